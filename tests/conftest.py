@@ -1,0 +1,34 @@
+"""Fixtures for every room's tests: a ROS domain of one's own."""
+
+from __future__ import annotations
+
+import fcntl
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+# Ids up to 101 leave DDS's ports below Linux's ephemeral range.
+_DOMAIN_IDS = range(40, 102)
+
+
+@pytest.fixture
+def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """Yield a ROS domain id that no other test of any process on this machine holds."""
+    for candidate in _DOMAIN_IDS:
+        lock = Path(tempfile.gettempdir(), f"roaas-domain-{candidate}.lock").open("w")  # noqa: SIM115 - held below
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.close()
+            continue
+        with lock:
+            monkeypatch.setenv("ROS_DOMAIN_ID", str(candidate))
+            monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+            yield candidate
+        return
+    pytest.fail(f"all ROS domain ids from {_DOMAIN_IDS[0]} to {_DOMAIN_IDS[-1]} are taken by other tests")
