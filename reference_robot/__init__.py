@@ -1,0 +1,1 @@
+"""A robot that conforms: ROS 2 interfaces, a simulated robot, and the web services in front of it."""
