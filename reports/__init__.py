@@ -1,0 +1,1 @@
+"""Turns result files into what people read."""

@@ -1,0 +1,200 @@
+"""The certificate: a conformance result as a page that a vendor can hand to a customer, and as Markdown.
+
+What it says is worked out here, once, for both; how it looks is the templates' affair. It calls itself a
+certificate only where every claimed class passed.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from reports.pages import html_page, markdown_page
+
+SHOWN_FAILURES = 10
+"""Findings shown for each requirement; the rest are counted. Result files hold them all."""
+SHOWN_BODY = 3000
+"""Characters of a request's or response's body that are shown."""
+SHOWN_CURL = 12_000
+"""A longer command (a size attack's) is of no use on a clipboard: it is cut, and the page says so."""
+
+VERDICT_WORDS = {
+    "conformant": "Conformant",
+    "not-conformant": "Not conformant",
+    "inconclusive": "Inconclusive",
+    "pass": "Passed",
+    "fail": "Failed",
+    "warn": "Warning",
+    "skip": "Not tested",
+    "error": "No verdict",
+    "not-claimed": "Not claimed",
+}
+_ORDER = ("fail", "error", "warn", "skip", "pass", "not-claimed")
+_CLASS_ORDER = ("fail", "inconclusive", "pass", "not-claimed")
+
+
+@dataclass(frozen=True, slots=True)
+class ClassSummary:
+    """One conformance class with its requirements, the worst first."""
+
+    name: str
+    title: str
+    verdict: str
+    reason: str
+    requirements: tuple[Mapping[str, Any], ...]
+
+    @property
+    def cases(self) -> int:
+        """Cases executed for the class."""
+        return sum(requirement["cases"] for requirement in self.requirements)
+
+    def count(self, verdict: str, level: str | None = None) -> int:
+        """Requirements with that verdict, of one level or of all."""
+        return sum(
+            requirement["verdict"] == verdict and level in (None, requirement["level"])
+            for requirement in self.requirements
+        )
+
+    def level(self, level: str) -> int:
+        """Requirements of that level."""
+        return sum(requirement["level"] == level for requirement in self.requirements)
+
+
+@dataclass(frozen=True, slots=True)
+class Untested:
+    """Requirements of claimed classes that were not judged for one reason."""
+
+    reason: str
+    requirements: tuple[Mapping[str, Any], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What both pages show.
+
+    Attributes:
+        result: the result file.
+        classes: claimed classes first, each group with the worst verdict first.
+        untested: requirements of claimed classes without a verdict, grouped by reason.
+    """
+
+    result: Mapping[str, Any]
+    classes: tuple[ClassSummary, ...]
+    untested: tuple[Untested, ...] = field(default=())
+
+    @property
+    def claimed(self) -> tuple[ClassSummary, ...]:
+        """The classes that were judged."""
+        return tuple(c for c in self.classes if c.verdict != "not-claimed")
+
+    @property
+    def unclaimed(self) -> tuple[ClassSummary, ...]:
+        """The classes that the vendor does not claim."""
+        return tuple(c for c in self.classes if c.verdict == "not-claimed")
+
+    @property
+    def passed(self) -> tuple[ClassSummary, ...]:
+        """The classes that the document certifies."""
+        return tuple(c for c in self.classes if c.verdict == "pass")
+
+    @property
+    def title(self) -> str:
+        """What the document may call itself."""
+        return (
+            "Certificate of conformance" if self.result["verdict"] == "conformant" else "Conformance report"
+        )
+
+    @property
+    def robot(self) -> str:
+        """The robot's name, or where it was reached when it has none."""
+        name = self.result["statement"]["robot"].get("name")
+        return str(name or self.result["target"].get("rest") or "Unnamed robot")
+
+    @property
+    def maker(self) -> str:
+        """Vendor and version, as far as they are stated."""
+        robot = self.result["statement"]["robot"]
+        parts = [robot.get("vendor"), f"version {robot['version']}" if robot.get("version") else None]
+        return ", ".join(part for part in parts if part)
+
+    @property
+    def headline(self) -> str:
+        """The verdict in a sentence."""
+        judged = len(self.claimed)
+        classes = f"{judged} claimed {'class' if judged == 1 else 'classes'}"
+        verdict = self.result["verdict"]
+        if verdict == "conformant":
+            return f"{'Each of the ' if judged > 1 else 'The '}{classes} passed."
+        failed = sum(c.verdict == "fail" for c in self.classes)
+        open_classes = sum(c.verdict == "inconclusive" for c in self.classes)
+        if verdict == "not-conformant":
+            rest = f"; {open_classes} could not be judged" if open_classes else ""
+            return f"{failed} of {classes} failed{rest}."
+        if not sum(requirement["cases"] for requirement in self.result["requirements"]):
+            return "No case was executed: nothing can be said of this robot."
+        return f"{open_classes} of {classes} could not be judged."
+
+    def with_verdict(self, verdict: str) -> tuple[Mapping[str, Any], ...]:
+        """Requirements of all classes with that verdict."""
+        return tuple(r for c in self.classes for r in c.requirements if r["verdict"] == verdict)
+
+    def counts(self) -> Iterator[tuple[str, int]]:
+        """Number of requirements for each verdict that occurs, the worst first."""
+        for verdict in _ORDER:
+            number = len(self.with_verdict(verdict))
+            if number:
+                yield verdict, number
+
+
+def certificate(result: Mapping[str, Any]) -> Certificate:
+    """Arrange a valid `roaas-result/1` document for reading."""
+    classes = tuple(sorted(_classes(result), key=lambda c: _CLASS_ORDER.index(c.verdict)))
+    return Certificate(result, classes, tuple(_untested(classes)))
+
+
+def _classes(result: Mapping[str, Any]) -> Iterator[ClassSummary]:
+    by_class: dict[str, list[Mapping[str, Any]]] = {name: [] for name in result["classes"]}
+    for requirement in result["requirements"]:
+        by_class.setdefault(requirement["class"], []).append(requirement)
+    titles = result.get("class_titles", {})
+    for name, requirements in by_class.items():
+        yield ClassSummary(
+            name=name,
+            title=titles.get(name, ""),
+            verdict=result["classes"].get(name, "inconclusive"),
+            reason=result["class_reasons"].get(name, ""),
+            requirements=tuple(sorted(requirements, key=lambda r: _ORDER.index(r["verdict"]))),
+        )
+
+
+def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
+    groups: dict[str, list[Mapping[str, Any]]] = {}
+    for summary in classes:
+        if summary.verdict == "not-claimed":
+            continue
+        for requirement in summary.requirements:
+            if requirement["verdict"] in {"skip", "error"}:
+                reason = requirement["untestable"] or requirement["reason"] or "No reason was recorded."
+                groups.setdefault(reason, []).append(requirement)
+    for reason, requirements in groups.items():
+        yield Untested(reason, tuple(requirements))
+
+
+def certificate_html(result: Mapping[str, Any]) -> str:
+    """The certificate as one HTML file."""
+    return html_page("certificate.html.j2", **_values(result))
+
+
+def certificate_markdown(result: Mapping[str, Any]) -> str:
+    """The short form for a pull request."""
+    return markdown_page("certificate.md.j2", **_values(result))
+
+
+def _values(result: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "certificate": certificate(result),
+        "result": result,
+        "words": VERDICT_WORDS,
+        "shown_failures": SHOWN_FAILURES,
+        "shown_body": SHOWN_BODY,
+        "shown_curl": SHOWN_CURL,
+    }

@@ -1,0 +1,104 @@
+"""Makes the pages: Jinja templates to self-contained files that nothing leaves and nothing enters.
+
+Each page carries its style and its script, and a Content-Security-Policy that allows these and no other
+source. The script is named in the policy by its digest (CSP Level 3, section 2.3.1), so that nothing a robot
+answered could run even if an escape were forgotten. Every page works without its script: it only adds copy
+buttons and a search box, and opens what is folded before printing.
+"""
+
+import base64
+import hashlib
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from reports.untrusted import beginning, code_block, code_span, excerpt, plain, visible
+
+TEMPLATE_DIR = Path(__file__).parent / "templates"
+
+
+def html_page(template: str, **values: Any) -> str:
+    """Fill one of the HTML templates; everything that is no `Markup` is escaped."""
+    script = _asset("page.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    return (
+        _environment(html=True)
+        .get_template(template)
+        .render(
+            policy=policy,
+            # These two are files of this folder and carry nothing of a result.
+            script=Markup(script),  # noqa: S704 - our own file
+            style=Markup(_asset("page.css")),  # noqa: S704 - our own file
+            generator=f"RoAAS {suite_version()}",
+            **values,
+        )
+    )
+
+
+def markdown_page(template: str, **values: Any) -> str:
+    """Fill one of the Markdown templates; they put all foreign text into code spans and blocks."""
+    return (
+        _environment(html=False).get_template(template).render(generator=f"RoAAS {suite_version()}", **values)
+    )
+
+
+def write_page(path: Path, text: str) -> Path:
+    """Write a page beside its final name first: whoever is interrupted leaves the old page or the new one."""
+    draft = path.with_name(f".{path.name}.part")
+    draft.write_text(text, encoding="utf-8")
+    return draft.replace(path)
+
+
+def suite_version() -> str:
+    """Version of the installed distribution; "unknown" where the code runs without being installed."""
+    try:
+        return version("roaas")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+@cache
+def _environment(*, html: bool) -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATE_DIR),
+        autoescape=html,  # noqa: S701 - off for Markdown alone, where HTML entities would be shown as such
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        finalize=_finalize,
+    )
+    environment.filters.update(
+        beginning=beginning,
+        code_span=code_span,
+        code_block=code_block,
+        excerpt=excerpt,
+        grouped=grouped,
+        plain=plain,
+    )
+    return environment
+
+
+def _finalize(value: Any) -> Any:
+    """What every `{{ … }}` goes through: text becomes visible text; markup of our own stays as it is."""
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return visible(value)
+    return value
+
+
+def grouped(number: float) -> str:
+    """A whole number with its thousands apart: 12,345."""
+    return f"{number:,}"
+
+
+@cache
+def _asset(name: str) -> str:
+    return (TEMPLATE_DIR / name).read_text(encoding="utf-8")

@@ -1,0 +1,96 @@
+"""Reads result files: JSON that is checked against its public JSON Schema before it is shown."""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any, NoReturn
+
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import ValidationError, best_match
+
+from reports.errors import (
+    ResultFormatError,
+    ResultGarbledError,
+    ResultInvalidError,
+    ResultMissingError,
+    ResultUnreadableError,
+)
+from reports.untrusted import excerpt
+
+SCHEMA_DIR = Path(__file__).parent / "schemas"
+RESULT_FORMAT = "roaas-result/1"
+LATENCY_FORMAT = "roaas-latency/1"
+SCHEMA_FILES = {
+    RESULT_FORMAT: SCHEMA_DIR / "roaas-result-1.schema.json",
+    LATENCY_FORMAT: SCHEMA_DIR / "roaas-latency-1.schema.json",
+}
+RESULT_NAME = "result.json"
+LATENCY_NAME = "latency.json"
+
+
+@cache
+def validator(result_format: str) -> Draft202012Validator:
+    """The validator of one of the two formats; kept, because building one costs more than using it."""
+    schema = json.loads(SCHEMA_FILES[result_format].read_text(encoding="utf-8"))
+    return Draft202012Validator(schema)
+
+
+def read_result(path: Path) -> dict[str, Any]:
+    """Read a conformance result; errors as in `reports.errors`."""
+    return _read(path, RESULT_FORMAT)
+
+
+def read_latency(path: Path) -> dict[str, Any]:
+    """Read a latency result; errors as in `reports.errors`."""
+    return _read(path, LATENCY_FORMAT)
+
+
+def _read(path: Path, expected: str) -> dict[str, Any]:
+    document = _parse(path, _text(path))
+    if not isinstance(document, dict):
+        raise ResultInvalidError(f"{path}: at $: expected an object, found {_shown(document)}")
+    found = document.get("format")
+    if found != expected:
+        raise ResultFormatError(f"{path}: at $.format: expected {expected!r}, found {_shown(found)}")
+    error = best_match(validator(expected).iter_errors(document))
+    if error is not None:
+        raise ResultInvalidError(f"{path}: {_where(error)}")
+    return document
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise ResultMissingError(f"{path}: there is no such file") from error
+    except UnicodeDecodeError as error:
+        octet = error.object[error.start]
+        raise ResultUnreadableError(f"{path}: octet {error.start} (0x{octet:02x}) is not UTF-8") from error
+    except OSError as error:
+        raise ResultUnreadableError(f"{path}: {error.strerror or error}") from error
+
+
+def _parse(path: Path, text: str) -> Any:
+    try:
+        return json.loads(text, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        near = excerpt(text[max(0, error.pos - 20) : error.pos + 20], 60)
+        raise ResultGarbledError(
+            f"{path}: line {error.lineno}, column {error.colno}: {error.msg}, near {near!r}",
+        ) from error
+    except ValueError as error:  # NaN and Infinity, and integers of thousands of digits
+        raise ResultGarbledError(f"{path}: {error}") from error
+    except RecursionError as error:
+        raise ResultGarbledError(f"{path}: nested too deeply to be a result") from error
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a JSON number (RFC 8259, section 6)")
+
+
+def _where(error: ValidationError) -> str:
+    return f"at {error.json_path}: {excerpt(error.message, 300)} (value: {_shown(error.instance)})"
+
+
+def _shown(value: object) -> str:
+    return excerpt(json.dumps(value, ensure_ascii=False, default=repr), 120)

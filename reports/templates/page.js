@@ -1,0 +1,41 @@
+"use strict";
+// Adds comfort to a page that is whole without it: copy buttons, a search box, and everything unfolded in print.
+for (const source of document.querySelectorAll("[data-copy]")) {
+  const button = document.createElement("button");
+  const word = source.dataset.copy || "Copy";
+  button.type = "button";
+  button.textContent = word;
+  button.addEventListener("click", async () => {
+    const rows = source.tagName === "TABLE" ? Array.from(source.rows, (row) => Array.from(row.cells, (cell) => cell.innerText.trim()).join("\t")) : null;
+    try {
+      await navigator.clipboard.writeText(rows ? rows.join("\n") : source.textContent);
+      button.textContent = "Copied";
+    } catch {
+      // No clipboard for this page (an old browser, a page over plain HTTP): leave the text selected.
+      getSelection().selectAllChildren(source);
+      button.textContent = "Selected: copy with Ctrl+C";
+    }
+    setTimeout(() => { button.textContent = word; }, 2500);
+  });
+  const place = source.previousElementSibling;
+  if (place && place.classList.contains("label")) place.append(button);
+  else (source.closest(".scroll") || source).before(button);
+}
+const filter = document.querySelector(".filter");
+if (filter) {
+  const box = document.createElement("input");
+  box.type = "search";
+  box.placeholder = "Search requirements";
+  box.setAttribute("aria-label", "Search requirements");
+  box.addEventListener("input", () => {
+    const wanted = box.value.toLowerCase();
+    for (const item of document.querySelectorAll("details[data-verdict]")) item.classList.toggle("unmatched", !item.textContent.toLowerCase().includes(wanted));
+  });
+  filter.append(box);
+}
+let folded = [];
+addEventListener("beforeprint", () => {
+  folded = Array.from(document.querySelectorAll("details:not([open])"));
+  for (const item of folded) item.open = true;
+});
+addEventListener("afterprint", () => { for (const item of folded) item.open = false; });
