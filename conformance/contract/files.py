@@ -43,7 +43,6 @@ class Contract:
         wadl_path: the WADL, or None.
         publishers_path: the WSDL of the service that acts, or None.
         subscribers_path: the WSDL of the service that only reads, or None.
-        own: whether this is RoAAS's own contract, with resources that its own modules know.
     """
 
     directory: Path
@@ -51,7 +50,6 @@ class Contract:
     wadl_path: Path | None
     publishers_path: Path | None
     subscribers_path: Path | None
-    own: bool
 
     @classmethod
     def load(cls, directory: Path = CONTRACT_DIR) -> Contract:
@@ -64,31 +62,29 @@ class Contract:
             ContractError: there is no such folder, or nothing in it describes an interface, or too much does.
         """
         if not directory.is_dir():
-            raise ContractError(
-                f"{directory} is no folder: --contract takes one with openapi.yaml and/or *.wsdl in it"
-            )
+            raise ContractError(f"{directory} is no folder: --contract takes one with openapi.yaml and/or *.wsdl in it")
         openapi = next((directory / name for name in _OPENAPI_NAMES if (directory / name).is_file()), None)
         wsdls = sorted(directory.glob("*.wsdl"))
         reading = [path for path in wsdls if "subscriber" in path.name.lower()]
         acting = [path for path in wsdls if path not in reading]
         if openapi is None and not wsdls:
-            raise ContractError(
-                f"{directory} describes nothing: it has neither {_OPENAPI_NAMES[0]} nor a *.wsdl"
-            )
+            raise ContractError(f"{directory} describes nothing: it has neither {_OPENAPI_NAMES[0]} nor a *.wsdl")
         for kind, found in (("services that act", acting), ("services that only read", reading)):
             if len(found) > 1:
                 names = ", ".join(path.name for path in found)
                 raise ContractError(f"{directory} has more than one WSDL of {kind}: {names}")
-        contract = cls(
+        return cls(
             directory,
             openapi,
             next(iter(sorted(directory.glob("*.wadl"))), None),
             acting[0] if acting else None,
             reading[0] if reading else None,
-            own=False,
         )
-        own_resource = "/robot/pose/" in (contract.openapi.get("paths") or {})
-        return cls(**{**contract.__dict__, "own": own_resource}) if own_resource else contract
+
+    @cached_property
+    def own(self) -> bool:
+        """Whether this is RoAAS's own contract, with resources that its own modules know."""
+        return "/robot/pose/" in self.openapi.get("paths", {})
 
     @cached_property
     def openapi(self) -> dict[str, Any]:
