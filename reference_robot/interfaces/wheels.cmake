@@ -15,14 +15,6 @@ set(ENV{LD_LIBRARY_PATH} "${ros_prefix}/lib:$ENV{LD_LIBRARY_PATH}")
 # A message's shared libraries name others that the linker has to find as well.
 add_link_options("LINKER:-rpath-link,${ros_prefix}/lib")
 
-# Fast DDS, which the wheels carry, needs no introspection type support; without it the build is
-# shorter. The message packages' targets name it, though, so an empty target stands in.
-foreach(language IN ITEMS c cpp)
-  set(unneeded rosidl_typesupport_introspection_${language})
-  set(CMAKE_DISABLE_FIND_PACKAGE_${unneeded} ON)
-  add_library(${unneeded}::${unneeded} INTERFACE IMPORTED)
-endforeach()
-
 # The wheels' Python targets carry the include folders of the machine that built the wheels.
 function(roaas_correct_include_folders)
   get_property(imported DIRECTORY PROPERTY IMPORTED_TARGETS)
