@@ -1,0 +1,1 @@
+"""Judges a robot through its web services, and nothing else."""

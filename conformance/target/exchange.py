@@ -1,0 +1,138 @@
+"""What was sent to a robot and what came back, as values that can be shown and sent again."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import shlex
+from dataclasses import dataclass
+
+_CURL_PLAIN_LIMIT = 4000
+
+
+@dataclass(frozen=True)
+class Request:
+    """One HTTP request as it was sent.
+
+    Attributes:
+        method: as on the wire.
+        url: absolute, with its target as it was sent.
+        headers: pairs in sending order; a bearer token is never kept in them.
+        body: octets.
+        raw: what went over the socket, where the request was written by hand and is no plain HTTP request.
+    """
+
+    method: str
+    url: str
+    headers: tuple[tuple[str, str], ...] = ()
+    body: bytes = b""
+    raw: bytes | None = None
+
+    @property
+    def size(self) -> int:
+        """How much there is to read in it: what "smallest failing request" is measured by."""
+        return len(self.url) + len(self.body) + sum(len(name) + len(value) for name, value in self.headers)
+
+    def curl(self) -> str:
+        """A shell command that sends the request again (a raw one by nc)."""
+        if self.raw is not None:
+            host, _, port = self.url.split("//", 1)[-1].split("/", 1)[0].rpartition(":")
+            return f"{_printed(self.raw)} | nc {host.strip('[]')} {port}"
+        words = ["curl", "-i", "--path-as-is", "-g"]
+        if self.method == "HEAD":
+            words.append("-I")
+        elif self.method != "GET" or self.body:
+            words += ["-X", self.method]
+        for name, value in self.headers:
+            if name.lower() in {"host", "content-length", "connection", "user-agent", "accept-encoding"}:
+                continue
+            words += ["-H", f"{name}: {value}" if value else f"{name};"]
+        pipe = ""
+        if self.body:
+            if _is_plain(self.body):
+                words += ["--data-binary", self.body.decode()]
+            else:
+                pipe = f"{_printed(self.body)} | "
+                words += ["--data-binary", "@-"]
+        words.append(self.url)
+        # $ROAAS_TOKEN has to be expanded by the shell, so its header is quoted by hand.
+        return pipe + " ".join(
+            '"Authorization: Bearer $ROAAS_TOKEN"'
+            if word == "Authorization: Bearer $ROAAS_TOKEN"
+            else shlex.quote(word)
+            for word in words
+        )
+
+
+def _is_plain(body: bytes) -> bool:
+    if len(body) > _CURL_PLAIN_LIMIT or body.startswith(b"@"):
+        return False
+    try:
+        return all(char.isprintable() or char in "\n\t" for char in body.decode())
+    except UnicodeDecodeError:
+        return False
+
+
+def _printed(body: bytes) -> str:
+    """A shell command that writes ``body``; compressed where that makes it shorter, as attack bodies are huge."""
+    packed = gzip.compress(body, mtime=0)
+    if len(packed) < len(body):
+        return f"echo {base64.b64encode(packed).decode()} | base64 -d | gunzip"
+    return f"echo {base64.b64encode(body).decode()} | base64 -d"
+
+
+@dataclass(frozen=True)
+class Response:
+    """One HTTP response.
+
+    Attributes:
+        status: status code.
+        headers: pairs in the order and spelling in which they came.
+        body: octets, after transfer coding and before content coding.
+        elapsed_ms: from the first octet sent to the last one received.
+        http_version: ``HTTP/1.1`` or ``HTTP/1.0``.
+    """
+
+    status: int
+    headers: tuple[tuple[str, str], ...]
+    body: bytes
+    elapsed_ms: float
+    http_version: str = "HTTP/1.1"
+
+    def header(self, name: str) -> str | None:
+        """The value of a field, several joined by commas (RFC 9110 5.3); None where there is none."""
+        values = [value for key, value in self.headers if key.lower() == name.lower()]
+        return ", ".join(values) if values else None
+
+    @property
+    def media_type(self) -> str:
+        """Content-Type without parameters, in lower case; empty where there is none."""
+        return (self.header("content-type") or "").split(";", 1)[0].strip().lower()
+
+    @property
+    def ok(self) -> bool:
+        """Whether the status is 2xx."""
+        return 200 <= self.status < 300  # noqa: PLR2004 - RFC 9110 15.3
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """A request with its answer, or with the reason why none came.
+
+    Attributes:
+        request: what was sent.
+        response: what came, or None.
+        problem: why there is no response ("no answer within 10 s", "connection closed without an answer", ...).
+    """
+
+    request: Request
+    response: Response | None
+    problem: str = ""
+
+    @property
+    def came(self) -> str:
+        """What came, in a few words for a finding."""
+        if self.response is None:
+            return self.problem
+        kind = f", {self.response.media_type}" if self.response.media_type else ""
+        return f"status {self.response.status}{kind}"

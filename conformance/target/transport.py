@@ -1,0 +1,87 @@
+"""HTTP to a robot with one deadline for a whole exchange, however slowly its octets drip.
+
+httpcore is used rather than a higher client because it sends what it is given (target, fields and their order) and
+parses answers strictly with h11, which makes it the judge of framing as well.
+"""
+
+from __future__ import annotations
+
+import ssl
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import httpcore
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+# An answer longer than this is no answer to any request of the contract.
+MAX_ANSWER = 32 * 1024 * 1024
+_clock = threading.local()
+
+
+def set_deadline(seconds: float) -> None:
+    """Give the exchange that this thread starts now ``seconds`` until its last octet."""
+    _clock.at = time.monotonic() + seconds
+
+
+def _left(timeout: float | None, error: type[Exception]) -> float:
+    left = float(getattr(_clock, "at", float("inf"))) - time.monotonic()
+    if left <= 0:
+        raise error("the deadline has passed")
+    return min(left, timeout) if timeout is not None else left
+
+
+class _DeadlineStream(httpcore.NetworkStream):
+    """A stream whose every wait ends at the exchange's deadline."""
+
+    def __init__(self, stream: httpcore.NetworkStream) -> None:
+        self._stream = stream
+
+    def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
+        return self._stream.read(max_bytes, _left(timeout, httpcore.ReadTimeout))
+
+    def write(self, buffer: bytes, timeout: float | None = None) -> None:
+        self._stream.write(buffer, _left(timeout, httpcore.WriteTimeout))
+
+    def close(self) -> None:
+        self._stream.close()
+
+    def start_tls(
+        self, ssl_context: ssl.SSLContext, server_hostname: str | None = None, timeout: float | None = None
+    ) -> httpcore.NetworkStream:
+        left = _left(timeout, httpcore.ConnectTimeout)
+        return _DeadlineStream(self._stream.start_tls(ssl_context, server_hostname, left))
+
+    def get_extra_info(self, info: str) -> Any:
+        return self._stream.get_extra_info(info)
+
+
+class DeadlineBackend(httpcore.NetworkBackend):
+    """httpcore's own network access, under the exchange's deadline."""
+
+    def __init__(self) -> None:
+        self._backend = httpcore.SyncBackend()
+
+    def connect_tcp(
+        self,
+        host: str,
+        port: int,
+        timeout: float | None = None,
+        local_address: str | None = None,
+        socket_options: Iterable[Any] | None = None,
+    ) -> httpcore.NetworkStream:
+        """See httpcore.NetworkBackend."""
+        left = _left(timeout, httpcore.ConnectTimeout)
+        return _DeadlineStream(self._backend.connect_tcp(host, port, left, local_address, socket_options))
+
+
+def tls_context(ca_file: Path | None) -> ssl.SSLContext:
+    """A context that trusts the system's authorities, or only those in ``ca_file``.
+
+    Raises:
+        OSError: the file cannot be read, or (ssl.SSLError) holds no certificate.
+    """
+    return ssl.create_default_context(cafile=str(ca_file) if ca_file else None)

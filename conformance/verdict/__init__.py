@@ -1,0 +1,1 @@
+"""From evidence to verdicts: what was judged, requirement by requirement, and what follows for class and robot."""

@@ -1,0 +1,119 @@
+"""From evidence to verdicts. The rules are here, and nowhere else.
+
+MUST fails, SHOULD warns, MAY informs. Skip outranks pass: a class with a MUST that could not be judged is
+inconclusive, never passed; so is one of which nothing was judged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from conformance.contract.ledger import Requirement
+    from conformance.verdict.judge import Evidence
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is said of one requirement.
+
+    Attributes:
+        requirement: which.
+        value: pass, fail, warn, skip, not-claimed or error.
+        reason: why, where it is not simply passed.
+        evidence: what was seen.
+    """
+
+    requirement: Requirement
+    value: str
+    reason: str
+    evidence: Evidence
+
+
+def verdict_of(requirement: Requirement, evidence: Evidence, claims: Iterable[str]) -> Verdict:
+    """Judge one requirement by its evidence."""
+
+    def verdict(value: str, reason: str = "") -> Verdict:
+        return Verdict(requirement, value, reason, evidence)
+
+    if requirement.class_ not in claims:
+        return verdict("not-claimed", f"class {requirement.class_} is not claimed")
+    if evidence.unclaimed and not evidence.cases:
+        return verdict("not-claimed", evidence.unclaimed)
+    if evidence.findings:
+        first = next(iter(evidence.findings.values()))
+        more = f" (and {len(evidence.findings) - 1} more)" if len(evidence.findings) > 1 else ""
+        reason = f"{first.expected}; found: {first.message}{more}"
+        value = {"MUST": "fail", "SHOULD": "warn"}.get(requirement.level)
+        return verdict(value, reason) if value else verdict("pass", f"not so, as it may be: {reason}")
+    for value, reasons in (
+        ("skip", [requirement.untestable] if requirement.untestable else []),
+        ("error", evidence.errors),
+        ("skip", evidence.skips),
+        ("skip", [] if evidence.cases else evidence.notes or ["nothing was executed for it"]),
+    ):
+        if reasons:
+            return verdict(value, "; ".join(reasons))
+    return verdict("pass", "; ".join(evidence.notes))
+
+
+def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Verdict and reason for each class that has requirements: pass, fail, inconclusive or not-claimed."""
+    by_class: dict[str, list[Verdict]] = {}
+    for verdict in verdicts:
+        by_class.setdefault(verdict.requirement.class_, []).append(verdict)
+    return {name: _class_verdict(items, name in claims) for name, items in by_class.items()}
+
+
+def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[str, str]:  # noqa: FBT001 - private
+    if not claimed:
+        return "not-claimed", ""
+    failed = [item for item in verdicts if item.value == "fail"]
+    if failed:
+        return "fail", f"{len(failed)} of {len(verdicts)} requirements failed, first {failed[0].requirement.id}"
+    unjudged = [
+        item for item in verdicts if item.value == "error" or (item.value == "skip" and _holds_back(item.requirement))
+    ]
+    if unjudged:
+        first = unjudged[0]
+        return (
+            "inconclusive",
+            (
+                f"{len(unjudged)} of {len(verdicts)} requirements could not be judged, first {first.requirement.id}: "
+                f"{first.reason}"
+            ),
+        )
+    if not any(item.evidence.cases for item in verdicts):
+        return "inconclusive", "nothing was executed"
+    return "pass", ""
+
+
+def _holds_back(requirement: Requirement) -> bool:
+    """Whether a class waits for this requirement to be judged.
+
+    What only a ROS probe can see is judged when there is one; a robot without ROS at hand is not held back by it.
+    """
+    return requirement.level == "MUST" and requirement.untestable is None and "probe" not in requirement.needs
+
+
+def overall(classes: Mapping[str, tuple[str, str]]) -> str:
+    """conformant, not-conformant or inconclusive."""
+    values = {value for value, _ in classes.values()} - {"not-claimed"}
+    if "fail" in values:
+        return "not-conformant"
+    if "inconclusive" in values or not values:
+        return "inconclusive"
+    return "conformant"
+
+
+def expected_failure(verdict: Verdict, reason: str, expires: str) -> Verdict:
+    """The verdict of a requirement whose failure a baseline expects."""
+    return replace(verdict, value="warn", reason=f"expected until {expires} ({reason}): {verdict.reason}")
+
+
+def broken_baseline(verdict: Verdict, problem: str) -> Verdict:
+    """The verdict of a requirement whose baseline entry is wrong."""
+    return replace(verdict, value="error", reason=problem)
