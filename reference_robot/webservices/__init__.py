@@ -1,0 +1,1 @@
+"""The paper's layer: ROS publishers and subscribers, REST resources and SOAP services, and no simulation."""

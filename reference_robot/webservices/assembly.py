@@ -1,0 +1,100 @@
+"""How the layers hang together: one pair of ROS nodes, handed down to every resource and web method (paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from reference_robot.webservices.deliveries import Deliveries
+from reference_robot.webservices.goals import Goals
+from reference_robot.webservices.http.address import Address, url_of
+from reference_robot.webservices.plans import Planner
+from reference_robot.webservices.resources.delivery import Delivery, DeliveryList
+from reference_robot.webservices.resources.description import OpenApi, Wadl
+from reference_robot.webservices.resources.goal import Goal
+from reference_robot.webservices.resources.graph import NavigationServices, Sensors
+from reference_robot.webservices.resources.plan import Plan
+from reference_robot.webservices.resources.pose import Pose
+from reference_robot.webservices.resources.velocity import LinearVelocity
+from reference_robot.webservices.resources.velocity import Velocity as VelocityResource
+from reference_robot.webservices.rest import RestInterface
+from reference_robot.webservices.soap.interface import SoapInterface
+from reference_robot.webservices.soap.publishers import PublishersWebService
+from reference_robot.webservices.soap.subscribers import SubscribersWebService
+from reference_robot.webservices.velocity import Velocity
+
+if TYPE_CHECKING:
+    from reference_robot.webservices.configuration import Configuration
+    from reference_robot.webservices.http.authorization import Authorization
+    from reference_robot.webservices.nodes.calls import RosCalls
+    from reference_robot.webservices.nodes.publishers import RobotPublishersNode
+    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+
+
+@dataclass(frozen=True)
+class RosSide:
+    """The nodes that everything shares, and the way to call ROS through them."""
+
+    publishers: RobotPublishersNode
+    subscribers: RobotSubscribersNode
+    calls: RosCalls
+
+
+@dataclass(frozen=True)
+class Endpoints:
+    """Where the two interfaces listen: host, and the ports that were really bound."""
+
+    host: str
+    rest_port: int
+    soap_port: int
+
+    @property
+    def rest(self) -> str:
+        """The base URL of the REST interface."""
+        return url_of(self.host, self.rest_port)
+
+    @property
+    def soap(self) -> str:
+        """The base URL of the SOAP interface."""
+        return url_of(self.host, self.soap_port)
+
+
+def interfaces(
+    ros: RosSide, configuration: Configuration, endpoints: Endpoints, authorization: Authorization
+) -> tuple[RestInterface, SoapInterface]:
+    """Return both interfaces, which share the nodes and everything that is known about the robot.
+
+    Args:
+        ros: The robot.
+        configuration: Names, limits and deadlines.
+        endpoints: Where the interfaces listen.
+        authorization: Who may call.
+    """
+    publishers, subscribers, calls = ros.publishers, ros.subscribers, ros.calls
+    frames = configuration.names.frames
+    goals = Goals(publishers, subscribers, calls, frames)
+    velocity = Velocity(publishers, subscribers, configuration.web, goals.is_active)
+    planner = Planner(subscribers, calls, frames)
+    deliveries = Deliveries(publishers, subscribers)
+    pose = Pose(subscribers)
+    rest_address = Address(endpoints.rest)
+    resources = [
+        pose,
+        VelocityResource(velocity),
+        LinearVelocity(velocity),
+        Sensors(subscribers),
+        NavigationServices(subscribers),
+        Goal(goals),
+        Plan(planner),
+        DeliveryList(deliveries),
+        OpenApi(rest_address),
+        Wadl(rest_address),
+    ]
+    services = [
+        PublishersWebService(deliveries),
+        SubscribersWebService(subscribers, pose, velocity, goals, planner),
+    ]
+    return (
+        RestInterface(resources, Delivery(deliveries), authorization),
+        SoapInterface(services, Address(endpoints.soap), authorization),
+    )

@@ -1,0 +1,116 @@
+"""The delivery application as both interfaces see it: hand a request to ROS, remember it, tell what became of it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+
+from mybot_delivery_app.msg import DeliveryRequestMsg
+
+from reference_robot.webservices.problems import not_yet
+
+if TYPE_CHECKING:
+    from reference_robot.webservices.nodes.publishers import RobotPublishersNode
+    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+
+_REMEMBERED: Final = 100  # the contract asks for the last 50
+_STATES: Final = frozenset({"queued", "active", "done", "failed", "dropped"})
+_NANOSECONDS: Final = 10**9
+
+
+class DeliveryRequest(NamedTuple):
+    """The fields of a DeliveryRequestMsg: coordinates in metres, every double as it was sent."""
+
+    message_code: int
+    depot_x: float
+    depot_y: float
+    destination_x: float
+    destination_y: float
+    source_x: float
+    source_y: float
+
+
+class _Accepted(NamedTuple):
+    request: DeliveryRequest
+    nanoseconds: int
+    interface: Literal["rest", "soap"]
+
+
+class Deliveries:
+    """Takes delivery requests from both interfaces.
+
+    Args:
+        publishers: The node that publishes requests.
+        subscribers: The node that hears what became of them.
+    """
+
+    def __init__(self, publishers: RobotPublishersNode, subscribers: RobotSubscribersNode) -> None:
+        self._publishers = publishers
+        self._subscribers = subscribers
+        self._accepted: deque[_Accepted] = deque(maxlen=_REMEMBERED)
+
+    def accept(self, request: DeliveryRequest, interface: Literal["rest", "soap"]) -> None:
+        """Publish a request whose values have been checked: exactly one message.
+
+        Raises:
+            Problem: 503, when no delivery application listens: the message would be lost.
+        """
+        if not self._publishers.delivery_is_served():
+            raise not_yet("no delivery application listens on the robot")
+        message = DeliveryRequestMsg()
+        (
+            message.message_code,
+            message.depot_x,
+            message.depot_y,
+            message.destination_x,
+            message.destination_y,
+            message.source_x,
+            message.source_y,
+        ) = request
+        self._accepted.append(_Accepted(request, time.time_ns(), interface))
+        self._publishers.publish_delivery(message)
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Return the requests accepted last, newest first, with the state that the application reports."""
+        missions = _missions(self._subscribers.missions)
+        entries = []
+        for accepted in reversed(self._accepted):
+            seconds, nanoseconds = divmod(accepted.nanoseconds, _NANOSECONDS)
+            entries.append(
+                {
+                    "request": accepted.request._asdict(),
+                    "state": _state(accepted, missions),
+                    "accepted": {"sec": seconds, "nanosec": nanoseconds},
+                    "interface": accepted.interface,
+                }
+            )
+        return entries
+
+
+def _state(accepted: _Accepted, missions: dict[DeliveryRequest, list[tuple[int, str]]]) -> str:
+    """Return the state of a request, and take its mission off the list.
+
+    A message carries no identity, so equal requests are told apart by order: the newest request takes the newest
+    mission that began after it. What the application has not reported (yet) is queued.
+    """
+    same = missions.get(accepted.request)
+    if same and same[0][0] >= accepted.nanoseconds:
+        return same.pop(0)[1]
+    return "queued"
+
+
+def _missions(report: str) -> dict[DeliveryRequest, list[tuple[int, str]]]:
+    """Return start (ns) and state of the reported missions by request, newest first; a report amiss counts as none."""
+    found: dict[DeliveryRequest, list[tuple[int, str]]] = {}
+    try:
+        for mission in json.loads(report or "[]"):
+            request = DeliveryRequest(**mission["request"])
+            accepted = mission["accepted"]
+            nanoseconds = int(accepted["sec"]) * _NANOSECONDS + int(accepted["nanosec"])
+            if mission["state"] in _STATES:
+                found.setdefault(request, []).append((nanoseconds, mission["state"]))
+    except (ValueError, TypeError, KeyError):
+        return {}
+    return found

@@ -1,0 +1,134 @@
+"""The endpoint publisher: both interfaces on their own ports, in one process and one event loop.
+
+The robot publishes its endpoints itself, without an application server (paper, "Purpose").
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from typing import TYPE_CHECKING, Any, Final
+
+import uvicorn
+
+from reference_robot.webservices.http.protocol import RobotHttpProtocol
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from reference_robot.webservices.http.interface import Interface
+
+_BACKLOG: Final = 1024  # connections that may arrive at once
+_KEEP_ALIVE: Final = 60  # seconds that an idle connection is kept for its next request
+_LAST_WORDS: Final = 2  # seconds for answers under way when the robot stops
+_SWEEP: Final = 1.0  # seconds between looks for overdue requests
+
+
+class PortInUseError(OSError):
+    """A port cannot be bound; the message names it and says why."""
+
+
+def bound(host: str, port: int) -> socket.socket:
+    """Return a TCP socket bound to host and port; port 0 takes a free one.
+
+    Raises:
+        PortInUseError: The address cannot be had.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise PortInUseError(f"cannot listen on {host} port {port}: {error}") from error
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(_BACKLOG)  # here and not later, so that a port in use is found out at once
+    except OSError as error:
+        listener.close()
+        raise PortInUseError(f"cannot listen on {host} port {port}: {error}") from error
+    listener.setblocking(False)  # noqa: FBT003 - socket's own signature
+    return listener
+
+
+class _Server(uvicorn.Server):
+    """uvicorn, leaving signals to the runner: two servers live in one process.
+
+    Attributes:
+        answers: Set when the server has begun to listen.
+    """
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self.answers = asyncio.Event()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to listen."""
+        await super().startup(sockets)
+        self.answers.set()
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+class EndpointPublisher:
+    """Serves interfaces until it is told to stop.
+
+    Args:
+        interfaces: Each interface with the bound socket that it listens on.
+    """
+
+    def __init__(self, interfaces: list[tuple[Interface, socket.socket]]) -> None:
+        self._listeners = [listener for _, listener in interfaces]
+        self._servers = [_Server(_settings(interface)) for interface, _ in interfaces]
+
+    async def serve(self, stop: asyncio.Event, started: asyncio.Event) -> None:
+        """Answer requests.
+
+        Args:
+            stop: Set by whoever wants the endpoints to close; answers under way are finished first.
+            started: Set here when all endpoints answer.
+        """
+        async with asyncio.TaskGroup() as group:
+            sweeping = group.create_task(self._end_overdue_requests())
+            for server, listener in zip(self._servers, self._listeners, strict=True):
+                group.create_task(server.serve(sockets=[listener]))
+            await asyncio.gather(*(server.answers.wait() for server in self._servers))
+            started.set()
+            await stop.wait()
+            for server in self._servers:
+                server.should_exit = True
+            sweeping.cancel()
+
+    async def _end_overdue_requests(self) -> None:
+        """End half-sent requests that would otherwise pile up: uvicorn waits for them forever."""
+        now = asyncio.get_running_loop().time
+        while True:
+            await asyncio.sleep(_SWEEP)
+            for server in self._servers:
+                connections: Any = list(server.server_state.connections)
+                for connection in connections:
+                    connection.close_if_overdue(now())
+
+
+def _settings(interface: Interface) -> uvicorn.Config:
+    return uvicorn.Config(
+        interface,
+        loop="uvloop",
+        http=RobotHttpProtocol,
+        ws="none",
+        lifespan="off",
+        interface="asgi3",
+        access_log=False,
+        log_config=None,
+        log_level="error",
+        proxy_headers=False,
+        server_header=False,
+        date_header=True,
+        backlog=_BACKLOG,
+        timeout_keep_alive=_KEEP_ALIVE,
+        timeout_graceful_shutdown=_LAST_WORDS,
+    )

@@ -1,0 +1,209 @@
+"""The life of a goal: sent, repeated, preempted, cancelled, ended. One goal is current at a time, or none."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import uuid
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped
+from std_msgs.msg import Header
+
+from reference_robot.webservices.poses import require_pose
+from reference_robot.webservices.problems import Problem, not_yet
+from reference_robot.webservices.representation.messages import message_from, reader_of
+from reference_robot.webservices.representation.shapes import Record, Text, shape_of
+
+if TYPE_CHECKING:
+    from reference_robot.names import Frames
+    from reference_robot.webservices.nodes.calls import RosCalls
+    from reference_robot.webservices.nodes.publishers import RobotPublishersNode
+    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+
+_GOAL_ID: Final = Record("GoalID", (("stamp", shape_of(Time)), ("id", Text(1, 255))), optional=frozenset({"stamp"}))
+# move_base_msgs/MoveBaseActionGoal, a type of ROS 1 that only the web interface still knows.
+GOAL: Final = Record(
+    "MoveBaseActionGoal",
+    (
+        ("header", shape_of(Header)),
+        ("goal_id", _GOAL_ID),
+        ("goal", Record("MoveBaseGoal", (("target_pose", shape_of(PoseStamped)),))),
+    ),
+    optional=frozenset({"header", "goal_id"}),
+)
+
+_STATUS_TEXTS: Final = {
+    GoalStatus.STATUS_ACCEPTED: "accepted",
+    GoalStatus.STATUS_EXECUTING: "executing",
+    GoalStatus.STATUS_CANCELING: "canceling",
+}
+_REASON_COMES_WITHIN: Final = 0.3  # seconds after a refusal in which its reason may still arrive
+_REASON_STEP: Final = 0.02
+
+
+@dataclass(frozen=True)
+class _Goal:
+    """A goal that the robot accepted from us; ``handle`` is rclpy's, which follows its status."""
+
+    identity: bytes
+    described: dict[str, Any]
+    handle: Any
+
+    @property
+    def status(self) -> int:
+        reported: int = self.handle.status
+        return reported or GoalStatus.STATUS_ACCEPTED  # 0: accepted, and no status has come yet
+
+
+class Goals:
+    """The goal resource's life cycle, on the event loop's thread.
+
+    Args:
+        publishers: The node that sends and cancels goals.
+        subscribers: The node that hears of goals which others sent (a mission's) and of reasons for refusals.
+        calls: Waits for ROS.
+        frames: Those in which poses are taken.
+    """
+
+    def __init__(
+        self,
+        publishers: RobotPublishersNode,
+        subscribers: RobotSubscribersNode,
+        calls: RosCalls,
+        frames: Frames,
+    ) -> None:
+        self._publishers = publishers
+        self._subscribers = subscribers
+        self._calls = calls
+        self._frames = frames
+        self._own: _Goal | None = None
+        self._over = ""  # the goal that ended last: no longer current, even before the robot says so
+        self._one_at_a_time = asyncio.Lock()
+
+    def current(self) -> dict[str, Any] | None:
+        """Return the active goal as a plain MoveBaseActionGoal with its status, or None."""
+        own = self._active_own()
+        if own is not None:
+            return own.described | {"status": {"code": own.status, "text": _STATUS_TEXTS[own.status]}}
+        return self._foreign()
+
+    def is_active(self) -> bool:
+        """Tell whether the robot follows a goal, whoever sent it."""
+        return self.current() is not None
+
+    async def send(self, wanted: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+        """Send a goal, unless it is the current one already.
+
+        Args:
+            wanted: A plain MoveBaseActionGoal of the right shape.
+
+        Returns:
+            The HTTP status and the goal as the robot holds it: 200 for a repeat, 201 for a new goal, 202 where it
+            displaces another one.
+
+        Raises:
+            Problem: 422 for a pose that cannot be taken or a goal that the robot refuses, 409 for the current goal's
+                id with another pose, 503 while no navigation is there.
+        """
+        require_pose(wanted["goal"]["target_pose"], self._frames, "goal.target_pose")
+        async with self._one_at_a_time:
+            current = self.current()
+            identity = wanted.get("goal_id", {}).get("id")
+            if current is not None and identity == current["goal_id"]["id"]:
+                if _destination(wanted) != _destination(current):
+                    raise Problem(409, f"goal_id.id {identity!a} is the current goal's, which has another target_pose")
+                return 200, current
+            self._own = await self._accepted(self._filled_in(wanted))
+            sent = self.current() or self._own.described | {"status": {"code": 1, "text": "accepted"}}
+            return (201 if current is None else 202), sent
+
+    async def cancel(self) -> None:
+        """Cancel the active goal.
+
+        Raises:
+            Problem: 404 when there is none, 409 when the robot will not cancel it, 503 when it does not answer.
+        """
+        async with self._one_at_a_time:
+            current = self.current()
+            if current is None:
+                raise Problem(404, "the robot follows no goal")
+            own = self._active_own()
+            identity = own.identity if own else bytes.fromhex(current["goal_id"]["id"])
+            reply = await self._calls.result(
+                lambda: self._publishers.cancel_goal(identity), "the navigation's cancel service"
+            )
+            if reply.return_code == CancelGoal.Response.ERROR_REJECTED:
+                raise Problem(409, f"the navigation refuses to cancel goal {current['goal_id']['id']!a}")
+            # Cancelled, unknown or ended: in each case it is current no longer.
+            self._own = None
+            self._over = identity.hex()
+
+    def _active_own(self) -> _Goal | None:
+        own = self._own
+        if own is not None and (own.status not in _STATUS_TEXTS or not self._publishers.navigation_is_served()):
+            self._over = own.identity.hex()  # it has ended, or whoever followed it is gone
+            self._own = own = None
+        return own
+
+    def _foreign(self) -> dict[str, Any] | None:
+        """Return the goal of a mission, which the navigation publishes; a report amiss counts as none."""
+        report = self._subscribers.current_goal
+        if not report or not self._publishers.navigation_is_served():
+            return None
+        try:
+            told = json.loads(report)
+            identity, code, pose = str(told["goal_id"]), int(told["status"]), told["pose"]
+            header = {"stamp": pose["header"]["stamp"], "frame_id": pose["header"]["frame_id"]}
+            described = {
+                "header": header,
+                "goal_id": {"stamp": header["stamp"], "id": identity},
+                "goal": {"target_pose": reader_of(PoseStamped)(message_from(shape_of(PoseStamped), pose))},
+                "status": {"code": code, "text": _STATUS_TEXTS.get(code, "")},
+            }
+        except (ValueError, TypeError, KeyError, AssertionError):
+            return None
+        return described if code in _STATUS_TEXTS and identity != self._over else None
+
+    def _filled_in(self, wanted: dict[str, Any]) -> dict[str, Any]:
+        """Return the goal with what the client may leave out: stamps mean now, the id is a new one."""
+        seconds, nanoseconds = self._publishers.get_clock().now().seconds_nanoseconds()
+        now = {"stamp": {"sec": seconds, "nanosec": nanoseconds}}
+        target = wanted["goal"]["target_pose"]
+        return {
+            "header": now | wanted.get("header", {"frame_id": target["header"]["frame_id"]}),
+            "goal_id": now | wanted.get("goal_id", {"id": str(uuid.uuid4())}),
+            "goal": {"target_pose": {"header": now | target["header"], "pose": target["pose"]}},
+        }
+
+    async def _accepted(self, described: dict[str, Any]) -> _Goal:
+        if not self._publishers.navigation_is_served():
+            raise not_yet("the robot has no navigation that takes goals")
+        identity = uuid.uuid4().bytes  # ROS's own: an id of the web may come again for another goal
+        pose = message_from(shape_of(PoseStamped), described["goal"]["target_pose"])
+        handle = await self._calls.result(lambda: self._publishers.send_goal(identity, pose), "the navigation")
+        if not handle.accepted:
+            reason = await self._reason(identity.hex())
+            raise Problem(422, f"goal.target_pose is refused by the navigation: {reason}")
+        return _Goal(identity, described, handle)
+
+    async def _reason(self, identity: str) -> str:
+        """Return why the robot refused a goal, which it tells on a topic of its own; Nav2 does not."""
+        for _ in range(round(_REASON_COMES_WITHIN / _REASON_STEP)):
+            try:
+                told = json.loads(self._subscribers.last_rejection or "{}")
+                if told.get("goal_id") == identity:
+                    return str(told["reason"])
+            except (ValueError, KeyError, AttributeError):
+                break
+            await asyncio.sleep(_REASON_STEP)
+        return "it gave no reason"
+
+
+def _destination(goal: dict[str, Any]) -> tuple[str, Any]:
+    target = goal["goal"]["target_pose"]
+    return target["header"]["frame_id"], target["pose"]

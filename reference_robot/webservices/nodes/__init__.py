@@ -1,0 +1,1 @@
+"""Pure ROS nodes: all publishers, and all subscribers. No web code (paper, section on the meta-models)."""

@@ -1,0 +1,122 @@
+"""RobotPublishersNode: everything that the web services send into ROS."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from action_msgs.srv import CancelGoal
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
+from mybot_delivery_app.msg import DeliveryRequestMsg
+from nav2_msgs.action import NavigateToPose
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from unique_identifier_msgs.msg import UUID
+
+if TYPE_CHECKING:
+    from rclpy.context import Context
+    from rclpy.publisher import Publisher
+    from rclpy.task import Future
+
+    from reference_robot.names import RosNames
+
+COURIER_DELIVERY_MESSAGE_CODE: Final = 3
+COFFEE_DELIVERY_MESSAGE_CODE: Final = 4
+
+# Each accepted request is exactly one message (contract, ROS side): deep enough for a burst that outruns the reader.
+_DELIVERY_QOS: Final = QoSProfile(depth=1000)
+_VELOCITY_QOS: Final = QoSProfile(depth=10)
+_VELOCITY_TYPES: Final[dict[str, Any]] = {
+    "geometry_msgs/msg/Twist": Twist,
+    "geometry_msgs/msg/TwistStamped": TwistStamped,
+}
+
+
+class RobotPublishersNode(Node):
+    """All publishers, and the clients of the actions that move the robot.
+
+    Args:
+        context: The ROS context that shares the robot's domain.
+        names: Topics and actions to bind to.
+    """
+
+    def __init__(self, context: Context, names: RosNames) -> None:
+        super().__init__("robot_publishers", context=context)
+        self._names = names
+        self._delivery: Publisher = self.create_publisher(DeliveryRequestMsg, names.topics.delivery, _DELIVERY_QOS)
+        self._velocity: dict[str, Publisher] = {}
+        self._navigation = ActionClient(self, NavigateToPose, names.actions.navigate_to_pose)
+        self._cancel = self.create_client(CancelGoal, f"{names.actions.navigate_to_pose}/_action/cancel_goal")
+        if names.velocity.message != "auto":
+            self._velocity_publisher(f"geometry_msgs/msg/{names.velocity.message}")
+
+    # The delivery application
+
+    def delivery_is_served(self) -> bool:
+        """Tell whether anybody on the graph takes delivery requests."""
+        return bool(self._delivery.get_subscription_count())
+
+    def publish_delivery(self, request: DeliveryRequestMsg) -> None:
+        """Publish one delivery request."""
+        self._delivery.publish(request)
+
+    # Velocity
+
+    def find_velocity_subscribers(self) -> bool:
+        """Tell whether a robot takes velocity commands, and have a publisher of the type that it takes.
+
+        The type is the subscriber's: Twist on Nav2 as it comes with Jazzy, TwistStamped on a TurtleBot 3.
+        """
+        if any(publisher.get_subscription_count() for publisher in self._velocity.values()):
+            return True
+        if self._names.velocity.message == "auto":
+            topic = self.resolve_topic_name(self._names.topics.cmd_vel)
+            for endpoint in self.get_subscriptions_info_by_topic(topic):
+                if endpoint.topic_type in _VELOCITY_TYPES:
+                    self._velocity_publisher(endpoint.topic_type)
+        return any(publisher.get_subscription_count() for publisher in self._velocity.values())
+
+    def publish_velocity(self, twist: Twist) -> None:
+        """Publish one velocity command, in each type that a subscriber takes."""
+        for kind, publisher in self._velocity.items():
+            if not publisher.get_subscription_count():
+                continue
+            if _VELOCITY_TYPES[kind] is Twist:
+                publisher.publish(twist)
+            else:
+                stamped = TwistStamped(twist=twist)
+                stamped.header.stamp = self.get_clock().now().to_msg()
+                stamped.header.frame_id = self._names.frames.base
+                publisher.publish(stamped)
+
+    def _velocity_publisher(self, kind: str) -> None:
+        if kind not in self._velocity:
+            self._velocity[kind] = self.create_publisher(
+                _VELOCITY_TYPES[kind], self._names.topics.cmd_vel, _VELOCITY_QOS
+            )
+
+    # Navigation
+
+    def navigation_is_served(self) -> bool:
+        """Tell whether an action server takes goals."""
+        return bool(self._navigation.server_is_ready())
+
+    def send_goal(self, identity: bytes, pose: PoseStamped) -> Future:
+        """Send a goal; the future holds rclpy's ClientGoalHandle. Call it in the executor's thread.
+
+        Args:
+            identity: The 16 octets of the goal's UUID.
+            pose: Where to go, in a frame that the robot knows.
+        """
+        return self._navigation.send_goal_async(NavigateToPose.Goal(pose=pose), goal_uuid=UUID(uuid=list(identity)))
+
+    def cancel_goal(self, identity: bytes) -> Future:
+        """Cancel a goal, whoever sent it; the future holds a CancelGoal response."""
+        request = CancelGoal.Request()
+        request.goal_info.goal_id.uuid = list(identity)
+        return self._cancel.call_async(request)
+
+    def destroy_node(self) -> None:
+        """Destroy the action client before the node that it hangs on."""
+        self._navigation.destroy()
+        super().destroy_node()

@@ -1,0 +1,103 @@
+"""RobotSubscribersNode: everything that the web services learn from ROS."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from nav2_msgs.action import ComputePathToPose
+from nav_msgs.msg import Odometry
+from nav_msgs.srv import GetPlan
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from std_msgs.msg import String
+
+if TYPE_CHECKING:
+    from rclpy.context import Context
+    from rclpy.task import Future
+
+    from reference_robot.names import RosNames
+
+_LATCHED_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_NAVIGATION_PACKAGES: Final = frozenset({"nav_msgs", "nav2_msgs", "map_msgs", "slam_toolbox"})
+
+
+class RobotSubscribersNode(Node):
+    """All subscribers, the queries of the graph, and the clients of the planners.
+
+    Callbacks run in the executor's thread and only keep the message that came last: one reference, which the event
+    loop's thread reads. What a message means is worked out by whoever is asked for it.
+
+    Attributes:
+        odometry: The odometry received last, None before the first.
+        missions: The JSON list of missions received last (see ``names.toml``), empty before the first.
+        current_goal: The JSON of the goal that the robot follows, empty when it follows none.
+        last_rejection: The JSON of the goal refused last, and why; empty before the first.
+    """
+
+    def __init__(self, context: Context, names: RosNames) -> None:
+        super().__init__("robot_subscribers", context=context)
+        self.odometry: Odometry | None = None
+        self.missions = ""
+        self.current_goal = ""
+        self.last_rejection = ""
+        topics = names.topics
+        self.create_subscription(Odometry, topics.odom, self._keep_odometry, qos_profile_sensor_data)
+        self.create_subscription(String, topics.missions, self._keep_missions, _LATCHED_QOS)
+        self.create_subscription(String, topics.current_goal, self._keep_current_goal, _LATCHED_QOS)
+        self.create_subscription(String, topics.last_rejection, self._keep_last_rejection, _LATCHED_QOS)
+        self._planner_service = self.create_client(GetPlan, names.services.get_plan)
+        self._planner_action = ActionClient(self, ComputePathToPose, names.actions.compute_path_to_pose)
+
+    def _keep_odometry(self, message: Odometry) -> None:
+        self.odometry = message
+
+    def _keep_missions(self, message: String) -> None:
+        self.missions = message.data
+
+    def _keep_current_goal(self, message: String) -> None:
+        self.current_goal = message.data
+
+    def _keep_last_rejection(self, message: String) -> None:
+        self.last_rejection = message.data
+
+    # The graph
+
+    def sensors(self) -> list[dict[str, str]]:
+        """Return name, topic and type of every topic of sensor data that somebody publishes."""
+        return [
+            {"name": topic.removeprefix("/"), "topic": topic, "type": types[0]}
+            for topic, types in sorted(self.get_topic_names_and_types())
+            if types[0].startswith("sensor_msgs/msg/") and self.count_publishers(topic)
+        ]
+
+    def navigation_services(self) -> list[dict[str, str]]:
+        """Return name and type of every service of the navigation stack; those inside actions are not among them."""
+        return [
+            {"name": name, "type": types[0]}
+            for name, types in sorted(self.get_service_names_and_types())
+            if types[0].partition("/")[0] in _NAVIGATION_PACKAGES and "/_" not in name
+        ]
+
+    # Planning
+
+    def plan_service_is_served(self) -> bool:
+        """Tell whether a GetPlan service is there: a Nav2 of Jazzy has none."""
+        return bool(self._planner_service.service_is_ready())
+
+    def plan_action_is_served(self) -> bool:
+        """Tell whether a ComputePathToPose action is there."""
+        return bool(self._planner_action.server_is_ready())
+
+    def ask_plan_service(self, request: GetPlan.Request) -> Future:
+        """Ask the service; the future holds a GetPlan response."""
+        return self._planner_service.call_async(request)
+
+    def ask_plan_action(self, goal: ComputePathToPose.Goal) -> Future:
+        """Ask the action; the future holds rclpy's ClientGoalHandle. Call it in the executor's thread."""
+        return self._planner_action.send_goal_async(goal)
+
+    def destroy_node(self) -> None:
+        """Destroy the action client before the node that it hangs on."""
+        self._planner_action.destroy()
+        super().destroy_node()

@@ -1,0 +1,113 @@
+"""Plans: a GetPlan service where the robot has one, else the ComputePathToPose action of Nav2."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import PoseStamped
+from nav2_msgs.action import ComputePathToPose
+from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan
+
+from reference_robot.webservices.poses import planar_pose, require_known_frame
+from reference_robot.webservices.problems import Problem, not_yet
+from reference_robot.webservices.representation.messages import reader_of
+
+if TYPE_CHECKING:
+    from geometry_msgs.msg import Pose
+
+    from reference_robot.names import Frames
+    from reference_robot.webservices.nodes.calls import RosCalls
+    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+
+_LARGEST_TOLERANCE: Final = 3.4e38  # nav_msgs/GetPlan carries it as a float32
+
+
+@dataclass(frozen=True)
+class PlanQuery:
+    """What a plan is asked for: metres and radians, goal and start in ``frame_id``.
+
+    A part of the start that is left out is the robot's own.
+    """
+
+    x: float
+    y: float
+    yaw: float = 0.0
+    frame_id: str = "map"
+    tolerance: float = 0.1
+    start_x: float | None = None
+    start_y: float | None = None
+    start_yaw: float | None = None
+
+
+class Planner:
+    """Asks ROS for plans.
+
+    Args:
+        subscribers: The node with the planners' clients.
+        calls: Waits for ROS.
+        frames: Those in which poses are taken.
+    """
+
+    def __init__(self, subscribers: RobotSubscribersNode, calls: RosCalls, frames: Frames) -> None:
+        self._subscribers = subscribers
+        self._calls = calls
+        self._frames = frames
+        self._read = reader_of(Path)
+
+    async def plan(self, query: PlanQuery) -> dict[str, Any]:
+        """Return a plain nav_msgs/GetPlan response, ``{"plan": Path}``, with at least one pose.
+
+        Raises:
+            Problem: 422 for an unknown frame, a negative tolerance or a goal that no plan reaches; 503 while there is
+                no planner, or no odometry to start from.
+        """
+        require_known_frame(query.frame_id, self._frames, "frame_id")
+        if not 0 <= query.tolerance <= _LARGEST_TOLERANCE:
+            raise Problem(422, f"tolerance must be a length of 0 m or more, not {query.tolerance}")
+        start = self._stamped(self._start(query), query.frame_id)
+        goal = self._stamped(planar_pose(query.x, query.y, query.yaw), query.frame_id)
+        if self._subscribers.plan_service_is_served():
+            request = GetPlan.Request(start=start, goal=goal, tolerance=query.tolerance)
+            reply = await self._calls.result(lambda: self._subscribers.ask_plan_service(request), "the plan service")
+            path = reply.plan
+        elif self._subscribers.plan_action_is_served():
+            path = await self._by_action(start, goal)
+        else:
+            raise not_yet("the robot has no planner")
+        if not path.poses:
+            raise Problem(422, f"no plan leads to x = {query.x}, y = {query.y} in frame {query.frame_id}")
+        plain = self._read(path)
+        if plain["header"]["frame_id"] != query.frame_id:
+            raise Problem(422, f"the robot plans in frame {plain['header']['frame_id']}, not {query.frame_id}")
+        return {"plan": plain}
+
+    async def _by_action(self, start: PoseStamped, goal: PoseStamped) -> Path:
+        request = ComputePathToPose.Goal(start=start, goal=goal, use_start=True)
+        handle = await self._calls.result(lambda: self._subscribers.ask_plan_action(request), "the planner")
+        if not handle.accepted:
+            return Path()
+        reply = await self._calls.result(handle.get_result_async, "the planner")
+        return reply.result.path if reply.status == GoalStatus.STATUS_SUCCEEDED else Path()
+
+    def _start(self, query: PlanQuery) -> Pose:
+        if query.start_x is not None and query.start_y is not None:
+            return planar_pose(query.start_x, query.start_y, query.start_yaw or 0.0)
+        odometry = self._subscribers.odometry
+        if odometry is None:
+            raise not_yet("the robot has not published its odometry yet, from which a plan would start")
+        own = odometry.pose.pose
+        x = own.position.x if query.start_x is None else query.start_x
+        y = own.position.y if query.start_y is None else query.start_y
+        pose = planar_pose(x, y, query.start_yaw or 0.0)
+        if query.start_yaw is None:
+            pose.orientation = own.orientation
+        return pose
+
+    def _stamped(self, pose: Pose, frame_id: str) -> PoseStamped:
+        stamped = PoseStamped(pose=pose)
+        stamped.header.frame_id = frame_id
+        stamped.header.stamp = self._subscribers.get_clock().now().to_msg()
+        return stamped

@@ -1,0 +1,43 @@
+"""Poses that clients send: heading, unit quaternions, and frames that the robot knows."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from geometry_msgs.msg import Pose
+
+from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.checking import shown
+
+if TYPE_CHECKING:
+    from reference_robot.names import Frames
+
+_UNIT_TOLERANCE: Final = 1e-3  # contract, fine print
+
+
+def planar_pose(x: float, y: float, yaw: float) -> Pose:
+    """Return the pose on the floor at x, y (m) with a heading of yaw (rad)."""
+    pose = Pose()
+    pose.position.x, pose.position.y = x, y
+    pose.orientation.z, pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+    return pose
+
+
+def require_known_frame(frame_id: str, frames: Frames, where: str) -> None:
+    """Raise the 422 for a frame in which the robot takes no poses."""
+    if frame_id not in {frames.map, frames.odom}:
+        raise Problem(422, f"{where} must be {frames.map} or {frames.odom}: the robot knows no frame {shown(frame_id)}")
+
+
+def require_unit(orientation: dict[str, float], where: str) -> None:
+    """Raise the 422 for a quaternion whose length is not 1 within 1e-3."""
+    length = math.hypot(*orientation.values())
+    if not abs(length - 1) <= _UNIT_TOLERANCE:
+        raise Problem(422, f"{where} must have length 1 within {_UNIT_TOLERANCE}, not {length}")
+
+
+def require_pose(stamped: dict[str, Any], frames: Frames, where: str) -> None:
+    """Raise the 422 for a plain PoseStamped in an unknown frame or without a unit quaternion."""
+    require_known_frame(stamped["header"]["frame_id"], frames, f"{where}.header.frame_id")
+    require_unit(stamped["pose"]["orientation"], f"{where}.pose.orientation")

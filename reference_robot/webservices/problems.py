@@ -1,0 +1,54 @@
+"""Refusals, as RFC 9457 describes them."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from typing import Final
+
+from lxml import etree
+
+from reference_robot.webservices.representation.writing import text_of, write_json
+
+PROBLEM_JSON: Final = "application/problem+json"
+PROBLEM_XML: Final = "application/problem+xml"
+
+_NAMESPACE: Final = "urn:ietf:rfc:7807"  # RFC 9457 appendix B keeps RFC 7807's
+
+
+class Problem(Exception):  # noqa: N818 - RFC 9457's own name for it
+    """A request is refused.
+
+    Args:
+        status: HTTP status, 4xx for the client's fault and 5xx for the robot's.
+        detail: What was wrong, naming field and value.
+        headers: Further fields of the response, such as Allow or Retry-After.
+    """
+
+    def __init__(self, status: int, detail: str, headers: tuple[tuple[bytes, bytes], ...] = ()) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.detail = detail
+        self.headers = headers
+
+    def members(self) -> dict[str, str | int]:
+        """Return the members of the problem details object (RFC 9457 3.1)."""
+        return {
+            "type": "about:blank",
+            "title": HTTPStatus(self.status).phrase,
+            "status": self.status,
+            "detail": self.detail,
+        }
+
+    def written(self, media_type: str) -> bytes:
+        """Return the problem in one of its two media types."""
+        if media_type == PROBLEM_JSON:
+            return write_json(self.members())
+        root = etree.Element("problem", xmlns=_NAMESPACE)
+        for name, value in self.members().items():
+            etree.SubElement(root, name).text = text_of(value)
+        return etree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def not_yet(detail: str) -> Problem:
+    """Return the 503 for what the robot cannot say or do yet (RFC 9110 15.6.4)."""
+    return Problem(503, detail, ((b"retry-after", b"1"),))

@@ -1,0 +1,113 @@
+"""Whether plain data that came over the wire has the shape that the contract asks for."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.shapes import Real, Record, Series, Text, Truth, Whole
+
+if TYPE_CHECKING:
+    from reference_robot.webservices.representation.shapes import Shape
+
+_SHOWN: Final = 120
+
+
+def checked(shape: Shape, plain: Any, where: str = "") -> Any:
+    """Return the data with every real number as a float.
+
+    Args:
+        shape: What is asked for.
+        plain: What was sent.
+        where: The field's path, for the message; empty at the root.
+
+    Raises:
+        Problem: 422, with a detail that names the field and the value (RFC 9110 15.5.21).
+    """
+    return _CHECKS[type(shape)](shape, plain, where)
+
+
+def refused(where: str, plain: Any, why: str) -> Problem:
+    """Return the 422 that names a field and its value."""
+    return Problem(422, f"{where or 'the body'} {why}, not {shown(plain)}")
+
+
+def shown(plain: Any) -> str:
+    """Return a value as it can stand in an error message: printable, and short however long it was."""
+    text = ascii(plain)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}… ({len(text)} characters)"
+
+
+def _real(_shape: Real, plain: Any, where: str) -> float:
+    if type(plain) is float or type(plain) is int:
+        try:
+            number = float(plain)
+        except OverflowError:
+            number = math.inf
+        if math.isfinite(number):
+            return number
+    raise refused(where, plain, "must be a finite number")
+
+
+def _whole(shape: Whole, plain: Any, where: str) -> int:
+    if type(plain) is float and plain.is_integer():
+        plain = int(plain)  # JSON knows one kind of number: 4.0 is 4
+    if type(plain) is int and shape.lowest <= plain <= shape.highest:
+        return plain
+    raise refused(where, plain, f"must be an integer from {shape.lowest} to {shape.highest}")
+
+
+def _text(shape: Text, plain: Any, where: str) -> str:
+    if type(plain) is not str:
+        raise refused(where, plain, "must be a string")
+    if len(plain) < shape.shortest or (shape.longest is not None and len(plain) > shape.longest):
+        longest = "" if shape.longest is None else f" to {shape.longest}"
+        raise refused(where, plain, f"must have {shape.shortest}{longest} characters")
+    try:
+        plain.encode()
+    except UnicodeEncodeError as error:  # an unpaired \ud800 in JSON (RFC 8259 8.2)
+        raise refused(where, plain, "must be Unicode text without lone surrogates") from error
+    return plain
+
+
+def _truth(_shape: Truth, plain: Any, where: str) -> bool:
+    if type(plain) is not bool:
+        raise refused(where, plain, "must be true or false")
+    return plain
+
+
+def _series(shape: Series, plain: Any, where: str) -> list[Any]:
+    if type(plain) is not list:
+        raise refused(where, plain, "must be a list")
+    if shape.length is not None and len(plain) != shape.length:
+        raise refused(where, plain, f"must have {shape.length} items")
+    return [checked(shape.item, item, f"{where}[{index}]") for index, item in enumerate(plain)]
+
+
+def _record(shape: Record, plain: Any, where: str) -> dict[str, Any]:
+    if type(plain) is not dict:
+        raise refused(where, plain, f"must be an object of type {shape.name}")
+    path = f"{where}." if where else ""
+    known = dict(shape.fields)
+    for name, value in plain.items():
+        if name not in known:
+            known_names = ", ".join(known)
+            raise Problem(422, f"unknown field {shown(path + name)} = {shown(value)}; {shape.name} has {known_names}")
+    result = {}
+    for name, part in shape.fields:
+        if name in plain:
+            result[name] = checked(part, plain[name], path + name)
+        elif name not in shape.optional:
+            raise Problem(422, f"missing field {path}{name}; got {shown(plain)}")
+    return result
+
+
+_CHECKS: Final[dict[type, Any]] = {
+    Real: _real,
+    Whole: _whole,
+    Text: _text,
+    Truth: _truth,
+    Series: _series,
+    Record: _record,
+}

@@ -1,0 +1,72 @@
+"""Between ROS messages and plain data."""
+
+from __future__ import annotations
+
+import math
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
+
+from reference_robot.webservices.representation.shapes import Record, Series, shape_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from reference_robot.webservices.representation.shapes import Shape
+
+
+class NonFiniteValueError(ValueError):
+    """A message holds NaN or an infinity, which never leaves the robot (contract, REST)."""
+
+
+def reader_of(message: Any) -> Callable[[Any], dict[str, Any]]:
+    """Return a function from a message of this class to plain data.
+
+    The function raises NonFiniteValueError, naming the field, for a value that is not finite.
+    """
+    read = _reader(shape_of(message))
+
+    def to_plain(value: Any) -> dict[str, Any]:
+        plain: dict[str, Any] = read(value)
+        require_finite(plain)
+        return plain
+
+    return to_plain
+
+
+def require_finite(plain: Any, where: str = "") -> None:
+    """Raise NonFiniteValueError, naming the field, if plain data holds a value that is not finite."""
+    if isinstance(plain, float):
+        if not math.isfinite(plain):
+            raise NonFiniteValueError(f"{where} is {plain}")
+    elif isinstance(plain, dict):
+        for name, value in plain.items():
+            require_finite(value, f"{where}.{name}" if where else name)
+    elif isinstance(plain, list):
+        for index, value in enumerate(plain):
+            require_finite(value, f"{where}[{index}]")
+
+
+def message_from(shape: Record, plain: dict[str, Any]) -> Any:
+    """Return the ROS message that checked plain data stands for; fields left out keep ROS's defaults."""
+    return shape.message(**{name: _value(shape.field(name), value) for name, value in plain.items()})
+
+
+def _value(shape: Shape | None, plain: Any) -> Any:
+    if isinstance(shape, Record):
+        return message_from(shape, plain)
+    if isinstance(shape, Series):
+        return [_value(shape.item, item) for item in plain]
+    return plain
+
+
+def _reader(shape: Shape) -> Callable[[Any], Any]:
+    if isinstance(shape, Record):
+        parts = [(name, attrgetter(name), _reader(part)) for name, part in shape.fields]
+        return lambda message: {name: read(get(message)) for name, get, read in parts}
+    if isinstance(shape, Series):
+        if isinstance(shape.item, (Record, Series)):
+            read_item = _reader(shape.item)
+            return lambda items: [read_item(item) for item in items]
+        # NumPy arrays and array.array hold ROS's numeric arrays; both hand out Python numbers.
+        return lambda items: items.tolist() if hasattr(items, "tolist") else list(items)
+    return lambda value: value

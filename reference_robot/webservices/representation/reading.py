@@ -1,0 +1,163 @@
+"""Request bodies as plain data: strict JSON (RFC 8259) and XML in the form that the robot sends."""
+
+from __future__ import annotations
+
+import codecs
+import json
+import math
+import re
+from typing import TYPE_CHECKING, Any, Final
+
+from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.checking import checked, shown
+from reference_robot.webservices.representation.shapes import Real, Record, Series, Text, Truth, Whole
+from reference_robot.webservices.representation.writing import JSON, XML
+from reference_robot.webservices.representation.xml_input import parsed
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+ACCEPTED: Final = (JSON, XML)
+
+# The contract's grammar of a number, in paths, queries and XML alike; ASCII digits only.
+NUMBER: Final = r"[+-]?(?:[0-9]+(?:\.[0-9]+)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_REAL: Final = re.compile(NUMBER)
+_WHOLE: Final = re.compile(r"[+-]?[0-9]{1,40}")  # far beyond 64 bits; Python refuses to read 5,000 digits
+_DIGITS_READ: Final = 400  # an integer with more is beyond every double
+_XML_SPACE: Final = " \t\r\n"
+
+
+class _Beyond:
+    """A JSON number that no double holds; prints as it was sent."""
+
+    def __init__(self, lexeme: str) -> None:
+        self.lexeme = lexeme
+
+    def __repr__(self) -> str:
+        return self.lexeme
+
+
+def read(body: bytes, content_type: bytes | None, shape: Record) -> dict[str, Any]:
+    """Return a request body as plain data of the given shape.
+
+    Args:
+        body: The content, its size already bounded.
+        content_type: The Content-Type field's value, None where there is none.
+        shape: What the contract asks for.
+
+    Raises:
+        Problem: 415 for another media type, 400 for what is no JSON or XML at all, 422 for the wrong shape or value.
+    """
+    media_type, charset = parsed_content_type(content_type)
+    if media_type == JSON:
+        if charset is not None and charset not in {"utf-8", "utf8", "us-ascii"}:
+            raise _unsupported(f"charset {charset!a}")
+        return dict(checked(shape, read_json(body)))
+    if media_type == XML:
+        root = parsed(body, charset)
+        if root.tag != shape.name:
+            raise Problem(422, f"the root element must be {shape.name}, not {shown(root.tag)}")
+        return dict(checked(shape, _from_element(root, shape, shape.name)))
+    raise _unsupported(f"Content-Type {(content_type or b'').decode('latin-1')[:200]!a}")
+
+
+def parsed_content_type(field: bytes | None) -> tuple[str, str | None]:
+    """Return media type and charset in lower case (RFC 9110 8.3.1); the charset is None where none is given."""
+    media_type, *parameters = (field or b"").decode("latin-1").lower().split(";")
+    for parameter in parameters:
+        name, _, value = parameter.partition("=")
+        if name.strip() == "charset":
+            return media_type.strip(), value.strip().strip('"')
+    return media_type.strip(), None
+
+
+def read_json(body: bytes) -> Any:
+    """Return a JSON text as plain data; a number that no double holds stays an object of its own.
+
+    Raises:
+        Problem: 400 for a byte order mark, octets that are not UTF-8, what is no JSON (NaN and Infinity among it) and
+            nesting too deep to be read; 422 for a name that occurs twice in one object.
+    """
+    if body.startswith(codecs.BOM_UTF8):
+        raise Problem(400, "the body begins with a byte order mark (RFC 8259 8.1)")
+    try:
+        return json.loads(
+            body.decode(),
+            object_pairs_hook=_object,
+            parse_constant=_refuse_constant,
+            parse_float=_real,
+            parse_int=_whole,
+        )
+    except UnicodeDecodeError as error:
+        raise Problem(400, f"the body is not UTF-8: {error.reason} at octet {error.start}") from error
+    except json.JSONDecodeError as error:
+        raise Problem(400, f"the body is not JSON: {error.msg} at line {error.lineno} column {error.colno}") from error
+    except RecursionError as error:
+        raise Problem(400, "the body is nested too deeply") from error
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    result = dict(pairs)
+    if len(result) != len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise Problem(422, f"the field {shown(twice)} occurs more than once in {shown(pairs)}")
+    return result
+
+
+def _refuse_constant(name: str) -> None:
+    raise Problem(400, f"{name} is no JSON number (RFC 8259 6)")
+
+
+def _real(lexeme: str) -> float | _Beyond:
+    number = float(lexeme)
+    return number if math.isfinite(number) else _Beyond(lexeme)
+
+
+def _whole(lexeme: str) -> int | _Beyond:
+    return int(lexeme) if len(lexeme) <= _DIGITS_READ else _Beyond(lexeme)
+
+
+def _from_element(element: etree._Element, shape: Any, where: str) -> Any:
+    """Return an element as plain data; what does not fit stays text and is refused by the check of shapes."""
+    if element.attrib:
+        raise Problem(422, f"unknown attribute {shown(next(iter(element.attrib)))} of {where}")
+    if isinstance(shape, Record):
+        return _from_children(element, shape, where)
+    if len(element):
+        raise Problem(422, f"{where} must hold a single value, not elements")
+    text = element.text or ""
+    value = text.strip(_XML_SPACE)
+    if isinstance(shape, Real) and _REAL.fullmatch(value):
+        return _real(value)
+    if isinstance(shape, Whole) and _WHOLE.fullmatch(value):
+        return int(value)
+    if isinstance(shape, Truth) and value in {"true", "false", "1", "0"}:
+        return value in {"true", "1"}
+    return text
+
+
+def _from_children(element: etree._Element, shape: Record, where: str) -> dict[str, Any]:
+    result: dict[str, Any] = {name: [] for name, part in shape.fields if isinstance(part, Series)}
+    _refuse_text(element.text, where)
+    for child in element:
+        _refuse_text(child.tail, where)
+        part = shape.field(child.tag)
+        path = f"{where}.{child.tag}"
+        if isinstance(part, Series):
+            result[child.tag].append(_from_element(child, part.item, path))
+        elif child.tag in result:
+            raise Problem(422, f"{shown(path)} occurs more than once")
+        else:
+            result[child.tag] = _from_element(child, part or Text(), path)
+    return result
+
+
+def _refuse_text(text: str | None, where: str) -> None:
+    if text and text.strip(_XML_SPACE):
+        raise Problem(422, f"{where} holds elements, not the text {shown(text.strip())}")
+
+
+def _unsupported(what: str) -> Problem:
+    accepted = ", ".join(ACCEPTED)
+    return Problem(415, f"{what} is not read here; send {accepted} in UTF-8", ((b"accept", accepted.encode()),))

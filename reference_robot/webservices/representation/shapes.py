@@ -1,0 +1,117 @@
+"""What a representation consists of: shapes, taken from ROS message classes or declared by hand."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, Final
+
+from rosidl_parser.definition import (
+    AbstractNestedType,
+    AbstractString,
+    Array,
+    BasicType,
+    NamespacedType,
+)
+
+
+@dataclass(frozen=True)
+class Real:
+    """A finite IEEE 754 double (ROS float32 and float64)."""
+
+
+@dataclass(frozen=True)
+class Whole:
+    """An integer within the bounds of its ROS type, both inclusive."""
+
+    lowest: int
+    highest: int
+
+
+@dataclass(frozen=True)
+class Text:
+    """A string whose length in characters lies within the bounds, both inclusive."""
+
+    shortest: int = 0
+    longest: int | None = None
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A boolean."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """A list of items; ``length`` is set for ROS arrays of fixed size."""
+
+    item: Shape
+    length: int | None = None
+
+
+@dataclass(frozen=True)
+class Record:
+    """Fields by name, in the order of the ROS definition.
+
+    ``optional`` fields may be left out in input; ``message`` is the ROS class, where there is one.
+    """
+
+    name: str
+    fields: tuple[tuple[str, Shape], ...]
+    optional: frozenset[str] = frozenset()
+    message: Any = field(default=None, compare=False)
+
+    def field(self, name: str) -> Shape | None:
+        """Return the shape of a field, or None where the record has no such field."""
+        return dict(self.fields).get(name)
+
+
+Shape = Real | Whole | Text | Truth | Series | Record
+
+_WHOLE_NUMBERS: Final = {
+    f"{sign}int{bits}": Whole(0, 2**bits - 1) if sign else Whole(-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    for sign in ("", "u")
+    for bits in (8, 16, 32, 64)
+} | {"octet": Whole(0, 255)}
+
+# The contract's fine print: a stamp may be left out everywhere in input, and then means now.
+_OPTIONAL: Final = {"std_msgs/Header": frozenset({"stamp"})}
+
+
+@cache
+def shape_of(message: Any) -> Record:
+    """Return the shape of a ROS message class.
+
+    Args:
+        message: A class that rosidl generated, such as ``geometry_msgs.msg.Twist``.
+
+    Raises:
+        TypeError: The class has a field of a type that no web service carries (wide characters, long double).
+    """
+    names = tuple(message.get_fields_and_field_types())
+    shapes = tuple(_shape(slot) for slot in message.SLOT_TYPES)
+    package = message.__module__.partition(".")[0]
+    return Record(
+        name=message.__name__,
+        fields=tuple(zip(names, shapes, strict=True)),
+        optional=_OPTIONAL.get(f"{package}/{message.__name__}", frozenset()),
+        message=message,
+    )
+
+
+def _shape(slot: Any) -> Shape:
+    if isinstance(slot, AbstractNestedType):
+        return Series(_shape(slot.value_type), slot.size if isinstance(slot, Array) else None)
+    if isinstance(slot, NamespacedType):
+        return shape_of(getattr(importlib.import_module(".".join(slot.namespaces)), slot.name))
+    if isinstance(slot, AbstractString):
+        return Text(longest=getattr(slot, "maximum_size", None))
+    if isinstance(slot, BasicType):
+        if slot.typename in {"double", "float"}:
+            return Real()
+        if slot.typename == "boolean":
+            return Truth()
+        if slot.typename in _WHOLE_NUMBERS:
+            return _WHOLE_NUMBERS[slot.typename]
+    raise TypeError(f"no web representation of the ROS type {slot!r}")

@@ -1,0 +1,74 @@
+"""Plain data as JSON, XML and text.
+
+All three print a double with the fewest digits that read back as the same double, so one state has identical
+values in every format (contract, class ``equivalence``).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any, Final
+
+import yaml
+from lxml import etree
+
+JSON: Final = "application/json"
+XML: Final = "application/xml"
+TEXT: Final = "text/plain"
+
+# XML 1.0 2.2 "Char": what is outside cannot stand in a document, not even as a character reference.
+_NO_XML_CHARACTER: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_REPLACEMENT: Final = "\N{REPLACEMENT CHARACTER}"
+
+# A list at the root has no field name for its items.
+_ITEM_NAMES: Final = {"Sensors": "sensor", "NavigationServices": "service", "Deliveries": "delivery"}
+
+
+def write_json(plain: Any) -> bytes:
+    """Return plain data as JSON, UTF-8 without BOM (RFC 8259 8.1); a non-finite value raises ValueError."""
+    return json.dumps(plain, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode()
+
+
+def write_xml(plain: Any, root: str) -> bytes:
+    """Return plain data as XML: a child per field, and one child per array item, named after the field."""
+    return etree.tostring(element_of(plain, root), encoding="utf-8", xml_declaration=True)
+
+
+def write_text(plain: Any) -> bytes:
+    """Return plain data as one YAML document, as ``ros2 topic echo`` prints a message."""
+    text = yaml.dump(plain, Dumper=_Dumper, sort_keys=False, default_flow_style=False, allow_unicode=True, width=2**31)
+    return str(text).encode()
+
+
+def element_of(plain: Any, name: str) -> etree._Element:
+    """Return plain data as an element of the given (possibly qualified) name."""
+    element = etree.Element(name)
+    if isinstance(plain, list):
+        _fill(element, {_ITEM_NAMES.get(name, "item"): plain})
+    else:
+        _fill(element, plain)
+    return element
+
+
+def _fill(element: etree._Element, plain: Any) -> None:
+    if isinstance(plain, dict):
+        for name, value in plain.items():
+            for item in value if isinstance(value, list) else [value]:
+                _fill(etree.SubElement(element, name), item)
+    else:
+        element.text = text_of(plain)
+
+
+def text_of(plain: Any) -> str:
+    """Return a single value in its XML Schema lexical form."""
+    if isinstance(plain, bool):
+        return "true" if plain else "false"
+    return _NO_XML_CHARACTER.sub(_REPLACEMENT, str(plain))
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes equal lists in full where PyYAML would refer to the first one with an alias."""
+
+    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's signature
+        return True

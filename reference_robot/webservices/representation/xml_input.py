@@ -1,0 +1,101 @@
+"""XML from outside, parsed so that nothing in it can reach beyond itself.
+
+No entity is resolved, nothing is fetched, no DTD is loaded, the tree stays within libxml2's ordinary limits (depth
+256), and a document with a DOCTYPE or a processing instruction is refused (WS-I Basic Profile 1.1 R1008, R1009).
+The size is bounded before a body comes here.
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+from typing import Final
+
+from lxml import etree
+
+from reference_robot.webservices.problems import Problem
+
+# The XML declaration; and a DOCTYPE that nothing but white space, comments and instructions precedes. Both match
+# possessively, so that no document makes them backtrack.
+_DECLARATION: Final = re.compile(rb"""\A<\?xml\s[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]++)["']""")
+_DOCTYPE: Final = re.compile(rb"\A(?:\s++|<\?(?s:.*?)\?>|<!--(?s:.*?)-->)*+<!DOCTYPE")
+
+# WS-I R1012 and XML 1.0 4.3.3: every receiver reads UTF-8 and UTF-16. ASCII is part of UTF-8.
+_UTF8: Final = frozenset({"utf-8", "ascii"})
+_UTF16: Final = frozenset({"utf-16", "utf-16-le", "utf-16-be"})
+
+# Attributes that one document may have in all. libxml2 before 2.12 compares those of an element pairwise.
+_MOST_ATTRIBUTES: Final = 1000
+
+
+def parsed(body: bytes, charset: str | None = None) -> etree._Element:
+    """Return the root element of a document.
+
+    Args:
+        body: The document, its size already bounded.
+        charset: The media type's charset parameter, which outranks the document's own word (RFC 7303 3.2).
+
+    Raises:
+        Problem: 400 where the document is malformed, 415 where its encoding is neither UTF-8 nor UTF-16, and 400
+            where it has a DOCTYPE or a processing instruction, or far too many attributes.
+    """
+    text = _as_utf8(body, charset)
+    if b"<!DOCTYPE" in text and _DOCTYPE.match(text):
+        raise Problem(400, "the document has a DOCTYPE, which is refused (WS-I BP R1008)")
+    if text.count(b"=") > _MOST_ATTRIBUTES:
+        raise Problem(400, f"the document has more than {_MOST_ATTRIBUTES} attributes")
+    parser = etree.XMLParser(
+        encoding="utf-8",  # decided above, whatever the declaration says
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,  # so that a value with a comment in it is one text
+    )
+    try:
+        root = etree.fromstring(text, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        raise Problem(400, f"the body is not well-formed XML: {ascii(str(error))[1:-1]}") from error
+    if root.getroottree().docinfo.internalDTD is not None:
+        raise Problem(400, "the document has a DOCTYPE, which is refused (WS-I BP R1008)")
+    if text.find(b"<?", 2) >= 0:
+        _refuse_instructions(root)
+    return root
+
+
+def _as_utf8(body: bytes, charset: str | None) -> bytes:
+    name = charset or _own_encoding(body)
+    try:
+        codec = codecs.lookup(name).name
+    except (LookupError, ValueError) as error:
+        raise Problem(415, f"unknown charset {name!a}; XML is read as UTF-8 or UTF-16") from error
+    if codec in _UTF8:
+        return body.removeprefix(codecs.BOM_UTF8)
+    if codec not in _UTF16:
+        raise Problem(415, f"charset {name!a}; XML is read as UTF-8 or UTF-16 (WS-I BP R1012)")
+    try:
+        text = body.decode(codec)
+    except UnicodeDecodeError as error:
+        raise Problem(400, f"the body is not {name}: {error.reason} at octet {error.start}") from error
+    return text.removeprefix("\ufeff").encode("utf-8", "surrogatepass")
+
+
+def _own_encoding(body: bytes) -> str:
+    """Return what the document says of itself (XML 1.0 appendix F): byte order mark, first octets, declaration."""
+    if body.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    if body.startswith(b"<\0"):
+        return "utf-16-le"
+    if body.startswith(b"\0<"):
+        return "utf-16-be"
+    declaration = _DECLARATION.match(body.removeprefix(codecs.BOM_UTF8))
+    return declaration[1].decode("ascii") if declaration else "utf-8"
+
+
+def _refuse_instructions(root: etree._Element) -> None:
+    before_root = root.itersiblings(preceding=True)
+    after_root = root.itersiblings()
+    for group in (root.iter(), before_root, after_root):
+        for node in group:
+            if isinstance(node, etree._ProcessingInstruction):  # noqa: SLF001 - lxml has no public name for the class
+                raise Problem(400, f"the document has the processing instruction {node.target!a} (WS-I BP R1009)")

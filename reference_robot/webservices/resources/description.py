@@ -1,0 +1,61 @@
+"""/openapi.json and /application.wadl: the contract's files, with the address under which they were asked for."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import yaml
+from lxml import etree
+
+from conformance.contract.files import CONTRACT_DIR
+from reference_robot.webservices.http.messages import Request, Response, content
+from reference_robot.webservices.resources.resource import Resource
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_WADL_NAMESPACE: Final = "{http://wadl.dev.java.net/2009/02}"
+
+
+class OpenApi(Resource):
+    """The OpenAPI description, as JSON."""
+
+    path: ClassVar = "/openapi.json"
+
+    def __init__(self, address: Callable[[Request], str]) -> None:
+        """Read the description.
+
+        Args:
+            address: Tells the interface's base URL, as a request names it.
+        """
+        self._address = address
+        document: Any = yaml.safe_load((CONTRACT_DIR / "openapi.yaml").read_text(encoding="utf-8"))
+        self._document: dict[str, Any] = document
+
+    def get(self, request: Request) -> Response:
+        """Return the description with this robot as its server."""
+        document = self._document | {"servers": [{"url": self._address(request)}]}
+        return content(200, "application/json", json.dumps(document, default=str).encode())
+
+
+class Wadl(Resource):
+    """The WADL description."""
+
+    path: ClassVar = "/application.wadl"
+
+    def __init__(self, address: Callable[[Request], str]) -> None:
+        """Read the description.
+
+        Args:
+            address: Tells the interface's base URL, as a request names it.
+        """
+        self._address = address
+        self._document = etree.parse(CONTRACT_DIR / "robot.wadl")
+
+    def get(self, request: Request) -> Response:
+        """Return the description with this robot as its base."""
+        for resources in self._document.iter(f"{_WADL_NAMESPACE}resources"):
+            resources.set("base", self._address(request) + "/")
+        body = etree.tostring(self._document, encoding="utf-8", xml_declaration=True)
+        return content(200, "application/vnd.sun.wadl+xml", body)

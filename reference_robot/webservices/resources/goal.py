@@ -1,0 +1,49 @@
+"""/robot/navigation/action/goal/: sending and cancelling a goal location."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Final
+
+from reference_robot.webservices.goals import GOAL, Goals
+from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.resources.resource import (
+    NO_CONTENT,
+    Resource,
+    represented,
+    sent,
+    wanted_format,
+)
+
+if TYPE_CHECKING:
+    from reference_robot.webservices.http.messages import Request, Response
+
+_CREATED: Final = 201
+
+
+class Goal(Resource):
+    """The active goal, move_base_msgs/MoveBaseActionGoal with the status that the robot adds."""
+
+    path: ClassVar = "/robot/navigation/action/goal/"
+
+    def __init__(self, goals: Goals) -> None:
+        self._goals = goals
+
+    def get(self, request: Request) -> Response:
+        """Return the active goal; 404 when there is none."""
+        media_type = wanted_format(request)
+        goal = self._goals.current()
+        if goal is None:
+            raise Problem(404, "the robot follows no goal")
+        return represented(goal, GOAL.name, media_type)
+
+    async def put(self, request: Request) -> Response:
+        """Send a goal; 201 with Location for a new one, 202 where it preempts another, 200 for a repeat."""
+        media_type = wanted_format(request)
+        status, goal = await self._goals.send(await sent(request, GOAL))
+        location = ((b"location", self.path.encode()),) if status == _CREATED else ()
+        return represented(goal, GOAL.name, media_type, status, location)
+
+    async def delete(self, _request: Request) -> Response:
+        """Cancel the active goal; 404 when there is none."""
+        await self._goals.cancel()
+        return NO_CONTENT

@@ -1,0 +1,72 @@
+"""What all REST resources share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+from reference_robot.webservices.http.messages import Request, Response, content
+from reference_robot.webservices.negotiation import chosen
+from reference_robot.webservices.representation.reading import read
+from reference_robot.webservices.representation.writing import (
+    JSON,
+    TEXT,
+    XML,
+    write_json,
+    write_text,
+    write_xml,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from reference_robot.webservices.representation.shapes import Record
+
+FORMATS: Final = (JSON, XML, TEXT)
+NO_CONTENT: Final = Response(204)
+
+_LIVE: Final = ((b"vary", b"accept"), (b"cache-control", b"no-store"))
+
+
+class Resource:
+    """A resource: a path, and a method ``get``, ``put`` or ``delete`` for each HTTP method that it offers.
+
+    A handler returns its answer, or an awaitable of it; it raises a Problem to refuse.
+    """
+
+    path: ClassVar[str]
+
+    def handlers(self) -> dict[str, Callable[[Request], Response | Awaitable[Response]]]:
+        """Return the handlers by HTTP method; HEAD is GET without content (RFC 9110 9.3.2)."""
+        offered = {name.upper(): getattr(self, name) for name in ("get", "put", "delete") if hasattr(self, name)}
+        return offered | ({"HEAD": offered["GET"]} if "GET" in offered else {})
+
+
+def wanted_format(request: Request) -> str:
+    """Return the format that the client likes best; raises the 406."""
+    return chosen(request.headers.get(b"accept"), FORMATS)
+
+
+def represented(
+    plain: Any, root: str, media_type: str, status: int = 200, headers: tuple[tuple[bytes, bytes], ...] = ()
+) -> Response:
+    """Return plain data as an answer.
+
+    Args:
+        plain: What the client is to learn.
+        root: The root element's name in XML: the ROS type's.
+        media_type: One of FORMATS.
+        status: The HTTP status.
+        headers: Further fields.
+    """
+    if media_type == JSON:
+        body = write_json(plain)
+    elif media_type == XML:
+        body = write_xml(plain, root)
+    else:
+        body = write_text(plain)
+    return content(status, media_type, body, (*_LIVE, *headers))
+
+
+async def sent(request: Request, shape: Record) -> dict[str, Any]:
+    """Return the content of a request as plain data of the given shape; raises 413, 415, 400 and 422."""
+    return read(await request.body(), request.headers.get(b"content-type"), shape)

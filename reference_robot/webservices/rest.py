@@ -1,0 +1,59 @@
+"""The REST interface: from a request to the resource that it names (paper, ``ros-rs``)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from reference_robot.webservices.http.interface import Interface
+from reference_robot.webservices.http.messages import Request, Response
+from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.resources.delivery import Delivery
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Iterable
+
+    from reference_robot.webservices.http.authorization import Authorization
+    from reference_robot.webservices.resources.resource import Resource
+
+    Handlers = dict[str, Callable[[Request], Response | Awaitable[Response]]]
+
+_DELIVERY_PATHS: Final = b"/robot/app/delivery/"
+
+
+class RestInterface(Interface):
+    """Serves resources.
+
+    Args:
+        resources: Those with a fixed path.
+        delivery: The one with values in its path.
+        authorization: Who may call.
+    """
+
+    def __init__(self, resources: Iterable[Resource], delivery: Delivery, authorization: Authorization) -> None:
+        super().__init__(authorization)
+        self._fixed: dict[bytes, Handlers] = {resource.path.encode(): resource.handlers() for resource in resources}
+        self._delivery = delivery.handlers()
+
+    def answer(self, request: Request) -> Response | Awaitable[Response]:
+        """Return the resource's answer.
+
+        Raises:
+            Problem: 404 for an unknown path whatever the method, 405 with Allow for a method that the resource does
+                not offer (RFC 9110 15.5.5, 15.5.6), and what the resource raises.
+        """
+        handlers = self._fixed.get(request.path)
+        if handlers is None:
+            handlers = self._with_values(request.path)
+        handler = handlers.get(request.method)
+        if handler is not None:
+            return handler(request)
+        allow = (b"allow", ", ".join([*handlers, "OPTIONS"]).encode())
+        if request.method == "OPTIONS":
+            return Response(204, (allow,))
+        raise Problem(405, f"{request.method} is not offered here; see Allow", (allow,))
+
+    def _with_values(self, path: bytes) -> Handlers:
+        if path.startswith(_DELIVERY_PATHS) and Delivery.owns(path):
+            return self._delivery
+        hint = "; its path ends with a slash" if path + b"/" in self._fixed else ""
+        raise Problem(404, f"there is no resource at {path.decode('ascii')[:200]!a}{hint}")

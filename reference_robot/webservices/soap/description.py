@@ -1,0 +1,55 @@
+"""A service's WSDL and XSD: served with the robot's own address, and the judge of what comes in."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from lxml import etree
+
+from conformance.contract.files import CONTRACT_DIR
+from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.soap.faults import Fault, client_fault
+
+_WSDL_SOAP: Final = "{http://schemas.xmlsoap.org/wsdl/soap/}"
+_XSD: Final = "{http://www.w3.org/2001/XMLSchema}"
+_ERRORS_TOLD: Final = 3
+
+
+class ServiceDescription:
+    """The contract's files of one service.
+
+    Args:
+        name: ``publishers`` or ``subscribers``, the files' name.
+        path: Where the service answers, such as ``/turtlesim_publisher_ws``.
+    """
+
+    def __init__(self, name: str, path: str) -> None:
+        self._path = path
+        self._wsdl = etree.parse(CONTRACT_DIR / f"{name}.wsdl")
+        self.xsd = (CONTRACT_DIR / f"{name}.xsd").read_bytes()
+        document = etree.fromstring(self.xsd)
+        self.namespace = str(document.get("targetNamespace"))
+        self._schema = etree.XMLSchema(document)
+
+    def wsdl(self, base: str) -> bytes:
+        """Return the WSDL with the robot's address in it (WS-I BP R2001), its schema at ``?xsd=1``.
+
+        Args:
+            base: The interface's base URL, as the request names it.
+        """
+        for address in self._wsdl.iter(f"{_WSDL_SOAP}address"):
+            address.set("location", base + self._path)
+        for schema in self._wsdl.iter(f"{_XSD}import"):
+            schema.set("schemaLocation", f"{base}{self._path}?xsd=1")
+        return etree.tostring(self._wsdl, encoding="utf-8", xml_declaration=True)
+
+    def require_valid(self, element: etree._Element) -> None:
+        """Raise the Client fault for an element that the XSD does not allow (R2724)."""
+        if not self._schema.validate(element):
+            raise self._invalid(element)
+
+    def _invalid(self, element: etree._Element) -> Fault:
+        # libxml2 quotes names and values of the message itself, and nothing of the robot's.
+        log: Any = self._schema.error_log
+        told = "; ".join(entry.message for entry in log[:_ERRORS_TOLD])
+        return client_fault(f"{shown(element.tag)} is not what the description says: {told}")

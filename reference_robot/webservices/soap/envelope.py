@@ -1,0 +1,69 @@
+"""From a parsed document to the one element in its Body, by the rules of SOAP 1.1 and the Basic Profile."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.soap.faults import SOAP, Fault, FaultCode, client_fault
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+_ENVELOPE: Final = f"{{{SOAP}}}Envelope"
+_HEADER: Final = f"{{{SOAP}}}Header"
+_BODY: Final = f"{{{SOAP}}}Body"
+_MUST_UNDERSTAND: Final = f"{{{SOAP}}}mustUnderstand"
+_ACTOR: Final = f"{{{SOAP}}}actor"
+
+# SOAP 1.1, 4.2.2: without an actor, or with this one, a header block is meant for whoever receives it.
+_FOR_US: Final = frozenset({None, "", "http://schemas.xmlsoap.org/soap/actor/next"})
+
+# WS-Addressing is tolerated, mandatory or not (contract): the answer goes back on the connection that asked, which is
+# what an anonymous ReplyTo asks for. No other address is ever called.
+_TOLERATED: Final = ("{http://www.w3.org/2005/08/addressing}", "{http://schemas.xmlsoap.org/ws/2004/08/addressing}")
+
+
+def operation_element(root: etree._Element) -> etree._Element:
+    """Return the single element child of the Body, by which the operation is chosen (WS-I BP R1127, R2710).
+
+    Raises:
+        Fault: VersionMismatch, MustUnderstand or Client, checked in that order (R2725).
+    """
+    if root.tag != _ENVELOPE:
+        raise _no_envelope(root)
+    parts = list(root)
+    header = parts.pop(0) if parts and parts[0].tag == _HEADER else None
+    blocks = [] if header is None else list(header)
+    if header is not None:
+        _require_understood(blocks)
+    if not parts or parts[0].tag != _BODY:
+        raise client_fault("the Envelope has no Body")
+    if len(parts) > 1:
+        raise client_fault(f"the Envelope has {shown(parts[1].tag)} after its Body (WS-I BP R1011)")
+    _require_valid_flags(blocks)
+    children = list(parts[0])
+    if len(children) != 1:
+        raise client_fault(f"the Body must have one element, not {len(children)}")
+    return children[0]
+
+
+def _no_envelope(root: etree._Element) -> Fault:
+    """Return the fault for another document element (R1015): an Envelope of another version, or no Envelope."""
+    if str(root.tag).rpartition("}")[2] == "Envelope":
+        return Fault(FaultCode.VERSION_MISMATCH, f"the Envelope must be SOAP 1.1's {_ENVELOPE}, not {shown(root.tag)}")
+    return client_fault(f"the document must be a SOAP 1.1 Envelope, not {shown(root.tag)}")
+
+
+def _require_understood(blocks: list[etree._Element]) -> None:
+    for block in blocks:
+        mandatory = block.get(_MUST_UNDERSTAND) == "1" and block.get(_ACTOR) in _FOR_US
+        if mandatory and not str(block.tag).startswith(_TOLERATED):
+            raise Fault(FaultCode.MUST_UNDERSTAND, f"the mandatory header block {shown(block.tag)} is not understood")
+
+
+def _require_valid_flags(blocks: list[etree._Element]) -> None:
+    for block in blocks:
+        flag = block.get(_MUST_UNDERSTAND)
+        if flag not in {None, "0", "1"}:
+            raise client_fault(f"mustUnderstand must be 0 or 1, not {shown(flag)} (WS-I BP R1013)")

@@ -1,0 +1,48 @@
+"""SOAP 1.1 faults (SOAP 1.1, 4.4)."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Final
+
+from lxml import etree
+
+from reference_robot.webservices.representation.writing import text_of
+
+SOAP: Final = "http://schemas.xmlsoap.org/soap/envelope/"
+
+
+class FaultCode(StrEnum):
+    """The standard fault codes, in the order in which they are checked (WS-I BP R1004, R2725)."""
+
+    VERSION_MISMATCH = "VersionMismatch"
+    MUST_UNDERSTAND = "MustUnderstand"
+    CLIENT = "Client"
+    SERVER = "Server"
+
+
+class Fault(Exception):  # noqa: N818 - SOAP's own name for it
+    """A message is answered with a fault.
+
+    Args:
+        code: Whose fault.
+        text: What was wrong, naming element and value.
+    """
+
+    def __init__(self, code: FaultCode, text: str) -> None:
+        super().__init__(text)
+        self.code = code
+        self.text = text
+
+    def envelope(self) -> bytes:
+        """Return the fault in its envelope: children unqualified (R1001), faultcode qualified."""
+        root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
+        fault = etree.SubElement(etree.SubElement(root, f"{{{SOAP}}}Body"), f"{{{SOAP}}}Fault")
+        etree.SubElement(fault, "faultcode").text = f"soap:{self.code}"
+        etree.SubElement(fault, "faultstring").text = text_of(self.text)
+        return etree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def client_fault(text: str) -> Fault:
+    """Return the fault for a message that is not what the description says (R2724)."""
+    return Fault(FaultCode.CLIENT, text)

@@ -1,0 +1,64 @@
+"""The SOAP interface: from a request to the service at its path."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from reference_robot.webservices.http.interface import Interface
+from reference_robot.webservices.http.messages import Request, Response, content
+from reference_robot.webservices.problems import Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Iterable
+
+    from reference_robot.webservices.http.authorization import Authorization
+    from reference_robot.webservices.soap.service import SoapService
+
+_ALLOW: Final = (b"allow", b"POST, OPTIONS")
+_ALLOW_DESCRIPTION: Final = (b"allow", b"GET, HEAD, POST, OPTIONS")
+_READ: Final = frozenset({"GET", "HEAD"})
+
+
+class SoapInterface(Interface):
+    """Serves SOAP services and their descriptions.
+
+    Args:
+        services: The services, each at its own path.
+        address: Tells the interface's base URL, as a request names it.
+        authorization: Who may call.
+    """
+
+    def __init__(
+        self,
+        services: Iterable[SoapService],
+        address: Callable[[Request], str],
+        authorization: Authorization,
+    ) -> None:
+        super().__init__(authorization)
+        self._services = {service.path.encode(): service for service in services}
+        self._address = address
+
+    def answer(self, request: Request) -> Response | Awaitable[Response]:
+        """Return a service's answer, or its description at ``?wsdl`` and ``?xsd=1``.
+
+        Raises:
+            Problem: 404 for an unknown path, 405 for other methods (WS-I BP R1114), and what the service raises.
+        """
+        service = self._services.get(request.path)
+        if service is None:
+            raise Problem(404, f"there is no service at {request.path.decode('ascii')[:200]!a}")
+        if request.method == "POST":
+            return service.post(request)
+        description = self._description(service, request)
+        allow = _ALLOW if description is None else _ALLOW_DESCRIPTION
+        if request.method == "OPTIONS":
+            return Response(204, (allow,))
+        if description is not None and request.method in _READ:
+            return content(200, "text/xml", description)
+        raise Problem(405, f"{request.method} is not offered here; messages come by POST", (allow,))
+
+    def _description(self, service: SoapService, request: Request) -> bytes | None:
+        asked = request.query.lower()
+        if asked in {b"wsdl", b"wsdl=1"}:
+            return service.description.wsdl(self._address(request))
+        return service.description.xsd if asked == b"xsd=1" else None

@@ -1,0 +1,82 @@
+"""One SOAP service: its operations by the element that asks for them, and how a message becomes an answer."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Final
+
+from reference_robot.webservices.http.messages import Request, Response, content
+from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.representation.reading import parsed_content_type
+from reference_robot.webservices.representation.xml_input import parsed
+from reference_robot.webservices.soap.envelope import operation_element
+from reference_robot.webservices.soap.faults import Fault, FaultCode, client_fault
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from lxml import etree
+
+    from reference_robot.webservices.soap.description import ServiceDescription
+
+    Operation = Callable[[etree._Element], bytes | Awaitable[bytes]]  # noqa: SLF001 - lxml's only name for the class
+
+_LOGGER: Final = logging.getLogger(__name__)
+_MEDIA_TYPE: Final = "text/xml"
+_SERVERS_FAULT: Final = 500
+
+
+class SoapService:
+    """A service: a subclass gives the description and the operations.
+
+    An operation takes the wrapper element, valid by the XSD, and returns the answering envelope.
+    """
+
+    path: str
+    description: ServiceDescription
+
+    def operations(self) -> dict[str, Operation]:
+        """Return the operations by local name."""
+        raise NotImplementedError
+
+    def __init__(self) -> None:
+        namespace = self.description.namespace
+        self._operations = {f"{{{namespace}}}{name}": operation for name, operation in self.operations().items()}
+
+    async def post(self, request: Request) -> Response:
+        """Answer a message: 200, or 500 with a fault (WS-I BP R1126).
+
+        Raises:
+            Problem: 415 for another media type, 400 for what is no XML and for a DOCTYPE or processing instruction,
+                413 for too much of it: without a fault, for there was no message.
+        """
+        media_type, charset = parsed_content_type(request.headers.get(b"content-type"))
+        if media_type != _MEDIA_TYPE:
+            raise Problem(
+                415,
+                f"SOAP 1.1 comes as text/xml, not {media_type[:200]!a} (WS-I BP R1115)",
+                ((b"accept", _MEDIA_TYPE.encode()),),
+            )
+        root = parsed(await request.body(), charset)
+        try:
+            outcome = self._answer(root)
+            envelope = outcome if isinstance(outcome, bytes) else await outcome
+        except Fault as fault:
+            return content(500, _MEDIA_TYPE, fault.envelope())
+        except Problem as problem:
+            code = FaultCode.SERVER if problem.status >= _SERVERS_FAULT else FaultCode.CLIENT
+            return content(500, _MEDIA_TYPE, Fault(code, problem.detail).envelope())
+        except Exception:
+            _LOGGER.exception("no answer to %s", root.tag)
+            failure = Fault(FaultCode.SERVER, "the robot failed to answer; its log says why")
+            return content(500, _MEDIA_TYPE, failure.envelope())
+        return content(200, _MEDIA_TYPE, envelope)
+
+    def _answer(self, root: etree._Element) -> bytes | Awaitable[bytes]:
+        element = operation_element(root)
+        operation = self._operations.get(str(element.tag))
+        if operation is None:
+            raise client_fault(f"no operation is asked for by {shown(element.tag)}")
+        self.description.require_valid(element)
+        return operation(element)

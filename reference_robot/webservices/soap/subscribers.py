@@ -1,0 +1,91 @@
+"""RobotSubscribersWebService: the web methods that tell the robot's state, each as its REST resource does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from lxml import etree
+
+from reference_robot.webservices.plans import Planner, PlanQuery
+from reference_robot.webservices.representation.writing import element_of
+from reference_robot.webservices.soap.description import ServiceDescription
+from reference_robot.webservices.soap.faults import SOAP, client_fault
+from reference_robot.webservices.soap.service import SoapService
+
+if TYPE_CHECKING:
+    from reference_robot.webservices.goals import Goals
+    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+    from reference_robot.webservices.resources.pose import Pose
+    from reference_robot.webservices.soap.service import Operation
+    from reference_robot.webservices.velocity import Velocity
+
+PATH: Final = "/turtlesim_subscriber_ws"
+
+
+class SubscribersWebService(SoapService):
+    """GetPose, GetVelocity, GetSensors, GetNavigationServices, GetGoal and GetPlan.
+
+    Args:
+        subscribers: The node that knows the graph.
+        pose: The REST resource of the pose.
+        velocity: Measures.
+        goals: Knows the active goal.
+        planner: Plans.
+    """
+
+    def __init__(
+        self,
+        subscribers: RobotSubscribersNode,
+        pose: Pose,
+        velocity: Velocity,
+        goals: Goals,
+        planner: Planner,
+    ) -> None:
+        self.path = PATH
+        self.description = ServiceDescription("subscribers", PATH)
+        self._subscribers = subscribers
+        self._pose = pose
+        self._velocity = velocity
+        self._goals = goals
+        self._planner = planner
+        super().__init__()
+
+    def operations(self) -> dict[str, Operation]:
+        """Return the six operations."""
+        return {
+            "GetPose": lambda _: self._response("GetPose", [self._pose.plain()]),
+            "GetVelocity": lambda _: self._response("GetVelocity", [self._velocity.measured()]),
+            "GetSensors": lambda _: self._response("GetSensors", self._subscribers.sensors()),
+            "GetNavigationServices": lambda _: self._response(
+                "GetNavigationServices", self._subscribers.navigation_services()
+            ),
+            "GetGoal": lambda _: self._response("GetGoal", [goal] if (goal := self._goals.current()) else []),
+            "GetPlan": self._get_plan,
+        }
+
+    async def _get_plan(self, wrapper: etree._Element) -> bytes:
+        given: dict[str, Any] = {}
+        for element in wrapper:
+            name, text = str(element.tag), element.text or ""
+            given[name] = text if name == "frame_id" else _finite(name, text)
+        return self._response("GetPlan", [await self._planner.plan(PlanQuery(**given))])
+
+    def _response(self, operation: str, returned: list[Any]) -> bytes:
+        """Return the envelope with one unqualified ``return`` element for each value."""
+        namespace = self.description.namespace
+        root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
+        wrapper = etree.SubElement(
+            etree.SubElement(root, f"{{{SOAP}}}Body"),
+            f"{{{namespace}}}{operation}Response",
+            nsmap={"tns": namespace},
+        )
+        wrapper.extend([element_of(value, "return") for value in returned])
+        return etree.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _finite(name: str, text: str) -> float:
+    """Read a valid xs:double; INF and NaN never enter (contract, REST)."""
+    number = float(text)
+    if number - number != 0:
+        raise client_fault(f"{name} must be finite, not {text.strip()}")
+    return number

@@ -1,0 +1,108 @@
+"""The robot's velocity: what it measures, and what clients may ask for."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from typing import TYPE_CHECKING, Any, Final
+
+from geometry_msgs.msg import Twist
+
+from reference_robot.webservices.problems import Problem, not_yet
+from reference_robot.webservices.representation.messages import message_from, reader_of
+from reference_robot.webservices.representation.shapes import shape_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from reference_robot.webservices.configuration import WebSettings
+    from reference_robot.webservices.nodes.publishers import RobotPublishersNode
+    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+
+_DISCOVERY: Final = 1.0  # seconds that a robot just found may take to be connected
+_DISCOVERY_STEP: Final = 0.02
+
+
+class Velocity:
+    """Commands and measures velocity.
+
+    Args:
+        publishers: The node that publishes commands.
+        subscribers: The node that hears the odometry.
+        settings: Limits and hold time.
+        goal_is_active: Tells whether the robot follows a goal, and so takes no velocity from clients.
+    """
+
+    def __init__(
+        self,
+        publishers: RobotPublishersNode,
+        subscribers: RobotSubscribersNode,
+        settings: WebSettings,
+        goal_is_active: Callable[[], bool],
+    ) -> None:
+        self._publishers = publishers
+        self._subscribers = subscribers
+        self._settings = settings
+        self._goal_is_active = goal_is_active
+        self._read = reader_of(Twist)
+        self._commanded: dict[str, Any] | None = None
+        self._commanded_at = 0.0
+
+    def measured(self) -> dict[str, Any]:
+        """Return the measured velocity as a plain geometry_msgs/Twist; m/s and rad/s.
+
+        Raises:
+            Problem: 503 before the first odometry.
+        """
+        odometry = self._subscribers.odometry
+        if odometry is None:
+            raise not_yet("the robot has not published its odometry yet")
+        return self._read(odometry.twist.twist)
+
+    async def command(self, twist: dict[str, Any]) -> None:
+        """Publish a velocity once; the robot's own watchdog ends it after the hold time.
+
+        Args:
+            twist: A plain Twist of the right shape.
+
+        Raises:
+            Problem: 422 for a value beyond the limits or for a component that a differential drive cannot actuate,
+                409 while a goal is active, 503 when no robot takes velocities.
+        """
+        self._check_limits(twist)
+        if self._goal_is_active():
+            raise Problem(409, "the robot follows a goal; cancel it before setting a velocity")
+        await self._robot_found()
+        self._commanded, self._commanded_at = twist, time.monotonic()
+        self._publishers.publish_velocity(message_from(shape_of(Twist), twist))
+
+    async def command_linear(self, linear: dict[str, float]) -> None:
+        """Publish a velocity with a new linear part and the angular part that is in force.
+
+        What is in force is the angular part asked for within the hold time, or none: a robot that has stopped by
+        itself must not be made to turn again.
+        """
+        held = self._commanded
+        if held is None or time.monotonic() - self._commanded_at >= self._settings.hold:
+            angular = {"x": 0.0, "y": 0.0, "z": 0.0}
+        else:
+            angular = held["angular"]
+        await self.command({"linear": linear, "angular": angular})
+
+    def _check_limits(self, twist: dict[str, Any]) -> None:
+        limits = {("linear", "x"): self._settings.max_linear, ("angular", "z"): self._settings.max_angular}
+        for part, components in twist.items():
+            for axis, value in components.items():
+                limit = limits.get((part, axis))
+                if limit is None and value != 0:
+                    raise Problem(422, f"{part}.{axis} must be 0: this robot cannot actuate it, not {value}")
+                if limit is not None and abs(value) > limit:
+                    unit = "m/s" if part == "linear" else "rad/s"
+                    raise Problem(422, f"{part}.{axis} must lie within -{limit} and {limit} {unit}, not {value}")
+
+    async def _robot_found(self) -> None:
+        give_up = time.monotonic() + _DISCOVERY
+        while not self._publishers.find_velocity_subscribers():
+            if time.monotonic() > give_up:
+                raise not_yet("no robot on the ROS graph takes velocity commands")
+            await asyncio.sleep(_DISCOVERY_STEP)
