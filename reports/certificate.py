@@ -99,9 +99,7 @@ class Certificate:
     @property
     def title(self) -> str:
         """What the document may call itself."""
-        return (
-            "Certificate of conformance" if self.result["verdict"] == "conformant" else "Conformance report"
-        )
+        return "Certificate of conformance" if self.result["verdict"] == "conformant" else "Conformance report"
 
     @property
     def robot(self) -> str:

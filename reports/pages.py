@@ -37,7 +37,7 @@ def html_page(template: str, **values: Any) -> str:
             # These two are files of this folder and carry nothing of a result.
             script=Markup(script),  # noqa: S704 - our own file
             style=Markup(_asset("page.css")),  # noqa: S704 - our own file
-            generator=f"RoAAS {suite_version()}",
+            generator_name=f"RoAAS {suite_version()}",
             **values,
         )
     )
@@ -45,9 +45,7 @@ def html_page(template: str, **values: Any) -> str:
 
 def markdown_page(template: str, **values: Any) -> str:
     """Fill one of the Markdown templates; they put all foreign text into code spans and blocks."""
-    return (
-        _environment(html=False).get_template(template).render(generator=f"RoAAS {suite_version()}", **values)
-    )
+    return _environment(html=False).get_template(template).render(generator_name=f"RoAAS {suite_version()}", **values)
 
 
 def write_page(path: Path, text: str) -> Path:

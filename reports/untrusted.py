@@ -103,5 +103,5 @@ def plain(text: str, limit: int = 600) -> str:
     Punctuation is escaped (GFM 6.1); an empty comment after `@` and `#` keeps a forge from notifying the
     person or linking the issue that a robot happens to name.
     """
-    line = re.sub(r"([\\`*_{}\[\]<>()!|~$&])", r"\\\1", excerpt(text, limit))
-    return re.sub(r"([@#])", r"\1<!-- -->", line)
+    line = re.sub(r"([\\`*_\[\]<>|~$&])", r"\\\1", excerpt(text, limit))
+    return re.sub(r"([@#])(?=\w)", r"\1<!-- -->", line)

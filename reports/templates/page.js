@@ -4,6 +4,7 @@ for (const source of document.querySelectorAll("[data-copy]")) {
   const button = document.createElement("button");
   const word = source.dataset.copy || "Copy";
   button.type = "button";
+  if (source.tagName === "TABLE") button.className = "table";
   button.textContent = word;
   button.addEventListener("click", async () => {
     const rows = source.tagName === "TABLE" ? Array.from(source.rows, (row) => Array.from(row.cells, (cell) => cell.innerText.trim()).join("\t")) : null;

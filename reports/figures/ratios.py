@@ -1,0 +1,69 @@
+"""Ratios with their intervals, one under the other: SOAP to REST beside the paper's, or a new run to an old one."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from reports.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Picture, drawing, gather
+
+
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """One row.
+
+    Attributes:
+        label: what is compared.
+        ratio: the estimate.
+        interval: its 95 % interval, or None where the run supports none.
+        colour: of its mark.
+    """
+
+    label: str
+    ratio: float
+    interval: tuple[float, float] | None
+    colour: str = INK
+
+
+def ratios(
+    name: str, title: str, rows: Sequence[Ratio], caption: str, *, mark: tuple[float, str] | None = None
+) -> Picture | None:
+    """A panel with a dot and a bar for each row, on a logarithmic axis with 1 in it.
+
+    Args:
+        name: id of the picture.
+        title: of the panel.
+        rows: from top to bottom.
+        caption: of the picture.
+        mark: a figure to compare with, and what it is called.
+    """
+    if not rows:
+        return None
+    told = "; ".join(f"{row.label}: {row.ratio:.3g}" for row in rows)
+    with drawing():
+        panel = Panel(title, f"{title}. {told}", height=1.45 + 0.34 * len(rows))
+        axes = panel.axes
+        axes.axvline(1.0, color=INK, linewidth=0.9)
+        if mark is not None:
+            axes.axvline(mark[0], color=PAPER_COLOUR, linestyle=(0, (4, 3)), linewidth=1.4, label=mark[1])
+        for place, row in enumerate(rows):
+            if row.interval is not None:
+                axes.plot(
+                    row.interval, [place, place], color=row.colour, linewidth=5, alpha=0.35, solid_capstyle="butt"
+                )
+            axes.plot([row.ratio], [place], "o", color=row.colour, markersize=5)
+            axes.annotate(
+                f"{row.ratio:.2f}", (1.0, place), (6, 0), xycoords=("axes fraction", "data"),
+                textcoords="offset points", va="center", color=SOFT,
+            )  # fmt: skip
+        axes.set_yticks(range(len(rows)), [row.label for row in rows])
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0), numticks=12))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        low, high = axes.get_xlim()
+        axes.set_xlim(min(low, 0.9), max(high, 1.1))
+        axes.grid(visible=False, axis="y")
+        panel.legend()
+        return gather(name, caption, [panel])

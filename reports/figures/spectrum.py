@@ -1,0 +1,96 @@
+"""The percentile spectrum: latency over the share of requests that were faster, on HdrHistogram's axis.
+
+The axis is 1 / (1 - quantile), logarithmic: each nine takes the same room, so that the tail, where a robot's
+stalls are, is not squeezed into the last pixel.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+from reports.figures.canvas import COLOUR, MARK, Panel, Picture, drawing, gather, log_time_axis
+from reports.histograms import Distribution, Floats, Series
+
+_POINTS = 220
+_NINES = (0.0, 0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999)
+
+Key = tuple[str, str, str]
+
+
+def spectrum(series: Mapping[Key, Series]) -> Picture | None:
+    """One panel for each client and operation: service time as a line, response time dashed."""
+    panels = []
+    with drawing():
+        for client, operation in dict.fromkeys((key[1], key[0]) for key in series):
+            drawn = [s for key, s in series.items() if key[:2] == (operation, client) and s.service is not None]
+            if not drawn:
+                continue
+            names = " and ".join(s.data["interface"].upper() for s in drawn)
+            panel = Panel(
+                f"{operation}, {client} client",
+                f"Percentile spectrum of {names} for {operation} with the {client} client; "
+                "the table of quantiles holds its figures.",
+            )
+            for one in drawn:
+                interface = one.data["interface"]
+                if one.service is not None:
+                    curve(panel.axes, one.service, (COLOUR[interface], MARK[interface]), f"{interface.upper()} service")
+                if one.response is not None and _differ(one.service, one.response):
+                    curve(
+                        panel.axes,
+                        one.response,
+                        (COLOUR[interface], MARK[interface]),
+                        f"{interface.upper()} response",
+                        "--",
+                    )
+            quantile_axis(panel.axes, max(s.service.total for s in drawn if s.service is not None))
+            log_time_axis(panel.axes, "y", "milliseconds")
+            panel.legend()
+            panels.append(panel)
+        return gather(
+            "spectrum",
+            "How long the slowest requests took. Read: at 99 %, one request in a hundred took longer than the curve "
+            "says. Solid: service time, from the moment a request was sent. Dashed: response time, from the moment "
+            "it was due, which also counts the wait behind a stalled robot. Thin: too few requests for a sure value.",
+            panels,
+        )
+
+
+def curve(axes: Axes, values: Distribution, look: tuple[str, str], label: str, dash: str = "-") -> None:
+    """Draw one distribution in a colour and with a mark; thin where the values are too few for an interval."""
+    colour, mark = look
+    reach = float(np.log10(max(values.total, 10)))
+    at = 1 - 10.0 ** -np.linspace(0.0, reach, _POINTS)
+    times = values.quantiles(at)
+    sure = at <= values.highest_supported
+    axes.plot(
+        _nines(at[sure]), times[sure], dash, color=colour, marker=mark, markersize=4.5, markevery=0.16, label=label
+    )
+    joint = max(int(sure.sum()) - 1, 0)
+    axes.plot(_nines(at[joint:]), times[joint:], dash, color=colour, linewidth=0.7)
+
+
+def quantile_axis(axes: Axes, total: int) -> None:
+    """Make the x axis HdrHistogram's, as far as `total` values reach."""
+    end = float(max(total, 10))
+    axes.set_xscale("log")
+    axes.set_xlim(1.0, end)
+    shown = [q for q in _NINES if 1 / (1 - q) <= end]
+    axes.xaxis.set_major_locator(FixedLocator([1 / (1 - q) for q in shown]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * (1 - 1 / value):.6g}"))
+    axes.set_xlabel("percentile")
+
+
+def _nines(at: Floats) -> Floats:
+    result: Floats = 1 / (1 - at)
+    return result
+
+
+def _differ(service: Distribution | None, response: Distribution) -> bool:
+    """Whether a second curve would show anything; in the closed model both times are one."""
+    return service is None or not (
+        np.array_equal(service.low_ms, response.low_ms) and np.array_equal(service.counts, response.counts)
+    )

@@ -1,0 +1,133 @@
+"""Latency over the run, with the stalls of the robot marked."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+from matplotlib.ticker import MaxNLocator
+
+from reports.figures.canvas import COLOUR, INK, MARK, Panel, Picture, drawing, gather, log_time_axis
+
+_MOST_POINTS = 400
+_STALL_FACTOR = 20
+_STALL_FLOOR_MS = 20.0
+_STALL_COLOUR = "#F0E442"
+
+
+@dataclass(frozen=True, slots=True)
+class Stall:
+    """A time in which a request waited far longer than usual.
+
+    Attributes:
+        start_s: from the start of the run.
+        end_s: the end of its last interval.
+        longest_ms: the longest response time in it; None where not one request came back.
+        series: operation, client, interface.
+    """
+
+    start_s: float
+    end_s: float
+    longest_ms: float | None
+    series: tuple[str, str, str]
+
+
+def stalls(result: Mapping[str, Any]) -> list[Stall]:
+    """Intervals whose longest response took 20 times the series' usual one and over 20 ms, runs of them as one.
+
+    The usual one is the median over intervals of the interval's own median. An interval in which every
+    request failed counts as well.
+    """
+    found: list[Stall] = []
+    for series in _timed(result):
+        width = result["time_series"]["width_s"]
+        medians = [point["p50_ms"] for point in series["points"] if point["p50_ms"] is not None]
+        limit = max(_STALL_FLOOR_MS, _STALL_FACTOR * median(medians)) if medians else _STALL_FLOOR_MS
+        open_stall: Stall | None = None
+        for point in series["points"]:
+            longest = point["max_ms"]
+            silent = longest is None and point["errors"] > 0
+            if not silent and (longest is None or longest <= limit):
+                open_stall = None
+                continue
+            if open_stall is not None:
+                found.pop()
+                longest = max((x for x in (open_stall.longest_ms, longest) if x is not None), default=None)
+            start = open_stall.start_s if open_stall is not None else point["t_s"]
+            open_stall = Stall(start, point["t_s"] + width, longest, _key(series))
+            found.append(open_stall)
+    return found
+
+
+def timeline(result: Mapping[str, Any]) -> Picture | None:
+    """One panel for each client and operation: median and longest response time over the run."""
+    panels = []
+    marks = stalls(result)
+    timed = list(_timed(result))
+    with drawing():
+        for operation, client in dict.fromkeys((s["operation"], s["client"]) for s in timed):
+            drawn = [s for s in timed if (s["operation"], s["client"]) == (operation, client)]
+            own = [stall for stall in marks if stall.series[:2] == (operation, client)]
+            panel = Panel(
+                f"{operation}, {client} client",
+                f"Response times of {operation} with the {client} client over the run; "
+                f"{len(own)} {'stall' if len(own) == 1 else 'stalls'} marked.",
+            )
+            for stall in own:
+                panel.axes.axvspan(stall.start_s, stall.end_s, color=_STALL_COLOUR, alpha=0.5, linewidth=0)
+            for series in drawn:
+                _draw(panel, series)
+            log_time_axis(panel.axes, "y", "response time, ms")
+            panel.axes.xaxis.set_major_locator(MaxNLocator(7, integer=True))
+            panel.axes.set_xlabel("seconds since the start")
+            for stall in own[:3]:
+                if stall.longest_ms is not None:
+                    panel.axes.annotate(
+                        f"{stall.longest_ms:,.0f} ms",
+                        (stall.end_s, stall.longest_ms), (4, 0), textcoords="offset points", va="center",
+                        color=INK,
+                    )  # fmt: skip
+            panel.legend()
+            panels.append(panel)
+        return gather(
+            "timeline",
+            "Response time over the run: the line is each interval's median, the dots its longest request, crosses "
+            "are failed requests. Yellow marks stalls: a request took 20 times as long as usual, and over 20 ms.",
+            panels,
+        )
+
+
+def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
+    interface = series["interface"]
+    points = _thinned([point for point in series["points"] if point["p50_ms"] is not None])
+    colour = COLOUR[interface]
+    times = [point["t_s"] for point in points]
+    panel.axes.plot(
+        times, [point["p50_ms"] for point in points], color=colour, linewidth=1.5, label=f"{interface.upper()} median"
+    )
+    panel.axes.plot(
+        times, [point["max_ms"] for point in points], MARK[interface],
+        color=colour, markersize=3, fillstyle="none", markeredgewidth=0.9, label=f"{interface.upper()} longest",
+    )  # fmt: skip
+    failed = [point["t_s"] for point in series["points"] if point["errors"]]
+    if failed:
+        panel.axes.plot(
+            failed, [0.97] * len(failed), "x", color=colour, markersize=6, markeredgewidth=1.6,
+            transform=panel.axes.get_xaxis_transform(), label=f"{interface.upper()} errors",
+        )  # fmt: skip
+
+
+def _thinned(points: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """At most a few hundred points: of each group the one with the longest request, so that no stall is lost."""
+    step = -(-len(points) // _MOST_POINTS) or 1
+    groups = (points[start : start + step] for start in range(0, len(points), step))
+    return [max(group, key=lambda point: point["max_ms"] or 0.0) for group in groups]
+
+
+def _timed(result: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    series = result.get("time_series", {}).get("series", [])
+    return [one for one in series if any(point["count"] or point["errors"] for point in one["points"])]
+
+
+def _key(series: Mapping[str, Any]) -> tuple[str, str, str]:
+    return series["operation"], series["client"], series["interface"]

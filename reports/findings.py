@@ -1,0 +1,171 @@
+"""What a latency result says, in sentences: the verdict first, each claim with its interval."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from reports.figures.spans import means
+from reports.figures.timeline import Stall, stalls
+from reports.histograms import Series
+from reports.numbers import interval, ms, rate, ratio
+
+PAPER = {"rest_ms": 1.5, "soap_ms": 2.5, "ratio": 1.67}
+"""What the paper reports: mean response times on localhost, and their ratio. It gives no spread and no method."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The head of the report.
+
+    Attributes:
+        tone: "good", "bad", "warning" or "quiet".
+        sign: what stands before the words.
+        words: a few words.
+        sentence: what was found, with its interval.
+    """
+
+    tone: str
+    sign: str
+    words: str
+    sentence: str
+
+
+def verdict(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> Verdict:
+    """The verdict on a result as a whole: valid or not first, thresholds next, then what was found."""
+    found = headline(result, series)
+    if not result["valid"]:
+        return Verdict("bad", "✗", "Not valid: these figures say nothing about the robot", found)
+    outcomes = [threshold["outcome"] for threshold in result.get("thresholds", [])]
+    missed, unsure = outcomes.count("missed"), outcomes.count("inconclusive")
+    if missed:
+        return Verdict("bad", "✗", f"{missed} of {_count(len(outcomes), 'threshold')} missed", found)
+    if unsure:
+        return Verdict("warning", "?", f"{unsure} of {_count(len(outcomes), 'threshold')} undecided", found)
+    if not any(one.data["count"] for one in series.values()):
+        return Verdict("warning", "?", "Nothing was measured", found)
+    if outcomes:
+        words = "The threshold is met" if len(outcomes) == 1 else f"All {len(outcomes)} thresholds are met"
+        return Verdict("good", "✓", words, found)
+    return Verdict("quiet", "✓", "Valid measurement", found)
+
+
+def headline(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> str:
+    """How SOAP compares with REST at the median, for the operation and client that tell most."""
+    leading = _leading(result)
+    if leading is None:
+        return _alone(series)
+    operation, client = leading["operation"], leading["client"]
+    where = f"for {operation}, with the {client} client"
+    low, high = leading["ci95"]
+    if low <= 1 <= high:
+        return (
+            f"No difference between SOAP and REST can be shown at the median {where}: SOAP takes {ratio(low)} to "
+            f"{ratio(high)} times as long (95 % interval, estimate {ratio(leading['ratio'])})."
+        )
+    return (
+        f"SOAP takes {ratio(low)} to {ratio(high)} times as long as REST at the median {where} (95 % interval, "
+        f"estimate {ratio(leading['ratio'])}).{_server_share(series, operation, client)}"
+    )
+
+
+def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+    """Further findings, a sentence each: noise floor, stalls, knee, failures."""
+    return [*_noise(result), *_stalled(result), *_knees(result), *_failed(result, series)]
+
+
+def _leading(result: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    usable = [c for c in result["comparisons"] if c["quantile"] == "p50" and c["ci95"] and c["ratio"]]
+    order = {"delivery": 0, "pose": 1, "coffee": 2}
+    return min(usable, key=lambda c: (c["client"] != "wire", order[c["operation"]]), default=None)
+
+
+def _alone(series: Mapping[tuple[str, str, str], Series]) -> str:
+    """What can be said where SOAP and REST cannot be compared."""
+    for one in series.values():
+        if one.data["count"] and one.data["service_ms"]["p50"] is not None:
+            bounds = one.data["ci95_ms"]["p50"]
+            sure = f" (95 % interval {interval(bounds)} ms)" if bounds else " (too few requests for an interval)"
+            return (
+                f"Half of {one.name} requests took at most {ms(one.data['service_ms']['p50'])} ms{sure}. SOAP and REST "
+                "cannot be compared by this run."
+            )
+    return "No series has enough successful requests for a figure."
+
+
+def _server_share(series: Mapping[tuple[str, str, str], Series], operation: str, client: str) -> str:
+    rest, soap = series.get((operation, client, "rest")), series.get((operation, client, "soap"))
+    if rest is None or soap is None:
+        return ""
+    rest_parts, soap_parts = means(rest), means(soap)
+    if "server" not in rest_parts or "server" not in soap_parts:
+        return " How much of that the server spends is not known: it sends no Server-Timing."
+    extra = sum(soap_parts.values()) - sum(rest_parts.values())
+    server = soap_parts["server"] - rest_parts["server"]
+    if extra <= 0:
+        return ""
+    return f" Of SOAP's extra {ms(extra)} ms on average, the server spends {ms(server)} ms."
+
+
+def _noise(result: Mapping[str, Any]) -> list[str]:
+    leading = _leading(result)
+    key = (leading["operation"], leading["client"]) if leading else ("delivery", "wire")
+    for noise in result.get("noise_floor", []):
+        if (noise["operation"], noise["client"]) == key and noise["quantile"] == "p50" and noise["ci95"]:
+            sentence = (
+                f"Noise floor: {noise['interface'].upper()} against itself, measured in the same way, comes to "
+                f"{interval(noise['ci95'], of_ratio=True)} times (95 % interval)."
+            )
+            return [sentence]
+    return []
+
+
+def _stalled(result: Mapping[str, Any]) -> list[str]:
+    """Stalls as moments of the robot: those of several series that overlap are one."""
+    moments: list[list[Stall]] = []
+    for stall in sorted(stalls(result), key=lambda stall: stall.start_s):
+        if moments and stall.start_s < max(other.end_s for other in moments[-1]):
+            moments[-1].append(stall)
+        else:
+            moments.append([stall])
+    if not moments:
+        return []
+    longest = max((stall for moment in moments for stall in moment), key=lambda stall: stall.longest_ms or 0.0)
+    operation, client, interface = longest.series
+    told = "no request was answered" if longest.longest_ms is None else f"{ms(longest.longest_ms)} ms"
+    which = "" if len(moments) == 1 else ", the longest"
+    sentence = (
+        f"{_count(len(moments), 'stall')}{which} in seconds {longest.start_s:.0f} to {longest.end_s:.0f}: {told} "
+        f"({operation}, {interface.upper()}, {client})."
+    )
+    return [sentence]
+
+
+def _knees(result: Mapping[str, Any]) -> list[str]:
+    told = []
+    for knee in result.get("knee", []):
+        name = knee["interface"].upper()
+        criterion = f"({knee['criterion']})"
+        if knee["highest_rate"] is None:
+            told.append(f"{name} met the criterion at no offered rate {criterion}.")
+            continue
+        sentence = f"{name} holds up to {rate(knee['highest_rate'])} requests/s {criterion}"
+        missed = knee.get("first_rate_missed")
+        if missed is None:
+            told.append(f"{sentence}, the highest rate offered: the knee lies above it.")
+            continue
+        because = f": {knee['reason']}" if knee.get("reason") else ""
+        limit = " The generator, not the robot, was the limit." if knee.get("limited_by") == "generator" else ""
+        told.append(f"{sentence}; it gave way at {rate(missed)} requests/s{because}.{limit}")
+    return told
+
+
+def _failed(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+    errors = sum(one.data["errors"] for one in series.values())
+    if not errors and not result.get("errors"):
+        return ["No request failed."] if any(one.data["count"] for one in series.values()) else []
+    answered = sum(one.data["count"] for one in series.values())
+    return [f"{_count(errors, 'request')} of {errors + answered:,} failed; they are in no figure of time."]
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -1,0 +1,150 @@
+"""Distributions of latencies, out of the HDR histograms that a result file carries.
+
+A histogram is HdrHistogram's V2 encoding, compressed, in base64, of whole microseconds. It is decoded once
+into three arrays, from which every curve is drawn; all times that leave this module are milliseconds.
+"""
+
+import math
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from hdrh.codec import HdrCookieException, HdrLengthException
+from hdrh.histogram import HdrHistogram
+from numpy.typing import NDArray
+
+from reports.errors import ResultInvalidError
+
+Floats = NDArray[np.float64]
+_US_PER_MS = 1000.0
+_TAIL = 0.025
+"""What a two-sided 95 % interval leaves on each side."""
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """Recorded values, grouped by the histogram's own buckets.
+
+    Attributes:
+        low_ms: lower edge of each bucket that holds something, ascending.
+        high_ms: its upper edge (half a microsecond beyond its highest value).
+        counts: how many values it holds.
+    """
+
+    low_ms: Floats
+    high_ms: Floats
+    counts: NDArray[np.int64]
+
+    @property
+    def total(self) -> int:
+        """How many values there are."""
+        return int(self.counts.sum())
+
+    @property
+    def middle_ms(self) -> Floats:
+        """The value that stands for each bucket."""
+        return (self.low_ms + self.high_ms) / 2
+
+    def quantiles(self, at: Floats) -> Floats:
+        """Values below which the shares `at` (0 to 1) of all values lie; interpolated inside a bucket."""
+        reached = np.cumsum(self.counts)
+        rank = np.clip(at, 0.0, 1.0) * self.total
+        index = np.minimum(np.searchsorted(reached, rank, side="left"), len(reached) - 1)
+        inside = (rank - (reached[index] - self.counts[index])) / self.counts[index]
+        width = self.high_ms[index] - self.low_ms[index]
+        result: Floats = self.low_ms[index] + np.clip(inside, 0.0, 1.0) * width
+        return result
+
+    def quantile_band(self, at: Floats) -> tuple[Floats, Floats]:
+        """95 % bounds of the quantiles by order statistics (binomial, normal approximation of the rank).
+
+        They take the values for independent, which a robot's answers in one run are not quite: the intervals
+        that the result file carries, from resampled blocks, are the ones to judge by.
+        """
+        spread = 1.96 * np.sqrt(at * (1 - at) / self.total)
+        return self.quantiles(at - spread), self.quantiles(at + spread)
+
+    @property
+    def highest_supported(self) -> float:
+        """The highest quantile for which these many values support a 95 % interval with an upper bound.
+
+        The largest of n values lies above the q-quantile with probability 1 - q**n; that is at least 97.5 %
+        up to q = 0.025**(1/n).
+        """
+        return math.exp(math.log(_TAIL) / self.total)
+
+
+def distribution(encoded: str, where: str) -> Distribution | None:
+    """Decode a histogram; None where it holds nothing.
+
+    Args:
+        encoded: base64 of the V2 encoding.
+        where: the place in the result file, for the message.
+
+    Raises:
+        ResultInvalidError: it is no such histogram.
+    """
+    if not encoded:
+        return None
+    try:
+        histogram = HdrHistogram.decode(encoded)
+        buckets = list(_buckets(histogram))
+    except (HdrCookieException, HdrLengthException, zlib.error, TypeError, ValueError, IndexError) as error:
+        shown = encoded if len(encoded) <= 40 else f"{encoded[:40]}…"  # noqa: PLR2004 - enough to find it by
+        raise ResultInvalidError(f"{where}: no HDR histogram (V2, base64): {error} (value: {shown!r})") from error
+    if not buckets:
+        return None
+    lows = [histogram.get_lowest_equivalent_value(value) for value, _ in buckets]
+    highs = [histogram.get_highest_equivalent_value(value) for value, _ in buckets]
+    return Distribution(
+        np.maximum(np.asarray(lows, dtype=np.float64) - 0.5, 0.0) / _US_PER_MS,
+        (np.asarray(highs, dtype=np.float64) + 0.5) / _US_PER_MS,
+        np.asarray([count for _, count in buckets], dtype=np.int64),
+    )
+
+
+def _buckets(histogram: Any) -> Iterator[tuple[int, int]]:
+    """Value and count of each bucket that holds something; the library's iterator reuses one item for all."""
+    for item in histogram.get_recorded_iterator():
+        yield item.value_iterated_to, item.count_added_in_this_iter_step
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One series of a latency result with its distributions.
+
+    Attributes:
+        data: the series as in the file.
+        service: time from the actual start; None without values.
+        response: time from the intended start; None without values or where it was not recorded.
+    """
+
+    data: Mapping[str, Any]
+    service: Distribution | None
+    response: Distribution | None
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Operation, client and interface: what a series is known by."""
+        return self.data["operation"], self.data["client"], self.data["interface"]
+
+    @property
+    def name(self) -> str:
+        """How the page calls it."""
+        return f"{self.data['operation']}, {self.data['interface'].upper()}"
+
+
+def all_series(result: Mapping[str, Any], path: str) -> dict[tuple[str, str, str], Series]:
+    """Every series of a result by operation, client and interface, wire before zeep and REST before SOAP."""
+    found = {}
+    for index, data in enumerate(result["series"]):
+        where = f"{path}: at $.series[{index}]"
+        series = Series(
+            data,
+            distribution(data["histogram"], f"{where}.histogram"),
+            distribution(data.get("response_histogram", ""), f"{where}.response_histogram"),
+        )
+        found[series.key] = series
+    return dict(sorted(found.items(), key=lambda item: (item[0][1] != "wire", item[0][0], item[0][2])))

@@ -1,0 +1,139 @@
+"""The latency report: a measurement of SOAP against REST as a page and as Markdown."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from reports.figures.canvas import COLOUR, INK, Picture
+from reports.figures.load import load
+from reports.figures.ratios import Ratio, ratios
+from reports.figures.shape import density, difference
+from reports.figures.spans import SPANS, means, spans
+from reports.figures.spectrum import spectrum
+from reports.figures.timeline import timeline
+from reports.findings import PAPER, remarks, verdict
+from reports.histograms import Series, all_series
+from reports.numbers import NONE, interval, ms, rate, ratio, share
+from reports.pages import html_page, markdown_page
+
+QUANTILES = ("mean", "p50", "p90", "p95", "p99", "p999", "max")
+QUANTILE_WORDS = {
+    "mean": "mean", "p50": "50 %", "p90": "90 %", "p95": "95 %", "p99": "99 %", "p999": "99.9 %", "max":
+    "longest",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class PaperRow:
+    """One line of the comparison with the paper: means, because that is what the paper gives.
+
+    Attributes:
+        label: whose figures.
+        rest_ms: REST's mean, None where it was not measured.
+        soap_ms: SOAP's.
+        ratio: of the two.
+        bounds: the ratio's 95 % interval.
+    """
+
+    label: str
+    rest_ms: float | None
+    soap_ms: float | None
+    ratio: float | None
+    bounds: tuple[float, float] | None
+
+
+def latency_html(result: Mapping[str, Any], path: str = "latency.json") -> str:
+    """The report as one HTML file.
+
+    Args:
+        result: a valid `roaas-latency/1` document.
+        path: where it came from, for messages.
+
+    Raises:
+        ResultInvalidError: a histogram in it cannot be decoded.
+    """
+    series = all_series(result, path)
+    return html_page("latency.html.j2", pictures=_pictures(result, series), **_values(result, series))
+
+
+def latency_markdown(result: Mapping[str, Any], path: str = "latency.json") -> str:
+    """The short form for a pull request; arguments and errors as for the page."""
+    series = all_series(result, path)
+    return markdown_page("latency.md.j2", **_values(result, series))
+
+
+def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> dict[str, Any]:
+    return {
+        "result": result,
+        "series": list(series.values()),
+        "verdict": verdict(result, series),
+        "remarks": remarks(result, series),
+        "paper": paper_rows(result, series),
+        "reasons": sorted({reason for one in series.values() for reason in one.data.get("reasons", {}).values()}),
+        "means": means,
+        "spans": SPANS,
+        "quantiles": QUANTILES,
+        "words": QUANTILE_WORDS,
+        "ms": ms,
+        "ratio": ratio,
+        "rate": rate,
+        "share": share,
+        "interval": interval,
+        "none": NONE,
+    }
+
+
+def paper_rows(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[PaperRow]:
+    """The paper's figures, and under them this run's for each operation and client."""
+    rows = [PaperRow("the paper, delivery", PAPER["rest_ms"], PAPER["soap_ms"], PAPER["ratio"], None)]
+    for operation, client in dict.fromkeys(key[:2] for key in series):
+        rest, soap = (series.get((operation, client, name)) for name in ("rest", "soap"))
+        compared = next(
+            (c for c in result["comparisons"]
+             if (c["operation"], c["client"], c["quantile"]) == (operation, client, "mean")),
+            None,
+        )  # fmt: skip
+        bounds = compared["ci95"] if compared else None
+        rows.append(
+            PaperRow(
+                f"this run, {operation}, {client} client",
+                rest.data["service_ms"]["mean"] if rest else None,
+                soap.data["service_ms"]["mean"] if soap else None,
+                compared["ratio"] if compared else None,
+                (bounds[0], bounds[1]) if bounds else None,
+            )
+        )
+    return rows
+
+
+def _pictures(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> dict[str, Picture | None]:
+    return {
+        "ratios": _ratio_picture(result),
+        "spectrum": spectrum(series),
+        "density": density(series),
+        "difference": difference(series, result["comparisons"]),
+        "spans": spans(series),
+        "timeline": timeline(result),
+        "load": load(result),
+    }
+
+
+def _ratio_picture(result: Mapping[str, Any]) -> Picture | None:
+    rows = [
+        Ratio(
+            f"{c['operation']}, {c['client']}, {QUANTILE_WORDS[c['quantile']]}",
+            c["ratio"],
+            (c["ci95"][0], c["ci95"][1]) if c["ci95"] else None,
+            COLOUR["soap"] if c["client"] == "wire" else INK,
+        )
+        for c in sorted(result["comparisons"], key=lambda c: (c["client"] != "wire", c["operation"]))
+        if c["ratio"] is not None and c["quantile"] in {"p50", "p99"}
+    ]
+    return ratios(
+        "ratios",
+        "SOAP's service time over REST's",
+        rows,
+        "How many times as long SOAP takes as REST, at the median (50 %) and at the 99th percentile, with 95 % "
+        "intervals. Right of 1 SOAP is slower. The dashed line is the ratio of the paper's two means.",
+        mark=(PAPER["ratio"], f"the paper's {PAPER['ratio']}"),
+    )
