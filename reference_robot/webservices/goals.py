@@ -171,7 +171,7 @@ class Goals:
 
     def _filled_in(self, wanted: dict[str, Any]) -> dict[str, Any]:
         """Return the goal with what the client may leave out: stamps mean now, the id is a new one."""
-        seconds, nanoseconds = self._publishers.get_clock().now().seconds_nanoseconds()
+        seconds, nanoseconds = self._publishers.node.get_clock().now().seconds_nanoseconds()
         now = {"stamp": {"sec": seconds, "nanosec": nanoseconds}}
         target = wanted["goal"]["target_pose"]
         return {

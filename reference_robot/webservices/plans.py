@@ -109,5 +109,5 @@ class Planner:
     def _stamped(self, pose: Pose, frame_id: str) -> PoseStamped:
         stamped = PoseStamped(pose=pose)
         stamped.header.frame_id = frame_id
-        stamped.header.stamp = self._subscribers.get_clock().now().to_msg()
+        stamped.header.stamp = self._subscribers.node.get_clock().now().to_msg()
         return stamped

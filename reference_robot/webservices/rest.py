@@ -50,7 +50,7 @@ class RestInterface(Interface):
         allow = (b"allow", ", ".join([*handlers, "OPTIONS"]).encode())
         if request.method == "OPTIONS":
             return Response(204, (allow,))
-        raise Problem(405, f"{request.method} is not offered here; see Allow", (allow,))
+        raise Problem(405, f"the method is not one of {allow[1].decode()}", (allow,))
 
     def _with_values(self, path: bytes) -> Handlers:
         if path.startswith(_DELIVERY_PATHS) and Delivery.owns(path):

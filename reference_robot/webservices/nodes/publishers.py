@@ -9,16 +9,15 @@ from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
-from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from unique_identifier_msgs.msg import UUID
 
 if TYPE_CHECKING:
-    from rclpy.context import Context
     from rclpy.publisher import Publisher
     from rclpy.task import Future
 
     from reference_robot.names import RosNames
+    from reference_robot.ros import RosRuntime
 
 COURIER_DELIVERY_MESSAGE_CODE: Final = 3
 COFFEE_DELIVERY_MESSAGE_CODE: Final = 4
@@ -32,21 +31,21 @@ _VELOCITY_TYPES: Final[dict[str, Any]] = {
 }
 
 
-class RobotPublishersNode(Node):
+class RobotPublishersNode:
     """All publishers, and the clients of the actions that move the robot.
 
     Args:
-        context: The ROS context that shares the robot's domain.
+        ros: The runtime that spins the node.
         names: Topics and actions to bind to.
     """
 
-    def __init__(self, context: Context, names: RosNames) -> None:
-        super().__init__("robot_publishers", context=context)
+    def __init__(self, ros: RosRuntime, names: RosNames) -> None:
+        self.node = ros.create_node("robot_publishers")
         self._names = names
-        self._delivery: Publisher = self.create_publisher(DeliveryRequestMsg, names.topics.delivery, _DELIVERY_QOS)
+        self._delivery: Publisher = self.node.create_publisher(DeliveryRequestMsg, names.topics.delivery, _DELIVERY_QOS)
         self._velocity: dict[str, Publisher] = {}
-        self._navigation = ActionClient(self, NavigateToPose, names.actions.navigate_to_pose)
-        self._cancel = self.create_client(CancelGoal, f"{names.actions.navigate_to_pose}/_action/cancel_goal")
+        self._navigation = ActionClient(self.node, NavigateToPose, names.actions.navigate_to_pose)
+        self._cancel = self.node.create_client(CancelGoal, f"{names.actions.navigate_to_pose}/_action/cancel_goal")
         if names.velocity.message != "auto":
             self._velocity_publisher(f"geometry_msgs/msg/{names.velocity.message}")
 
@@ -70,8 +69,8 @@ class RobotPublishersNode(Node):
         if any(publisher.get_subscription_count() for publisher in self._velocity.values()):
             return True
         if self._names.velocity.message == "auto":
-            topic = self.resolve_topic_name(self._names.topics.cmd_vel)
-            for endpoint in self.get_subscriptions_info_by_topic(topic):
+            topic = self.node.resolve_topic_name(self._names.topics.cmd_vel)
+            for endpoint in self.node.get_subscriptions_info_by_topic(topic):
                 if endpoint.topic_type in _VELOCITY_TYPES:
                     self._velocity_publisher(endpoint.topic_type)
         return any(publisher.get_subscription_count() for publisher in self._velocity.values())
@@ -85,13 +84,13 @@ class RobotPublishersNode(Node):
                 publisher.publish(twist)
             else:
                 stamped = TwistStamped(twist=twist)
-                stamped.header.stamp = self.get_clock().now().to_msg()
+                stamped.header.stamp = self.node.get_clock().now().to_msg()
                 stamped.header.frame_id = self._names.frames.base
                 publisher.publish(stamped)
 
     def _velocity_publisher(self, kind: str) -> None:
         if kind not in self._velocity:
-            self._velocity[kind] = self.create_publisher(
+            self._velocity[kind] = self.node.create_publisher(
                 _VELOCITY_TYPES[kind], self._names.topics.cmd_vel, _VELOCITY_QOS
             )
 
@@ -115,8 +114,3 @@ class RobotPublishersNode(Node):
         request = CancelGoal.Request()
         request.goal_info.goal_id.uuid = list(identity)
         return self._cancel.call_async(request)
-
-    def destroy_node(self) -> None:
-        """Destroy the action client before the node that it hangs on."""
-        self._navigation.destroy()
-        super().destroy_node()

@@ -8,21 +8,20 @@ from nav2_msgs.action import ComputePathToPose
 from nav_msgs.msg import Odometry
 from nav_msgs.srv import GetPlan
 from rclpy.action import ActionClient
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from std_msgs.msg import String
 
 if TYPE_CHECKING:
-    from rclpy.context import Context
     from rclpy.task import Future
 
     from reference_robot.names import RosNames
+    from reference_robot.ros import RosRuntime
 
 _LATCHED_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NAVIGATION_PACKAGES: Final = frozenset({"nav_msgs", "nav2_msgs", "map_msgs", "slam_toolbox"})
 
 
-class RobotSubscribersNode(Node):
+class RobotSubscribersNode:
     """All subscribers, the queries of the graph, and the clients of the planners.
 
     Callbacks run in the executor's thread and only keep the message that came last: one reference, which the event
@@ -35,19 +34,19 @@ class RobotSubscribersNode(Node):
         last_rejection: The JSON of the goal refused last, and why; empty before the first.
     """
 
-    def __init__(self, context: Context, names: RosNames) -> None:
-        super().__init__("robot_subscribers", context=context)
+    def __init__(self, ros: RosRuntime, names: RosNames) -> None:
+        self.node = ros.create_node("robot_subscribers")
         self.odometry: Odometry | None = None
         self.missions = ""
         self.current_goal = ""
         self.last_rejection = ""
         topics = names.topics
-        self.create_subscription(Odometry, topics.odom, self._keep_odometry, qos_profile_sensor_data)
-        self.create_subscription(String, topics.missions, self._keep_missions, _LATCHED_QOS)
-        self.create_subscription(String, topics.current_goal, self._keep_current_goal, _LATCHED_QOS)
-        self.create_subscription(String, topics.last_rejection, self._keep_last_rejection, _LATCHED_QOS)
-        self._planner_service = self.create_client(GetPlan, names.services.get_plan)
-        self._planner_action = ActionClient(self, ComputePathToPose, names.actions.compute_path_to_pose)
+        self.node.create_subscription(Odometry, topics.odom, self._keep_odometry, qos_profile_sensor_data)
+        self.node.create_subscription(String, topics.missions, self._keep_missions, _LATCHED_QOS)
+        self.node.create_subscription(String, topics.current_goal, self._keep_current_goal, _LATCHED_QOS)
+        self.node.create_subscription(String, topics.last_rejection, self._keep_last_rejection, _LATCHED_QOS)
+        self._planner_service = self.node.create_client(GetPlan, names.services.get_plan)
+        self._planner_action = ActionClient(self.node, ComputePathToPose, names.actions.compute_path_to_pose)
 
     def _keep_odometry(self, message: Odometry) -> None:
         self.odometry = message
@@ -67,16 +66,18 @@ class RobotSubscribersNode(Node):
         """Return name, topic and type of every topic of sensor data that somebody publishes."""
         return [
             {"name": topic.removeprefix("/"), "topic": topic, "type": types[0]}
-            for topic, types in sorted(self.get_topic_names_and_types())
-            if types[0].startswith("sensor_msgs/msg/") and self.count_publishers(topic)
+            for topic, types in sorted(self.node.get_topic_names_and_types())
+            if types[0].startswith("sensor_msgs/msg/") and self.node.count_publishers(topic)
         ]
 
     def navigation_services(self) -> list[dict[str, str]]:
         """Return name and type of every service of the navigation stack; those inside actions are not among them."""
         return [
             {"name": name, "type": types[0]}
-            for name, types in sorted(self.get_service_names_and_types())
-            if types[0].partition("/")[0] in _NAVIGATION_PACKAGES and "/_" not in name
+            for name, types in sorted(self.node.get_service_names_and_types())
+            if types[0].partition("/")[0] in _NAVIGATION_PACKAGES
+            and "/_" not in name
+            and self.node.count_services(name)  # a name that only a client waits for is no service
         ]
 
     # Planning
@@ -96,8 +97,3 @@ class RobotSubscribersNode(Node):
     def ask_plan_action(self, goal: ComputePathToPose.Goal) -> Future:
         """Ask the action; the future holds rclpy's ClientGoalHandle. Call it in the executor's thread."""
         return self._planner_action.send_goal_async(goal)
-
-    def destroy_node(self) -> None:
-        """Destroy the action client before the node that it hangs on."""
-        self._planner_action.destroy()
-        super().destroy_node()

@@ -1,0 +1,5 @@
+"""``python -m reference_robot`` is ``roaas robot``."""
+
+from reference_robot.cli import robot
+
+robot()

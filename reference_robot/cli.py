@@ -1,0 +1,73 @@
+"""The command ``robot``: the simulated robot and its web services, or the web services alone."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Final
+
+import click
+
+EXIT_FAILED: Final = 1
+EXIT_USAGE: Final = 2
+
+_HIGHEST_DOMAIN_ID: Final = 101
+_FILE: Final = click.Path(exists=True, dir_okay=False, path_type=Path)
+_PORT: Final = click.IntRange(0, 65535)
+
+# What must be importable, and where it comes from.
+_NEEDED: Final = {
+    "rclpy": "ROS 2 Jazzy: pip install 'roaas[ros]', or apt's ros-jazzy-rclpy and `source /opt/ros/jazzy/setup.bash`",
+    "mybot_delivery_app.msg": "the interface package: pip install reference_robot/interfaces/mybot_delivery_app",
+    "nav2_msgs.action": "the interface package: pip install reference_robot/interfaces/nav2_msgs, "
+    "or apt's ros-jazzy-nav2-msgs",
+    "uvicorn": "the web server: pip install 'roaas[robot]'",
+    "uvloop": "the event loop: pip install 'roaas[robot]'",
+    "httptools": "the HTTP parser: pip install 'roaas[robot]'",
+}
+
+
+@click.command()
+@click.option("--config", type=_FILE, help="TOML file of names, limits and deadlines.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option("--rest-port", type=_PORT, default=7003, show_default=True, help="0 takes a free one.")
+@click.option("--soap-port", type=_PORT, default=5555, show_default=True, help="0 takes a free one.")
+@click.option(
+    "--domain-id",
+    type=click.IntRange(0, _HIGHEST_DOMAIN_ID),
+    envvar="ROS_DOMAIN_ID",
+    default=0,
+    show_default=True,
+    help="ROS domain.",
+)
+@click.option(
+    "--time-scale",
+    type=click.FloatRange(0, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="How many times faster the simulated robot moves.",
+)
+@click.option("--token-file", type=_FILE, help="Ask for the bearer token in this file.")
+@click.option("--attach", is_flag=True, help="Start no simulation; serve the robot on the ROS graph.")
+def robot(**options: object) -> None:
+    """Run the reference robot.
+
+    When both interfaces answer, one line on stdout says where. SIGINT and SIGTERM stop the robot.
+    """
+    for module, remedy in _NEEDED.items():
+        try:
+            import_module(module)
+        except ImportError as error:
+            click.echo(f"roaas robot needs {module}, which cannot be imported ({error}). Install {remedy}", err=True)
+            sys.exit(EXIT_USAGE)
+    # Only now: it imports ROS and the web server.
+    launch = import_module("reference_robot.launch")
+    try:
+        launch.run(launch.Options(**options))
+    except launch.UnusableError as error:
+        click.echo(f"Error: {error}", err=True)
+        sys.exit(EXIT_USAGE)
+    except launch.RobotLostError as error:
+        click.echo(f"Error: {error}", err=True)
+        sys.exit(EXIT_FAILED)

@@ -1,0 +1,105 @@
+"""Starts a whole robot: the simulation as a child process, unless a robot is there already, and the web services."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import signal
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from reference_robot.names import NamesError
+from reference_robot.simulated import SimulatedRobot, SimulationError
+from reference_robot.webservices.configuration import ConfigurationError, load_configuration
+from reference_robot.webservices.endpoint import PortInUseError
+from reference_robot.webservices.http.authorization import Authorization, TokenFileError, read_token
+from reference_robot.webservices.runner import (
+    Listening,
+    RobotNotFoundError,
+    RobotWebServiceNodesRunner,
+)
+from reference_robot.webservices.soap.publishers import PATH as PUBLISHERS_PATH
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+    from types import FrameType
+
+    from reference_robot.webservices.assembly import Endpoints
+
+_DISCOVERY_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+
+
+class UnusableError(Exception):
+    """The robot cannot be started as asked: the message names the option, file or port, and what is wrong with it."""
+
+
+class RobotLostError(Exception):
+    """The simulated robot did not come up, or ended by itself."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line says (cli.md)."""
+
+    config: Path | None
+    host: str
+    rest_port: int
+    soap_port: int
+    domain_id: int
+    time_scale: float
+    token_file: Path | None
+    attach: bool
+
+
+def run(options: Options) -> None:
+    """Run the robot until SIGINT or SIGTERM.
+
+    Raises:
+        UnusableError: A file, port or address cannot be used.
+        RobotLostError: There is no robot (any more) behind the web services.
+    """
+    logging.basicConfig(stream=sys.stderr, level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+
+    def ready(endpoints: Endpoints) -> None:
+        wsdl = f"{endpoints.soap}{PUBLISHERS_PATH}?wsdl"
+        sys.stdout.write(f"ready rest={endpoints.rest} soap={wsdl} domain={options.domain_id}\n")
+        sys.stdout.flush()
+
+    try:
+        configuration = load_configuration(options.config)
+        token = None if options.token_file is None else read_token(options.token_file)
+        listening = Listening(options.host, options.rest_port, options.soap_port, Authorization(token))
+        runner = RobotWebServiceNodesRunner(configuration, listening, options.domain_id)
+        with contextlib.suppress(_Stopped), _stopped_by_signals(), _simulation(options):
+            runner.run(ready, wait_for_robot=not options.attach)
+    except (NamesError, ConfigurationError, TokenFileError, PortInUseError) as error:
+        raise UnusableError(error) from error
+    except (SimulationError, RobotNotFoundError) as error:
+        raise RobotLostError(error) from error
+
+
+class _Stopped(BaseException):
+    """A signal came while no event loop was there to take it."""
+
+
+@contextlib.contextmanager
+def _stopped_by_signals() -> Iterator[None]:
+    """Let SIGINT and SIGTERM unwind what has been started so far."""
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        raise _Stopped
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
+    yield
+
+
+def _simulation(options: Options) -> contextlib.AbstractContextManager[None]:
+    if options.attach:
+        return contextlib.nullcontext()
+    # A simulated robot is no affair of other machines on the network, unless the environment says so.
+    os.environ.setdefault(_DISCOVERY_RANGE, "LOCALHOST")
+    return SimulatedRobot(options.domain_id, options.time_scale, options.config).running()

@@ -1,0 +1,97 @@
+"""The simulated robot as a child process, which ends with its parent, however that ends."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+from typing import IO, TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+_START: Final = 30.0  # seconds
+_STOP: Final = 5.0  # seconds
+
+
+class SimulationError(RuntimeError):
+    """The simulation did not start, or ended by itself."""
+
+
+class SimulatedRobot:
+    """The simulation in a process of its own, with a watch on its end.
+
+    Args:
+        domain_id: The ROS domain.
+        time_scale: How many times faster the robot moves.
+        config: The TOML file of names, None for the robot's own.
+    """
+
+    def __init__(self, domain_id: int, time_scale: float, config: Path | None) -> None:
+        self._command = [
+            sys.executable,
+            "-m",
+            "reference_robot.simulation",
+            f"--domain-id={domain_id}",
+            f"--time-scale={time_scale}",
+            *([f"--config={config}"] if config else []),
+        ]
+        self._ending = threading.Event()
+
+    @contextlib.contextmanager
+    def running(self) -> Iterator[None]:
+        """Run the simulation while the block runs; should it end by itself, the block is ended by SIGTERM.
+
+        Raises:
+            SimulationError: It did not become ready, or ended by itself.
+        """
+        with subprocess.Popen(  # noqa: S603 - our own program, and arguments that click has checked
+            self._command,
+            stdin=subprocess.PIPE,  # its end tells the child that the parent is gone, even if that was killed
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # so that Ctrl-C reaches the parent alone, which stops the child in order
+        ) as process:
+            try:
+                assert process.stdout is not None  # noqa: S101 - tells mypy what PIPE means
+                self._await_ready(process.stdout)
+                watch = threading.Thread(target=self._watch, args=(process, process.stdout), daemon=True)
+                watch.start()
+                yield
+                lost = process.poll() is not None
+            finally:
+                self._ending.set()
+                _end(process)
+        if lost:
+            raise SimulationError(f"the simulation ended by itself with exit code {process.returncode}")
+
+    def _await_ready(self, stdout: IO[bytes]) -> None:
+        give_up = time.monotonic() + _START
+        told = b""
+        while b"ready" not in told.split():
+            readable, _, _ = select.select([stdout], [], [], max(0.0, give_up - time.monotonic()))
+            octets = os.read(stdout.fileno(), 4096) if readable else b""
+            if not octets:
+                why = "ended" if readable else f"was not ready within {_START:g} s"
+                raise SimulationError(f"the simulation {why}: {' '.join(self._command)}")
+            told += octets
+
+    def _watch(self, process: subprocess.Popen[bytes], stdout: IO[bytes]) -> None:
+        while os.read(stdout.fileno(), 4096):
+            pass  # a full pipe would stop the child
+        process.wait()
+        if not self._ending.is_set():
+            os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(_STOP)
+    except subprocess.TimeoutExpired:
+        process.kill()

@@ -1,0 +1,128 @@
+"""RobotWebServiceNodesRunner: starts nodes and endpoints, and stops them (paper; apart from the endpoint itself)."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import resource
+import signal
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import uvloop
+
+from reference_robot.ros import RosRuntime
+from reference_robot.webservices.assembly import Endpoints, RosSide, interfaces
+from reference_robot.webservices.endpoint import EndpointPublisher, bound
+from reference_robot.webservices.nodes.calls import RosCalls
+from reference_robot.webservices.nodes.publishers import RobotPublishersNode
+from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+
+if TYPE_CHECKING:
+    import socket
+    from collections.abc import Callable, Iterator
+
+    from reference_robot.webservices.configuration import Configuration
+    from reference_robot.webservices.http.authorization import Authorization
+
+_DESCRIPTORS: Final = 8192  # connections and ROS together; the usual soft limit of 1,024 is soon reached
+_DISCOVERY: Final = 20.0  # seconds in which a robot that has been started must appear on the graph
+_DISCOVERY_STEP: Final = 0.05
+
+
+class RobotNotFoundError(RuntimeError):
+    """The robot that was started did not appear on the ROS graph."""
+
+
+@dataclass(frozen=True)
+class Listening:
+    """Addresses to bind, and who may call; port 0 takes a free one."""
+
+    host: str
+    rest_port: int
+    soap_port: int
+    authorization: Authorization
+
+
+class RobotWebServiceNodesRunner:
+    """Runs the web services of one robot.
+
+    Args:
+        configuration: Names, limits and deadlines.
+        listening: Addresses and who may call.
+        domain_id: The ROS domain; None takes the environment's.
+    """
+
+    def __init__(self, configuration: Configuration, listening: Listening, domain_id: int | None) -> None:
+        self._configuration = configuration
+        self._listening = listening
+        self._domain_id = domain_id
+
+    def run(self, ready: Callable[[Endpoints], None], *, wait_for_robot: bool) -> None:
+        """Serve until SIGINT or SIGTERM.
+
+        Args:
+            ready: Called once, when both interfaces answer.
+            wait_for_robot: Whether odometry and the listeners of commands must be there first.
+
+        Raises:
+            PortInUseError: A port cannot be had.
+            RobotNotFoundError: ``wait_for_robot``, and none came in time.
+        """
+        _raise_descriptor_limit()
+        with self._sockets() as (rest, soap), RosRuntime(self._domain_id) as ros:
+            endpoints = Endpoints(self._listening.host, rest.getsockname()[1], soap.getsockname()[1])
+            names = self._configuration.names
+            publishers, subscribers = RobotPublishersNode(ros, names), RobotSubscribersNode(ros, names)
+            ros.start()
+            if wait_for_robot:
+                _await_robot(publishers, subscribers)
+            calls = RosCalls(publishers.node.executor, self._configuration.web.deadline)
+            pair = interfaces(
+                RosSide(publishers, subscribers, calls),
+                self._configuration,
+                endpoints,
+                self._listening.authorization,
+            )
+            publisher = EndpointPublisher(list(zip(pair, (rest, soap), strict=True)))
+            uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
+
+    @contextlib.contextmanager
+    def _sockets(self) -> Iterator[tuple[socket.socket, socket.socket]]:
+        host = self._listening.host
+        with bound(host, self._listening.rest_port) as rest, bound(host, self._listening.soap_port) as soap:
+            yield rest, soap
+
+
+async def _serve_until_signalled(publisher: EndpointPublisher, ready: Callable[[], None]) -> None:
+    stop, started = asyncio.Event(), asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    async with asyncio.TaskGroup() as group:
+        group.create_task(publisher.serve(stop, started))
+        await started.wait()
+        ready()
+
+
+def _await_robot(publishers: RobotPublishersNode, subscribers: RobotSubscribersNode) -> None:
+    missing = {
+        "odometry": lambda: subscribers.odometry is not None,
+        "a listener for velocity commands": publishers.find_velocity_subscribers,
+        "a delivery application": publishers.delivery_is_served,
+        "a navigation that takes goals": publishers.navigation_is_served,
+    }
+    give_up = time.monotonic() + _DISCOVERY
+    while missing:
+        missing = {what: is_there for what, is_there in missing.items() if not is_there()}
+        if missing and time.monotonic() > give_up:
+            raise RobotNotFoundError(f"after {_DISCOVERY:g} s, the ROS graph does not show {', '.join(missing)}")
+        time.sleep(_DISCOVERY_STEP)
+
+
+def _raise_descriptor_limit() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _DESCRIPTORS if hard == resource.RLIM_INFINITY else min(_DESCRIPTORS, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))

@@ -1,0 +1,139 @@
+"""A robot that is not ours: a node in a process of its own, which tells what reaches it over ROS.
+
+Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent]``. It prints one JSON object a line: ``{"ready": true}``, then
+``{"delivery": …}``, ``{"velocity": …}``, ``{"goal": …}``, ``{"cancel": …}`` as they come. Each line on its stdin is a
+command: ``{"odometry": {"x": …, "covariance": …}}`` publishes that odometry (over and over), ``{"finish": true}`` ends
+the goal.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import sys
+import threading
+import time
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import Twist, TwistStamped
+from mybot_delivery_app.msg import DeliveryRequestMsg
+from nav2_msgs.action import NavigateToPose
+from nav_msgs.msg import Odometry
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+import rclpy
+
+_UNREACHABLE_X = 1000.0
+
+
+def tell(**event: Any) -> None:
+    print(json.dumps(event), flush=True)
+
+
+def bits(value: float) -> str:
+    return struct.pack(">d", value).hex()
+
+
+class ForeignRobot(Node):
+    def __init__(self, context: Context, velocity: type, *, silent: bool) -> None:
+        super().__init__("foreign_robot", context=context)
+        self.odometry = None if silent else Odometry()
+        self.finished = threading.Event()
+        self._latest_goal: Any = None
+        group = ReentrantCallbackGroup()
+        self._publisher = self.create_publisher(Odometry, "odom", 10)
+        self.create_timer(0.02, self._publish, callback_group=group)
+        self.create_subscription(
+            DeliveryRequestMsg, "/DeliveryRequestMsg/from_json", self._delivery, QoSProfile(depth=1000)
+        )
+        self.create_subscription(velocity, "cmd_vel", self._velocity, 10)
+        self._server = ActionServer(
+            self,
+            NavigateToPose,
+            "navigate_to_pose",
+            execute_callback=self._drive,
+            goal_callback=self._goal,
+            cancel_callback=self._cancel,
+            callback_group=group,
+        )
+
+    def _publish(self) -> None:
+        odometry = self.odometry
+        if odometry is not None:
+            odometry.header.stamp = self.get_clock().now().to_msg()
+            self._publisher.publish(odometry)
+
+    def _delivery(self, message: DeliveryRequestMsg) -> None:
+        fields = message.get_fields_and_field_types()
+        tell(
+            delivery={
+                name: bits(value) if isinstance(value := getattr(message, name), float) else value for name in fields
+            }
+        )
+
+    def _velocity(self, message: Any) -> None:
+        twist = message.twist if isinstance(message, TwistStamped) else message
+        tell(velocity={"type": type(message).__name__, "x": twist.linear.x, "z": twist.angular.z})
+
+    def _goal(self, goal: NavigateToPose.Goal) -> GoalResponse:
+        pose = goal.pose
+        tell(goal={"frame_id": pose.header.frame_id, "x": pose.pose.position.x, "w": pose.pose.orientation.w})
+        return GoalResponse.REJECT if pose.pose.position.x == _UNREACHABLE_X else GoalResponse.ACCEPT
+
+    def _cancel(self, handle: Any) -> CancelResponse:
+        tell(cancel={"x": handle.request.pose.pose.position.x})
+        return CancelResponse.ACCEPT
+
+    def _drive(self, handle: Any) -> NavigateToPose.Result:
+        self._latest_goal = handle
+        self.finished.clear()
+        while handle.status != GoalStatus.STATUS_CANCELING:
+            if self._latest_goal is not handle:
+                handle.abort()  # another goal has preempted this one
+                return NavigateToPose.Result()
+            if self.finished.wait(0.01):
+                handle.succeed()
+                return NavigateToPose.Result()
+        handle.canceled()
+        return NavigateToPose.Result()
+
+    def obey(self, command: dict[str, Any]) -> None:
+        if "odometry" in command:
+            odometry = Odometry()
+            odometry.header.frame_id, odometry.child_frame_id = "odom", "base_link"
+            odometry.pose.pose.position.x = command["odometry"]["x"]
+            odometry.pose.covariance[35] = command["odometry"]["covariance"]
+            odometry.twist.twist.linear.x = command["odometry"]["x"] / 10
+            self.odometry = odometry
+        if "finish" in command:
+            self.finished.set()
+
+
+def main() -> None:
+    domain, velocity, *rest = sys.argv[1:]
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=int(domain))
+    robot = ForeignRobot(context, {"Twist": Twist, "TwistStamped": TwistStamped}[velocity], silent="silent" in rest)
+    executor = MultiThreadedExecutor(4, context=context)
+    executor.add_node(robot)
+    spinner = threading.Thread(target=executor.spin, daemon=True)
+    spinner.start()
+    tell(ready=True)
+    for line in sys.stdin:
+        robot.obey(json.loads(line))
+    robot.finished.set()
+    time.sleep(0.05)
+    executor.shutdown()
+    spinner.join(2)
+    robot.destroy_node()
+    context.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()
