@@ -1,0 +1,164 @@
+"""SOAP 1.1 envelopes: made from body and header elements, and read from a robot's answers as frozen values.
+
+A robot's answer is hostile input: nothing in it is expanded, fetched or trusted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from lxml import etree
+
+from conformance.soap.names import ENVELOPE, clark, local
+from conformance.soap.node import Node
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from conformance.target.exchange import Exchange
+
+
+class NotXmlError(ValueError):
+    """Octets that are no well-formed XML document; the message is the parser's."""
+
+
+class NotSoapError(ValueError):
+    """An answer that is no SOAP 1.1 message; the message says what is wrong with it."""
+
+
+def parse(document: bytes) -> etree._Element:
+    """Return the root element of a document from outside.
+
+    No entity is expanded, nothing is fetched, and libxml2's limits stay on.
+
+    Raises:
+        NotXmlError: it is not well-formed.
+    """
+    # A parser holds its last document's state, so each document gets one of its own.
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+    try:
+        return etree.fromstring(document, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        raise NotXmlError(ascii(str(error))[1:-1][:300] or "no XML") from error
+
+
+def elements(parent: etree._Element) -> list[etree._Element]:
+    """The element children: neither comments, nor processing instructions, nor entities."""
+    return [child for child in parent if isinstance(child.tag, str)]
+
+
+def text_of(element: etree._Element) -> str:
+    """The character data right inside an element, across comments and CDATA sections."""
+    parts = [element.text or ""]
+    parts += [child.tail or "" for child in element]
+    return "".join(parts)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A SOAP 1.1 fault as it was sent.
+
+    Attributes:
+        element: the Fault.
+        code_namespace: of faultcode's QName; None where its prefix is not bound; empty where it has no namespace.
+        code: local part of faultcode's QName, with what follows a dot (``Client.Authentication``); empty without one.
+        string: faultstring, or empty.
+        names: tags of the element children, in Clark notation, in their order.
+    """
+
+    element: etree._Element
+    code_namespace: str | None
+    code: str
+    string: str
+    names: tuple[str, ...]
+
+    @property
+    def standard(self) -> str:
+        """The standard code that this is one of (SOAP 1.1, 4.4.1), or empty."""
+        return self.code.split(".", 1)[0] if self.code_namespace == ENVELOPE else ""
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """A SOAP 1.1 message.
+
+    Attributes:
+        root: the Envelope.
+        headers: the header blocks.
+        body: the Body.
+        payload: its element children.
+        fault: the fault, if that is what the Body holds.
+    """
+
+    root: etree._Element
+    headers: tuple[etree._Element, ...]
+    body: etree._Element
+    payload: tuple[etree._Element, ...]
+    fault: Fault | None
+
+    @property
+    def first(self) -> etree._Element | None:
+        """The Body's first child, by which a message is known (BP R2710); None where there is none."""
+        return self.payload[0] if self.payload else None
+
+
+def read(document: bytes) -> Envelope:
+    """Read a message.
+
+    Raises:
+        NotSoapError: it is no XML, or no SOAP 1.1 envelope with a Body.
+    """
+    try:
+        root = parse(document)
+    except NotXmlError as error:
+        raise NotSoapError(f"no well-formed XML: {error}") from error
+    if root.tag != clark(ENVELOPE, "Envelope"):
+        raise NotSoapError(f"the document element is {root.tag}, not SOAP 1.1's Envelope")
+    parts = elements(root)
+    headers: list[etree._Element] = []
+    if parts and parts[0].tag == clark(ENVELOPE, "Header"):
+        headers = elements(parts.pop(0))
+    if not parts or parts[0].tag != clark(ENVELOPE, "Body"):
+        raise NotSoapError(f"the Envelope has {parts[0].tag if parts else 'nothing'} where its Body should be")
+    payload = tuple(elements(parts[0]))
+    fault = _fault(payload[0]) if payload and payload[0].tag == clark(ENVELOPE, "Fault") else None
+    return Envelope(root, tuple(headers), parts[0], payload, fault)
+
+
+def read_answer(exchange: Exchange) -> Envelope | None:
+    """The message in an answer; None where the answer holds none (see read())."""
+    if exchange.response is None:
+        return None
+    try:
+        return read(exchange.response.body)
+    except NotSoapError:
+        return None
+
+
+def _fault(element: etree._Element) -> Fault:
+    children = elements(element)
+    # R1001 wants the children unqualified; a fault that breaks it is read all the same, so that it can be judged.
+    by_name: dict[str, etree._Element] = {}
+    for child in children:
+        by_name.setdefault(local(str(child.tag)), child)
+    code_element = by_name.get("faultcode")
+    written = text_of(code_element).strip() if code_element is not None else ""
+    prefix, colon, name = written.rpartition(":")
+    space: str | None = ""
+    if code_element is not None:
+        space = code_element.nsmap.get(prefix) if colon else code_element.nsmap.get(None, "")
+    string = text_of(by_name["faultstring"]).strip() if "faultstring" in by_name else ""
+    return Fault(element, space, name, string, tuple(str(child.tag) for child in children))
+
+
+def envelope(body: Iterable[Node], headers: Iterable[Node] | None = None, space: str = ENVELOPE) -> Node:
+    """Make a message.
+
+    Args:
+        body: children of the Body.
+        headers: header blocks; None: no Header at all.
+        space: namespace of Envelope, Header and Body.
+    """
+    header = () if headers is None else (Node(clark(space, "Header"), children=tuple(headers)),)
+    return Node(clark(space, "Envelope"), children=(*header, Node(clark(space, "Body"), children=tuple(body))))
