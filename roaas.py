@@ -5,9 +5,14 @@ Rooms are imported when their command is used, so that ``roaas certify`` needs n
 
 from __future__ import annotations
 
+import functools
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 _COMMANDS = {
     "robot": ("reference_robot.cli", "robot"),
@@ -19,6 +24,9 @@ _COMMANDS = {
     "contract": ("conformance.cli.contract", "contract"),
 }
 _EXTRAS = {"robot": "robot", "load": "load"}
+# Commands that leave a result file in --out, and that file: the reports room turns it into what people read.
+_RESULTS = {"certify": "result.json", "load": "latency.json"}
+_ROOMS = {"conformance", "loadtests", "reference_robot", "reports"}
 
 
 class _Rooms(click.Group):
@@ -34,16 +42,41 @@ class _Rooms(click.Group):
         try:
             command = getattr(import_module(module), name)
         except ModuleNotFoundError as missing:
-            extra = _EXTRAS.get(cmd_name)
-            if extra is None or (missing.name or "").split(".")[0] in {"reference_robot", "loadtests"}:
+            if cmd_name not in _EXTRAS or (missing.name or "").split(".")[0] in _ROOMS:
                 raise
             raise click.UsageError(
                 f"'roaas {cmd_name}' needs the Python module {missing.name!r}, which is not installed: "
-                f"pip install 'roaas[{extra}]'",
+                f"pip install 'roaas[{_EXTRAS[cmd_name]}]'",
                 ctx,
             ) from missing
-        assert isinstance(command, click.Command)  # noqa: S101 - tells mypy what the table above holds
+        if not isinstance(command, click.Command):
+            raise TypeError(f"{module}.{name} is no command")
+        if cmd_name in _RESULTS:
+            _render_afterwards(command, _RESULTS[cmd_name])
         return command
+
+
+def _render_afterwards(command: click.Command, result: str) -> None:
+    """Have the reports room render what the command left, also when it failed or was interrupted."""
+    run = command.callback
+    if run is None or hasattr(run, "__wrapped__"):
+        return
+
+    @functools.wraps(run)
+    def run_and_render(*args: Any, out: Path, **options: Any) -> Any:
+        before = _changed(out / result)
+        try:
+            return run(*args, out=out, **options)
+        finally:
+            if _changed(out / result) != before:
+                for path in import_module("reports").render(out):
+                    click.echo(f"report: {path}")
+
+    command.callback = run_and_render
+
+
+def _changed(path: Path) -> int:
+    return path.stat().st_mtime_ns if path.exists() else 0
 
 
 @click.command(cls=_Rooms, context_settings={"help_option_names": ["-h", "--help"]})

@@ -72,7 +72,7 @@ class Judge:
         # What a check is about to risk: said before a hostile request, so that a robot that dies of it has failed it.
         self.at_risk: tuple[str, ...] = ()
 
-    def that(  # noqa: PLR0913 - a case is what was asked, what was seen and how to say it
+    def that(
         self,
         requirement: str,
         holds: bool,  # noqa: FBT001 - reads as a sentence: judge.that(id, answer.status == 200, ...)
@@ -116,7 +116,7 @@ class Judge:
             known.message, known.expected, known.exchange = message, expected, exchange
         return False
 
-    def demand(  # noqa: PLR0913 - as that()
+    def demand(
         self,
         requirement: str,
         holds: bool,  # noqa: FBT001 - as that()

@@ -1,0 +1,75 @@
+# The two commands: `make demo` and `make test`. Each sets up what it needs.
+SHELL := /bin/bash
+VENV := .venv
+BIN := $(VENV)/bin
+OUT := out
+# The newest Python that is there, from 3.11 up; or say which: make PYTHON=/path/to/python3.12 install
+PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do \
+	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' 2>/dev/null && command -v $$p && break; done)
+INTERFACES := $(addprefix reference_robot/interfaces/,mybot_delivery_app nav2_msgs)
+INTERFACE_FILES := $(shell find reference_robot/interfaces -type f -not -path '*/build/*')
+
+.PHONY: help install demo test lint selftest coverage-page bench clean
+
+help:
+	@echo "make demo      set up, start the robot, certify it, measure it, leave the reports in $(OUT)/"
+	@echo "make test      set up, then lint, types and all tests"
+	@echo "make install   set up only: $(VENV) with the command roaas in it"
+	@echo "make selftest  show that the suite catches faulty robots and blames no good one (about half an hour)"
+	@echo "make bench     print the benchmarks' ratios"
+	@echo "make clean     remove what the others made"
+
+install: $(VENV)/.installed
+
+# What pip cannot bring has to be there: each thing is named that is not.
+.PHONY: prerequisites
+prerequisites:
+	@test -n "$(PYTHON)" || { echo "missing: Python 3.11 to 3.14 (Debian, Ubuntu: apt install python3 python3-venv)" >&2; exit 2; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
+		{ echo "missing: the venv module of $(PYTHON) (Debian, Ubuntu: apt install python3-venv)" >&2; exit 2; }
+	@$(PYTHON) -c 'import sysconfig, pathlib, sys; sys.exit(not pathlib.Path(sysconfig.get_path("include"), "Python.h").exists())' || \
+		{ echo "missing: the headers of $(PYTHON), to build the ROS interfaces (Debian, Ubuntu: apt install python3-dev)" >&2; exit 2; }
+	@command -v c++ >/dev/null || \
+		{ echo "missing: a C++ compiler, to build the ROS interfaces (Debian, Ubuntu: apt install g++)" >&2; exit 2; }
+	@test "$$(uname -sm)" = "Linux x86_64" || \
+		{ echo "the robot runs on Linux x86-64 only (ROS 2 from PyPI); the suite alone runs anywhere: pip install '.[load]'" >&2; exit 2; }
+
+$(VENV)/.installed: pyproject.toml constraints.txt $(INTERFACE_FILES) | prerequisites
+	@echo "== setting up $(VENV) with $(PYTHON) (about two minutes)"
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[load,robot,ros,dev]'
+	@echo "== building the ROS 2 interface packages"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps $(addprefix ./,$(INTERFACES))
+	@touch $@
+
+demo: install
+	$(BIN)/python demo.py --out $(OUT)
+
+test: install browser lint
+	$(BIN)/python -m pytest
+
+lint: install
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+# The report tests look at the pages in a real browser.
+.PHONY: browser
+browser:
+	@command -v chromium chromium-browser google-chrome >/dev/null || \
+		{ test "$$(id -u)" = 0 && command -v apt-get >/dev/null && apt-get update -qq && apt-get install -y -qq chromium >/dev/null; } || \
+		{ echo "missing: chromium, in which the report tests look at the pages (Debian, Ubuntu: apt install chromium)" >&2; exit 2; }
+
+selftest: install
+	$(BIN)/roaas selftest --out $(OUT)/selftest
+
+coverage-page: install
+	$(BIN)/roaas contract coverage > docs/coverage.md
+
+bench: install
+	$(BIN)/python benchmarks/robot.py
+	$(BIN)/python benchmarks/generator.py
+
+clean:
+	rm -rf $(VENV) $(OUT) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

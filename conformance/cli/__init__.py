@@ -1,0 +1,1 @@
+"""The suite's commands: certify, contract, selftest."""

@@ -1,0 +1,197 @@
+"""``roaas certify``: options to a session, a session to a verdict, a verdict to an exit code."""
+
+from __future__ import annotations
+
+import shlex
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from conformance.cli.summary import print_summary
+from conformance.contract.files import CONTRACT_DIR, Contract, ContractError
+from conformance.contract.ledger import CLASSES, PROFILES
+from conformance.effort import EFFORTS, Effort
+from conformance.statement import Statement, StatementError, load_statement
+from conformance.verdict.exit_codes import INTERRUPTED, UNREACHABLE
+
+if TYPE_CHECKING:
+    from conformance.certification import Certification
+    from conformance.session import Session
+
+_ENDPOINTS = (
+    "rest",
+    "publishers_wsdl",
+    "subscribers_wsdl",
+    "publishers_endpoint",
+    "subscribers_endpoint",
+    "ca_file",
+    "token_file",
+    "request_rate",
+)
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("statement", required=False, type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "--init", is_flag=True, help="Ask the robot's descriptions and write a commented STATEMENT; judge nothing."
+)
+@click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
+@click.option("--publishers-wsdl", metavar="URL", help="WSDL of the publishers service, URL or file.")
+@click.option("--subscribers-wsdl", metavar="URL", help="WSDL of the subscribers service, URL or file.")
+@click.option("--publishers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say so.")
+@click.option("--subscribers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say so.")
+@click.option("--profile", type=click.Choice(list(PROFILES)), help="Claim the classes of a profile.")
+@click.option(
+    "--class", "classes", multiple=True, type=click.Choice(CLASSES), metavar="NAME", help="Claim a class; repeatable."
+)
+@click.option(
+    "--contract", type=click.Path(path_type=Path), default=CONTRACT_DIR, help="Judge by the contract in this folder."
+)
+@click.option("--allow-motion", is_flag=True, help="The robot may be moved: needed for most of the contract.")
+@click.option("--effort", type=click.Choice(EFFORTS), default="standard", show_default=True, help="How much to try.")
+@click.option(
+    "--minutes",
+    type=click.FloatRange(min=1),
+    default=10.0,
+    show_default=True,
+    help="How long --effort deep may take, about.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of everything random: same seed, same cases.",
+)
+@click.option(
+    "--timeout",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="S",
+    help="Deadline of one request.  [default: 10]",
+)
+@click.option(
+    "--request-rate", type=click.FloatRange(min=0, min_open=True), metavar="R", help="At most R requests per second."
+)
+@click.option(
+    "--ca-file",
+    type=click.Path(exists=True, dir_okay=False),
+    help="Authorities to trust for HTTPS instead of the system's.",
+)
+@click.option(
+    "--ros-domain-id", type=click.IntRange(0, 232), help="Watch the robot's ROS side with a probe (needs rclpy)."
+)
+@click.option(
+    "--baseline", type=click.Path(path_type=Path), help="Failures that are expected, with reason and expiry (TOML)."
+)
+@click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="Holds the bearer token to send.")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("out"),
+    show_default=True,
+    help="Folder for the results.",
+)
+@click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
+def certify(statement: Path | None, **options: Any) -> None:
+    """Judge a robot by its contract, requirement by requirement.
+
+    STATEMENT is the robot's implementation conformance statement (TOML); options win over it.
+    Without claimed classes (statement, --profile, --class), those are judged whose interfaces have an address.
+
+    Exit code: 0 conformant, 1 not conformant, 2 usage, 3 robot not reached, 4 inconclusive, 130 interrupted.
+    """
+    # A terminated run still stops the robot and writes what it has.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        declared = load_statement(statement) if statement and not options["init"] else Statement()
+        chosen = _apply(declared, options)
+        if options["init"]:
+            _init(statement, chosen, force=options["force"])
+            return
+        outcome = _certify(chosen, options)
+    except (StatementError, ContractError) as error:
+        raise click.UsageError(str(error)) from error
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    print_summary(outcome)
+    sys.exit(outcome.exit_code)
+
+
+def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
+    """Options win over the statement."""
+    given = {key: options[key] for key in _ENDPOINTS if options[key] is not None}
+    if options["timeout"] is not None:
+        given["timeout_s"] = options["timeout"]
+    where = replace(declared.endpoints, **given)
+    for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
+        url = getattr(where, key)
+        if url is not None and not url.startswith(("http://", "https://")):
+            raise StatementError(f"{key.replace('_', '-')} {url!r} is no URL: it has to start with http:// or https://")
+    if not (where.rest or where.publishers or where.subscribers):
+        raise StatementError("no robot is named: give a STATEMENT, --rest, --publishers-wsdl or --subscribers-wsdl")
+    claims = declared.claims
+    if options["profile"] or options["classes"]:
+        claims = (*PROFILES.get(options["profile"] or "", ()), *options["classes"])
+    ros = declared.ros
+    if options["ros_domain_id"] is not None:
+        ros = replace(ros, domain_id=options["ros_domain_id"])
+    return replace(declared, endpoints=where, claims=claims, ros=ros)
+
+
+def _init(path: Path | None, chosen: Statement, *, force: bool) -> None:
+    from conformance.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
+
+    if path is None:
+        raise click.UsageError("--init writes a statement: name the file, as in `roaas certify --init robot.toml`")
+    if path.exists() and not force:
+        raise click.UsageError(f"{path} exists already; --force overwrites it")
+    problem = write_first_statement(path, chosen)
+    if problem:
+        click.echo(f"the robot cannot be reached: {problem}", err=True)
+        sys.exit(UNREACHABLE)
+    click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
+
+
+def _certify(chosen: Statement, options: dict[str, Any]) -> Certification:
+    # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
+    from conformance.certification import certify as run  # noqa: PLC0415
+    from conformance.session import Session  # noqa: PLC0415
+    from conformance.standalone import connection_of  # noqa: PLC0415
+    from conformance.verdict.baseline import BaselineError, load_baseline  # noqa: PLC0415
+
+    contract = Contract.load(options["contract"])
+    try:
+        connection = connection_of(chosen.endpoints)
+        if chosen.endpoints.ca_file:
+            connection.tls()
+        baseline = load_baseline(options["baseline"], contract.ledger) if options["baseline"] else ()
+    except (OSError, BaselineError) as error:
+        raise StatementError(str(error)) from error
+    claims = tuple(name for name in chosen.claimed() if any(r.class_ == name for r in contract.ledger.values()))
+    session = Session(
+        statement=chosen,
+        contract=contract,
+        claims=claims,
+        allow_motion=options["allow_motion"],
+        seed=options["seed"],
+        effort=Effort(options["effort"], minutes=options["minutes"]),
+        connection=connection,
+    )
+    notes = _notes(session)
+    for note in notes:
+        click.echo(note, err=True)
+    command = shlex.join(["roaas", *sys.argv[1:]])
+    return run(session, options["out"], command=command, baseline=baseline, notes=notes)
+
+
+def _notes(session: Session) -> tuple[str, ...]:
+    notes = []
+    if session.statement.claims is None:
+        notes.append(f"No classes were claimed; judged are those that have an address: {', '.join(session.claims)}.")
+    if not session.allow_motion:
+        notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")
+    return tuple(notes)

@@ -1,0 +1,46 @@
+"""What ``roaas certify`` says at its end: classes, findings with a command to replay each, the verdict."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from conformance.verdict.exit_codes import UNREACHABLE
+
+if TYPE_CHECKING:
+    from conformance.certification import Certification
+
+_MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-claimed": "not claimed"}
+_SHOWN_CURL = 1000
+
+
+def print_summary(outcome: Certification) -> None:
+    """Print a certification to stdout; that the robot was not reached, to stderr."""
+    document = outcome.document
+    click.echo()
+    for name, value in document["classes"].items():
+        reason = document["class_reasons"].get(name, "")
+        click.echo(f"  {name:<20} {_MARKS[value]:<13}{reason[:300]}".rstrip())
+    for requirement in document["requirements"]:
+        if requirement["verdict"] in {"fail", "warn"}:
+            _print_finding(requirement)
+    counts = Counter(requirement["verdict"] for requirement in document["requirements"])
+    told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()))
+    click.echo(
+        f"\n{document['verdict']}: {told}; "
+        f"{document['requests']} requests in {document['duration_s']:.1f} s, seed {document['seed']}"
+    )
+    click.echo(f"result: {outcome.path}")
+    if outcome.exit_code == UNREACHABLE:
+        click.echo(f"error: {document['requirements'][0]['reason']}", err=True)
+
+
+def _print_finding(requirement: dict[str, Any]) -> None:
+    verdict, level = requirement["verdict"].upper(), requirement["level"]
+    click.echo(f"\n{verdict} {requirement['id']} ({level}, {requirement['source']})\n  {requirement['text']}")
+    for failure in requirement["failures"]:
+        click.echo(f"  expected: {failure['expected']}\n  found:    {failure['message']} (seen {failure['seen']}x)")
+        if failure["request"]:
+            click.echo(f"  replay:   {failure['request']['curl'][:_SHOWN_CURL]}")
