@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from reports.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Picture, drawing, gather
 
@@ -59,11 +59,23 @@ def ratios(
         axes.set_yticks(range(len(rows)), [row.label for row in rows])
         axes.set_ylim(len(rows) - 0.4, -0.6)
         axes.set_xscale("log")
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0), numticks=12))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
         low, high = axes.get_xlim()
-        axes.set_xlim(min(low, 0.9), max(high, 1.1))
+        low, high = min(low, 0.8), max(high, 1.25)
+        axes.set_xlim(low, high)
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_locator(FixedLocator(_ticks(low, high)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.grid(visible=False, axis="y")
         panel.legend()
         return gather(name, caption, [panel])
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """The finest of three scales of ticks that keeps them apart; 1 is in each."""
+    scales = (
+        (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5),
+        (0.25, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0),
+        (0.001, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, 1000.0),
+    )
+    scale = next((scale for scale in scales if scale[0] * 0.8 <= low and high <= scale[-1] * 1.2), scales[-1])
+    return [tick for tick in scale if low <= tick <= high]

@@ -1,0 +1,100 @@
+"""The commands `roaas report` and `roaas compare`."""
+
+from pathlib import Path
+from typing import NoReturn
+
+import click
+
+from reports.errors import ReportError, ResultUnreadableError
+from reports.pages import write_page
+from reports.reading import LATENCY_NAME, read_latency
+from reports.rendering import render
+from reports.untrusted import visible
+
+EXIT_OK = 0
+EXIT_SLOWER = 1
+EXIT_UNREADABLE = 2
+EXIT_INVALID = 4
+
+
+@click.command()
+@click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
+def report(directory: Path) -> None:
+    """Write the pages that belong to the result files in DIR again.
+
+    result.json gives certificate.html, certificate.md and junit.xml; latency.json gives latency.html and
+    latency.md. Exit code 2 where DIR holds no result file, or an unreadable one.
+    """
+    try:
+        written = render(directory)
+    except ReportError as error:
+        _refuse(error)
+    for path in written:
+        click.echo(path)
+
+
+@click.command()
+@click.argument("old", type=click.Path(path_type=Path))
+@click.argument("new", type=click.Path(path_type=Path))
+@click.option(
+    "--threshold",
+    type=click.FloatRange(min=0.0),
+    default=5.0,
+    show_default=True,
+    metavar="PERCENT",
+    help="How much a quantile has to change to count; a result's own noise floor counts where it is greater.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Write compare.html and compare.md there.",
+)
+def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
+    """Tell what changed from OLD to NEW, two results of `roaas load`: latency.json or the directory that holds it.
+
+    A change counts where its whole 95 % confidence interval lies beyond the threshold. Exit code 0: not
+    slower; 1: slower; 2: a result cannot be read, or the two cannot be compared; 4: one of them is not valid,
+    or nothing in them could be judged.
+    """
+    # They load matplotlib and numpy, which `roaas report` of a certificate does without.
+    from reports import comparison, comparison_pages  # noqa: PLC0415 - see above
+
+    names = _latency_file(old), _latency_file(new)
+    texts = str(names[0]), str(names[1])
+    try:
+        found = comparison.compare(read_latency(names[0]), read_latency(names[1]), texts, threshold / 100)
+        if out is not None:
+            pages = {
+                "compare.html": comparison_pages.comparison_html(found, texts),
+                "compare.md": comparison_pages.comparison_markdown(found, texts),
+            }
+            _write(out, pages)
+    except ReportError as error:
+        _refuse(error)
+    verdict = comparison_pages.verdict(found)
+    click.echo(comparison_pages.table(found))
+    for remark in found.remarks:
+        click.echo(f"\n{visible(remark)}", nl=False)
+    click.echo(f"\n{verdict.words}. {visible(verdict.sentence)}")
+    if not found.valid:
+        raise SystemExit(EXIT_INVALID)
+    raise SystemExit(EXIT_SLOWER if found.slower else EXIT_OK)
+
+
+def _latency_file(path: Path) -> Path:
+    return path / LATENCY_NAME if path.is_dir() else path
+
+
+def _write(directory: Path, pages: dict[str, str]) -> None:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for name, text in pages.items():
+            click.echo(write_page(directory / name, text), err=True)
+    except OSError as error:
+        raise ResultUnreadableError(f"{directory}: cannot write there: {error.strerror or error}") from error
+
+
+def _refuse(error: ReportError) -> NoReturn:
+    click.echo(f"Error: {error}", err=True)
+    raise SystemExit(EXIT_UNREADABLE)

@@ -1,0 +1,110 @@
+"""What `roaas compare` says: as a table for the terminal, as a page that draws both runs, and as Markdown."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from reports.comparison import Change, Comparison
+from reports.figures.canvas import COLOUR
+from reports.figures.change import change
+from reports.figures.ratios import Ratio, ratios
+from reports.findings import Verdict
+from reports.numbers import NONE, interval, ms, ratio, share
+from reports.pages import html_page, markdown_page
+
+QUANTILE_WORDS = {"p50": "50 %", "p99": "99 %"}
+_TONES = {"slower": "bad", "faster": "good", "same": "quiet", "unclear": "warning", "no figure": "quiet"}
+_SIGNS = {"slower": "✗", "faster": "✓", "same": "=", "unclear": "?", "no figure": NONE}
+_HEAD = ("series", "time", "at", "old ms", "new ms", "new/old", "95 % interval", "noise", "verdict")
+
+
+def verdict(comparison: Comparison) -> Verdict:
+    """The answer in a sentence, with the greatest change's interval."""
+    if not comparison.valid:
+        because = " ".join(comparison.remarks) or "No quantile has an interval in both results."
+        return Verdict("warning", "?", "Cannot be told", because)
+    slower, faster = comparison.with_verdict("slower"), comparison.with_verdict("faster")
+    counted = f"(Of {len(comparison.changes)} quantiles {len(slower)} got slower and {len(faster)} faster.)"
+    if slower:
+        return Verdict("bad", "✗", "It got slower", f"{sentence(slower[0])} {counted}")
+    if faster:
+        return Verdict("good", "✓", "It got faster", f"{sentence(faster[0])} {counted}")
+    unclear = comparison.with_verdict("unclear")
+    if unclear:
+        widest = sentence(max(unclear, key=_width))
+        return Verdict("quiet", "=", "No change can be shown", f"The least certain: {widest} Longer runs narrow it.")
+    return Verdict("quiet", "=", "No change", "Every quantile with an interval stayed within its noise threshold.")
+
+
+def sentence(of: Change) -> str:
+    """One change in words."""
+    return (
+        f"{of.series}: the {of.time} time at {QUANTILE_WORDS[of.quantile]} went from {ms(of.old_ms)} to "
+        f"{ms(of.new_ms)} ms, {ratio(of.ratio)} times (95 % interval {interval(of.interval, of_ratio=True)}, noise up to {share(of.threshold)})."
+    )
+
+
+def table(comparison: Comparison) -> str:
+    """All changes in aligned columns, for a terminal."""
+    rows = [_HEAD, *(_row(one) for one in comparison.changes)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD))]
+    # Words to the left, figures to the right.
+    lines = (
+        "  ".join(
+            cell.ljust(width) if column in {0, 1, 8} else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in rows
+    )
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def comparison_html(comparison: Comparison, names: tuple[str, str]) -> str:
+    """The page; `names` are the two files."""
+    pictures = {
+        "ratios": _ratios(comparison.changes),
+        "change": change(comparison.old_series, comparison.new_series),
+    }
+    return html_page("compare.html.j2", pictures=pictures, **_values(comparison, names))
+
+
+def comparison_markdown(comparison: Comparison, names: tuple[str, str]) -> str:
+    """The short form for a pull request; `names` are the two files."""
+    return markdown_page("compare.md.j2", **_values(comparison, names))
+
+
+def _values(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:
+    return {
+        "comparison": comparison,
+        "names": names,
+        "verdict": verdict(comparison),
+        "head": _HEAD,
+        "rows": [(one, _row(one)) for one in comparison.changes],
+        "tones": _TONES,
+        "signs": _SIGNS,
+    }
+
+
+def _row(one: Change) -> tuple[str, ...]:
+    return (
+        one.series, one.time, QUANTILE_WORDS[one.quantile], ms(one.old_ms), ms(one.new_ms), ratio(one.ratio),
+        interval(one.interval, of_ratio=True), share(one.threshold), one.verdict,
+    )  # fmt: skip
+
+
+def _ratios(changes: Sequence[Change]) -> Any:
+    rows = [
+        Ratio(f"{one.series}, {QUANTILE_WORDS[one.quantile]}", one.ratio, one.interval, COLOUR[one.interface])
+        for one in changes
+        if one.ratio is not None and one.time == "service"
+    ]
+    return ratios(
+        "ratios",
+        "new over old, service time",
+        rows,
+        "How many times as long requests take now, with 95 % intervals. Right of 1 they got slower. What lies within "
+        "the noise threshold of the table is no change.",
+    )
+
+
+def _width(one: Change) -> float:
+    return one.interval[1] / one.interval[0] if one.interval else 0.0
