@@ -1,0 +1,74 @@
+"""Pure pursuit: velocities that take a differential drive along a path and turn it to the final yaw."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from reference_robot.simulation.kinematics import within, wrap
+from reference_robot.simulation.office import Floats
+
+CRUISE: Final = 0.6  # m/s, below the base's limit
+_TURN: Final = 1.8  # rad/s
+_LOOKAHEAD: Final = 0.4  # m
+_POSITION_TOLERANCE: Final = 0.03  # m
+_YAW_TOLERANCE: Final = 0.02  # rad
+_DRIFT: Final = 0.1  # m off the goal at which a robot that turns on the spot goes back to driving
+_TURN_ON_SPOT: Final = 0.6  # rad off the course beyond which it stops to turn
+_SEARCH_AHEAD: Final = 8  # path poses in which the nearest one is sought
+
+
+@dataclass(frozen=True)
+class Command:
+    """A velocity (m/s, rad/s), the path length left (m), and whether the goal is reached."""
+
+    linear: float
+    angular: float
+    remaining: float
+    arrived: bool
+
+
+class Pursuit:
+    """Follows one path.
+
+    Args:
+        path: (k, 3) poses as the planner returns them.
+    """
+
+    def __init__(self, path: Floats) -> None:
+        self._path = path
+        pieces = np.hypot(*np.diff(path[:, :2], axis=0).T)
+        self._left = np.append(np.cumsum(pieces[::-1])[::-1], 0.0)
+        self._nearest = 0
+        self._turning = False
+
+    def command(self, x: float, y: float, yaw: float) -> Command:
+        """Return what to do at a pose of the robot."""
+        goal_x, goal_y, goal_yaw = self._path[-1]
+        off = math.dist((x, y), (goal_x, goal_y))
+        if off < _POSITION_TOLERANCE:
+            self._turning = True
+        elif off > _DRIFT:
+            self._turning = False
+        if self._turning:
+            error = wrap(goal_yaw - yaw)
+            arrived = abs(error) < _YAW_TOLERANCE
+            return Command(0.0, 0.0 if arrived else within(2.5 * error, _TURN), off, arrived)
+        target_x, target_y, remaining = self._target(x, y)
+        course = wrap(math.atan2(target_y - y, target_x - x) - yaw)
+        angular = within(3.0 * course, _TURN)
+        if abs(course) > _TURN_ON_SPOT:
+            return Command(0.0, angular, remaining, arrived=False)
+        # Slower towards the end, so that it stops there, and off the course, so that it cuts no corner.
+        linear = min(CRUISE, 1.5 * off + 0.02) * math.cos(course) ** 4
+        return Command(linear, angular, remaining, arrived=False)
+
+    def _target(self, x: float, y: float) -> tuple[float, float, float]:
+        """Return the path pose that lies a lookahead before the robot, and the length left."""
+        window = self._path[self._nearest : self._nearest + _SEARCH_AHEAD, :2]
+        distances = np.hypot(*(window - (x, y)).T)
+        self._nearest += int(distances.argmin())
+        ahead = self._left <= self._left[self._nearest] - _LOOKAHEAD
+        target = self._path[int(ahead.argmax()) if ahead.any() else -1]
+        return float(target[0]), float(target[1]), float(self._left[self._nearest] + distances.min())
