@@ -1,0 +1,61 @@
+"""The simulated robot as a process of its own: ``python -m reference_robot.simulation``.
+
+Prints ``ready`` on stdout when the robot is up. SIGINT and SIGTERM end it with exit code 0, and so does
+the end of its standard input where that is a pipe: a robot does not outlive the program that started it.
+"""
+
+import contextlib
+import os
+import signal
+import stat
+import sys
+import threading
+from pathlib import Path
+
+import click
+
+from reference_robot.names import NamesError, load_names
+from reference_robot.ros import RosRuntime
+from reference_robot.simulation.runner import Simulation
+
+
+@click.command()
+@click.option("--domain-id", type=click.IntRange(0, 101), help="ROS domain; ROS_DOMAIN_ID by default.")
+@click.option("--time-scale", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True)
+@click.option("--names", "names_file", type=click.Path(path_type=Path), help="Names of topics and actions.")
+def main(domain_id: int | None, time_scale: float, names_file: Path | None) -> None:
+    """Run the simulated robot until it is told to stop."""
+    # Seen on this machine only, unless the user wants it otherwise.
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    try:
+        names = load_names(names_file)
+    except NamesError as error:
+        raise click.UsageError(str(error)) from error
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda _number, _frame: stop.set())
+    if _stdin_is_pipe():
+        threading.Thread(target=_await_end_of_stdin, args=(stop,), daemon=True).start()
+    with RosRuntime(domain_id) as ros:
+        Simulation(ros, names, time_scale)
+        ros.start()
+        click.echo("ready")
+        stop.wait()
+
+
+def _stdin_is_pipe() -> bool:
+    try:
+        return stat.S_ISFIFO(os.fstat(sys.stdin.fileno()).st_mode)
+    except (AttributeError, OSError, ValueError):  # there is no standard input
+        return False
+
+
+def _await_end_of_stdin(stop: threading.Event) -> None:
+    with contextlib.suppress(OSError):
+        while os.read(0, 4096):
+            pass
+    stop.set()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+"""The paper's delivery application: a request on a topic makes the robot drive a mission.
+
+A mission goes source → destination → depot, each leg a NavigateToPose goal. It waits while navigation
+has somebody else's goal. A leg that is refused fails its mission, and the next one begins; a leg that is
+cancelled or displaced from outside fails its mission and drops the queue, because an operator who stops
+the robot wants it to stay stopped.
+"""
+
+import json
+import math
+import time
+from typing import Any, Final
+
+from action_msgs.msg import GoalStatus
+from mybot_delivery_app.msg import DeliveryRequestMsg
+from nav2_msgs.action import NavigateToPose
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Header, String
+
+from reference_robot.names import RosNames
+from reference_robot.simulation.messages import LATCHED, stamped_pose
+from reference_robot.simulation.missions import COFFEE, COURIER, DeliveryRequest, Missions, MissionState
+
+_REPORT_PERIOD_S: Final = 0.05  # at least this between two reports, however fast requests come
+_RETRY_PERIOD_S: Final = 0.2  # while navigation's action server is not there
+
+# Reliable, so that no request is lost in ordinary use. The short history is the bound under a flood:
+# the oldest unread request gives way, and a publisher never waits for us.
+_REQUESTS: Final = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+
+
+class Delivery:
+    """Runs missions.
+
+    Args:
+        node: The node to work through.
+        names: Topics, actions and frames.
+    """
+
+    def __init__(self, node: Node, names: RosNames) -> None:
+        self._node = node
+        self._frames = names.frames
+        self._missions = Missions()
+        self._legs: list[tuple[float, float, float]] = []
+        self._navigation_is_busy = False
+        self._reported_at = -math.inf
+        self._reports = node.create_publisher(String, names.topics.missions, LATCHED)
+        self._report_later = node.create_timer(_REPORT_PERIOD_S, self._report)
+        self._begin_later = node.create_timer(_RETRY_PERIOD_S, self._begin)
+        self._begin_later.cancel()
+        self._navigate = ActionClient(node, NavigateToPose, names.actions.navigate_to_pose)
+        node.create_subscription(String, names.topics.current_goal, self._note_current_goal, LATCHED)
+        node.create_subscription(DeliveryRequestMsg, names.topics.delivery, self._take, _REQUESTS)
+
+    def _take(self, message: DeliveryRequestMsg) -> None:
+        if message.message_code not in {COURIER, COFFEE}:
+            self._node.get_logger().info(
+                f"ignored a request with the unknown message code {message.message_code}",
+                throttle_duration_sec=1.0,
+            )
+            return
+        request = DeliveryRequest(
+            message.message_code,
+            message.depot_x,
+            message.depot_y,
+            message.destination_x,
+            message.destination_y,
+            message.source_x,
+            message.source_y,
+        )
+        mission = self._missions.add(request, divmod(time.time_ns(), 1_000_000_000))
+        if mission.state is MissionState.QUEUED:
+            self._begin()
+        self._changed()
+
+    def _note_current_goal(self, message: String) -> None:
+        self._navigation_is_busy = bool(message.data)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin the next mission, if there is one and navigation is free for it."""
+        self._begin_later.cancel()
+        if self._navigation_is_busy:
+            return
+        if not self._navigate.server_is_ready():
+            self._begin_later.reset()
+            return
+        mission = self._missions.begin()
+        if mission is None:
+            return
+        x, y = mission.request.stops()[-1]
+        self._legs = []
+        for stop_x, stop_y in mission.request.stops():
+            self._legs.append((stop_x, stop_y, math.atan2(stop_y - y, stop_x - x)))
+            x, y = stop_x, stop_y
+        self._changed()
+        self._next_leg()
+
+    def _next_leg(self) -> None:
+        if not self._legs:
+            self._finish(MissionState.DONE)
+            return
+        header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frames.map)
+        goal = NavigateToPose.Goal(pose=stamped_pose(self._legs.pop(0), header))
+        self._navigate.send_goal_async(goal).add_done_callback(self._leg_answered)
+
+    def _leg_answered(self, answer: Any) -> None:
+        handle = answer.result()
+        if handle.accepted:
+            handle.get_result_async().add_done_callback(self._leg_ended)
+        else:
+            self._finish(MissionState.FAILED)
+
+    def _leg_ended(self, answer: Any) -> None:
+        if answer.result().status == GoalStatus.STATUS_SUCCEEDED:
+            self._next_leg()
+            return
+        self._missions.abandon()
+        self._changed()
+
+    def _finish(self, state: MissionState) -> None:
+        self._missions.finish(state)
+        self._changed()
+        self._begin()
+
+    def _changed(self) -> None:
+        """Report the missions: at once, or when the last report is old enough."""
+        if time.monotonic() - self._reported_at >= _REPORT_PERIOD_S:
+            self._report()
+        else:
+            self._report_later.reset()
+
+    def _report(self) -> None:
+        self._report_later.cancel()
+        self._reported_at = time.monotonic()
+        self._reports.publish(String(data=json.dumps([mission.plain() for mission in self._missions])))

@@ -1,0 +1,180 @@
+"""Navigation: Nav2's NavigateToPose action, driven through cmd_vel.
+
+Goals are refused with a reason when no path leads there. Of two goals the newer one drives, and the
+displaced one ends ABORTED, as Nav2 has it. Two latched topics tell the rest of the robot what an action
+client cannot see: the active goal, whoever sent it, and why the last refused one was refused.
+"""
+
+import json
+import time
+from dataclasses import dataclass
+from typing import Any, Final
+
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import Twist, TwistStamped
+from nav2_msgs.action import NavigateToPose
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import Header, String
+
+from reference_robot.names import RosNames
+from reference_robot.simulation.localisation import Localisation
+from reference_robot.simulation.messages import LATCHED, PoseError, plain, pose_of, stamped_pose
+from reference_robot.simulation.planner import PlanError, Planner, Pose
+from reference_robot.simulation.pursuit import CRUISE, Command, Pursuit
+
+_FEEDBACK_PERIOD_S: Final = 0.2
+_PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time; then the goal is aborted
+_PROGRESS_M: Final = 0.05
+
+
+@dataclass
+class _Drive:
+    """A goal on its way: its handle, its path, and what progress it makes."""
+
+    handle: Any
+    pursuit: Pursuit
+    ended: Future
+    began: float
+    nearest: float = float("inf")
+    progressed: float = 0.0
+    reported: float = 0.0
+    canceling: bool = False
+
+
+class Navigation:
+    """Serves NavigateToPose.
+
+    Args:
+        node: The node to work through.
+        names: Topics, actions and frames.
+        planner: Plans in the office.
+        localisation: Where the robot is; each update is one step of control.
+        time_scale: How many times faster than real time the robot moves.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        names: RosNames,
+        planner: Planner,
+        localisation: Localisation,
+        time_scale: float = 1.0,
+    ) -> None:
+        self._node = node
+        self._names = names
+        self._planner = planner
+        self._localisation = localisation
+        self._time_scale = time_scale
+        self._drive: _Drive | None = None
+        self._path: Any = None  # of the goal that was accepted last and has not begun
+        self._stamped = names.velocity.message == "TwistStamped"
+        velocity = TwistStamped if self._stamped else Twist
+        self._velocities = node.create_publisher(velocity, names.topics.cmd_vel, 1)
+        self._current_goals = node.create_publisher(String, names.topics.current_goal, LATCHED)
+        self._rejections = node.create_publisher(String, names.topics.last_rejection, LATCHED)
+        self._tell_current_goal()
+        localisation.on_update = self._step
+        self._action = ActionServer(
+            node,
+            NavigateToPose,
+            names.actions.navigate_to_pose,
+            self._execute,
+            goal_callback=self._judge,
+            handle_accepted_callback=self._begin,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    def _judge(self, goal: NavigateToPose.Goal) -> GoalResponse:
+        try:
+            target = pose_of(goal.pose, self._names.frames)
+            self._path = self._planner.plan(self._localisation.pose(), target)
+        except (PlanError, PoseError) as error:
+            self._node.get_logger().info(f"refused a goal: {error}")
+            # Told before the refusal goes out, so that whoever is refused can look up why.
+            told = {"pose": plain(goal.pose), "reason": str(error)}
+            self._rejections.publish(String(data=json.dumps(told)))
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    def _begin(self, handle: Any) -> None:
+        displaced, path = self._drive, self._path
+        self._drive = _Drive(handle, Pursuit(path), Future(), began=time.monotonic())
+        self._drive.progressed = self._drive.began
+        if displaced is not None:
+            displaced.handle.abort()
+            displaced.ended.set_result(NavigateToPose.Result(error_msg="preempted by a newer goal"))
+        handle.execute()
+        self._tell_current_goal()
+
+    async def _execute(self, handle: Any) -> NavigateToPose.Result:
+        """Wait for the end of a goal, which _step or a newer goal brings about."""
+        drive = self._drive
+        if drive is None or drive.handle is not handle:
+            # Displaced before this task came to run; its state is already final.
+            return NavigateToPose.Result(error_msg="preempted by a newer goal")
+        return await drive.ended
+
+    def _step(self, pose: Pose) -> None:
+        """Control once; runs after each odometry message."""
+        drive = self._drive
+        if drive is None:
+            return
+        if drive.handle.is_cancel_requested:
+            if not drive.canceling:
+                drive.canceling = True
+                self._tell_current_goal()
+            self._end(drive.handle.canceled, "")
+            return
+        command = drive.pursuit.command(*pose)
+        if command.arrived:
+            self._end(drive.handle.succeed, "")
+            return
+        now = time.monotonic()
+        if command.remaining < drive.nearest - _PROGRESS_M:
+            drive.nearest, drive.progressed = command.remaining, now
+        if (now - drive.progressed) * self._time_scale > _PATIENCE_S:
+            self._end(drive.handle.abort, f"no progress in {_PATIENCE_S:g} s")
+            return
+        self._command(command.linear, command.angular)
+        if now - drive.reported >= _FEEDBACK_PERIOD_S:
+            drive.reported = now
+            self._tell_progress(drive, pose, command, now)
+
+    def _end(self, transition: Any, message: str) -> None:
+        drive, self._drive = self._drive, None
+        self._command(0.0, 0.0)
+        transition()
+        if drive is not None:
+            drive.ended.set_result(NavigateToPose.Result(error_msg=message))
+        self._tell_current_goal()
+
+    def _command(self, linear: float, angular: float) -> None:
+        twist = Twist()
+        twist.linear.x, twist.angular.z = linear, angular
+        if self._stamped:
+            self._velocities.publish(TwistStamped(header=self._header(self._names.frames.base), twist=twist))
+        else:
+            self._velocities.publish(twist)
+
+    def _tell_progress(self, drive: _Drive, pose: Pose, command: Command, now: float) -> None:
+        feedback = NavigateToPose.Feedback(
+            current_pose=stamped_pose(pose, self._header(self._names.frames.map)),
+            navigation_time=Duration(seconds=now - drive.began).to_msg(),
+            estimated_time_remaining=Duration(seconds=command.remaining / (CRUISE * self._time_scale)).to_msg(),
+            distance_remaining=command.remaining,
+        )
+        drive.handle.publish_feedback(feedback)
+
+    def _tell_current_goal(self) -> None:
+        drive, text = self._drive, ""
+        if drive is not None:
+            status = GoalStatus.STATUS_CANCELING if drive.canceling else GoalStatus.STATUS_EXECUTING
+            goal_id = bytes(drive.handle.goal_id.uuid).hex()
+            text = json.dumps({"goal_id": goal_id, "status": status, "pose": plain(drive.handle.request.pose)})
+        self._current_goals.publish(String(data=text))
+
+    def _header(self, frame_id: str) -> Header:
+        return Header(stamp=self._node.get_clock().now().to_msg(), frame_id=frame_id)

@@ -1,0 +1,93 @@
+"""Plans on request: the nav_msgs/GetPlan service of the paper and Nav2's ComputePathToPose action."""
+
+import time
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from nav2_msgs.action import ComputePathToPose
+from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.duration import Duration
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from reference_robot.names import RosNames
+from reference_robot.simulation.localisation import Localisation
+from reference_robot.simulation.messages import PoseError, path_message, pose_of
+from reference_robot.simulation.planner import PlanError, Planner, Pose
+
+
+class Planning:
+    """Answers requests for plans without driving.
+
+    Args:
+        node: The node to work through.
+        names: Services, actions and frames.
+        planner: Plans in the office.
+        localisation: Where a plan starts that names no start.
+    """
+
+    def __init__(self, node: Node, names: RosNames, planner: Planner, localisation: Localisation) -> None:
+        self._node = node
+        self._frames = names.frames
+        self._planner = planner
+        self._localisation = localisation
+        node.create_service(GetPlan, names.services.get_plan, self._get_plan)
+        self._action = ActionServer(
+            node,
+            ComputePathToPose,
+            names.actions.compute_path_to_pose,
+            self._compute_path,
+            cancel_callback=lambda _: CancelResponse.REJECT,  # a plan takes a millisecond
+        )
+
+    def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
+        """Answer with a path, or with an empty one where there is none.
+
+        A start without a frame_id means the robot's own pose; the plan is in the goal's frame.
+        """
+        try:
+            start = self._start(request.start if request.start.header.frame_id else None)
+            response.plan = self._plan(start, request.goal, request.tolerance)
+        except (PlanError, PoseError) as error:
+            self._node.get_logger().info(f"no plan: {error}")
+            response.plan = Path(header=self._header(request.goal.header.frame_id))
+        return response
+
+    def _compute_path(self, handle: Any) -> ComputePathToPose.Result:
+        asked = time.monotonic()
+        request, result = handle.request, ComputePathToPose.Result()
+        try:
+            start = self._start(request.start if request.use_start else None)
+            result.path = self._plan(start, request.goal, 0.0)
+        except PlanError as error:
+            result.error_code, result.error_msg = int(error.failure), str(error)
+        except PoseError as error:
+            result.error_code, result.error_msg = ComputePathToPose.Result.TF_ERROR, str(error)
+        result.planning_time = Duration(seconds=time.monotonic() - asked).to_msg()
+        if result.error_code == ComputePathToPose.Result.NONE:
+            handle.succeed()
+        else:
+            handle.abort()
+        return result
+
+    def _start(self, stamped: PoseStamped | None) -> Pose:
+        if stamped is not None:
+            return pose_of(stamped, self._frames)
+        return self._localisation.pose()
+
+    def _plan(self, start: Pose, goal: PoseStamped, tolerance: float) -> Path:
+        poses = self._planner.plan(start, pose_of(goal, self._frames), tolerance)
+        path = path_message(poses, self._header(goal.header.frame_id))
+        if not tolerance or _same_point(path.poses[-1], goal):
+            path.poses[-1].pose = goal.pose  # to the last bit, which a yaw there and back is not
+        return path
+
+    def _header(self, frame_id: str) -> Header:
+        return Header(stamp=self._node.get_clock().now().to_msg(), frame_id=frame_id or self._frames.map)
+
+
+def _same_point(one: PoseStamped, other: PoseStamped) -> bool:
+    mine, theirs = one.pose.position, other.pose.position
+    return bool(mine.x == theirs.x and mine.y == theirs.y)

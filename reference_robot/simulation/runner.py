@@ -1,0 +1,38 @@
+"""Puts the simulated robot together: one runtime, its nodes, and their order of construction."""
+
+from reference_robot.names import RosNames
+from reference_robot.ros import RosRuntime
+from reference_robot.simulation.base import Base
+from reference_robot.simulation.delivery import Delivery
+from reference_robot.simulation.localisation import Localisation
+from reference_robot.simulation.navigation import Navigation
+from reference_robot.simulation.office import OFFICE
+from reference_robot.simulation.planner import Planner
+from reference_robot.simulation.planning import Planning
+from reference_robot.simulation.sensors import Sensors
+
+
+class Simulation:
+    """The robot's nodes ``base``, ``navigation`` and ``delivery`` on a runtime.
+
+    Args:
+        ros: The runtime that spins and destroys the nodes; starting it is the caller's affair.
+        names: Topics, services, actions and frames.
+        time_scale: How many times faster than real time the robot moves; ROS time stays wall time.
+
+    Raises:
+        ValueError: The time scale is not positive.
+    """
+
+    def __init__(self, ros: RosRuntime, names: RosNames, time_scale: float = 1.0) -> None:
+        if not time_scale > 0:
+            raise ValueError(f"the time scale must be positive, not {time_scale}")
+        base_node = ros.create_node("base")
+        self.base = Base(base_node, names, time_scale)
+        self.sensors = Sensors(base_node, names, lambda: self.base.motion)
+        navigation_node = ros.create_node("navigation")
+        planner = Planner(OFFICE)
+        localisation = Localisation(navigation_node, names)
+        self.planning = Planning(navigation_node, names, planner, localisation)
+        self.navigation = Navigation(navigation_node, names, planner, localisation, time_scale)
+        self.delivery = Delivery(ros.create_node("delivery"), names)
