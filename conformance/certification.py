@@ -182,6 +182,10 @@ def _run_checks(session: Session, progress: TextIO | None, remarks: list[str]) -
             ],
             plugins=[_Named(holder)],
         )
+    except Exception as error:  # noqa: BLE001 - whatever breaks, what was judged until then is not lost
+        remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
+        session.lost = session.lost or "the suite itself failed"
+        return False
     finally:
         if before is None:
             del os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"]

@@ -245,7 +245,7 @@ def _no_answer(error: Exception, deadline: float) -> NoAnswerError:
     if isinstance(error, httpcore.TimeoutException):
         return NoAnswerError(Exchange(nothing, None, f"no answer within {deadline:g} s"), "timeout")
     if isinstance(error, httpcore.RemoteProtocolError):
-        if "disconnected" in text or "without sending" in text:
+        if "disconnected" in text:
             return NoAnswerError(Exchange(nothing, None, "connection closed without an answer"), "closed")
         return NoAnswerError(Exchange(nothing, None, f"the answer is no HTTP: {text}"), "garbage")
     if isinstance(error, httpcore.ConnectError):

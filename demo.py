@@ -1,0 +1,114 @@
+"""``make demo``: the whole job on this machine. A robot, its certification, a load test, and the reports."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import re
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_START_S = 60
+_STOP_S = 10
+_STATEMENT = Path(__file__).parent / "reference_robot" / "statement.toml"
+
+
+def main() -> int:
+    """Run the demo; the exit code is the certification's, or the load test's where the robot conforms."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for results and reports [out]")
+    parser.add_argument("--duration", type=float, default=20.0, help="seconds of load for each step [20]")
+    options = parser.parse_args()
+    started = time.monotonic()
+    # A domain of its own, so that no other robot on this machine is in the conversation.
+    domain = random.SystemRandom().randint(1, 101)
+    _say("1/3", f"starting the reference robot on ROS domain {domain}")
+    with _robot(domain) as (rest, soap):
+        endpoints = [str(_STATEMENT), "--rest", rest, "--publishers-wsdl", soap]
+        endpoints += ["--subscribers-wsdl", soap.replace("publisher", "subscriber")]
+        common = [*endpoints, "--allow-motion", "--out", str(options.out)]
+        _say("2/3", f"certifying it: REST {rest}, SOAP {soap}")
+        certified = _roaas("certify", *common, "--profile", "full", "--ros-domain-id", str(domain))
+        _say("3/3", "measuring SOAP against REST")
+        loaded = _roaas("load", *common, "--operation", "delivery", "--duration", f"{options.duration:g}")
+    _summary(options.out, time.monotonic() - started)
+    return certified or loaded
+
+
+@contextmanager
+def _robot(domain: int) -> Iterator[tuple[str, str]]:
+    """The reference robot on free ports; yields its REST base URL and its publishers' WSDL."""
+    command = [
+        sys.executable,
+        "-m",
+        "roaas",
+        "robot",
+        "--rest-port",
+        "0",
+        "--soap-port",
+        "0",
+        "--domain-id",
+        str(domain),
+    ]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - ours
+    # A robot that never gets ready must not keep the demo waiting.
+    watchdog = threading.Timer(_START_S, process.kill)
+    watchdog.start()
+    try:
+        line = process.stdout.readline() if process.stdout else ""
+        ready = re.match(r"ready rest=(\S+) soap=(\S+)", line)
+        if ready is None:
+            raise SystemExit(f"the robot did not get ready within {_START_S} s (it said {line!r})")
+        watchdog.cancel()
+        yield ready[1], ready[2]
+    finally:
+        watchdog.cancel()
+        process.terminate()
+        try:
+            process.wait(_STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _roaas(*arguments: str) -> int:
+    command = [sys.executable, "-m", "roaas", *arguments]
+    # The robot's libraries set up their own environment; each command is to start from a clean one.
+    environment = {key: value for key, value in os.environ.items() if key != "ROS_DOMAIN_ID"}
+    return subprocess.run(command, env=environment, check=False).returncode  # noqa: S603 - our own command
+
+
+def _say(step: str, text: str) -> None:
+    print(f"\n== {step} {text}", flush=True)  # noqa: T201 - a demo talks
+
+
+def _summary(out: Path, seconds: float) -> None:
+    result, latency = (_read(out / name) for name in ("result.json", "latency.json"))
+    lines = [f"== done in {seconds:.0f} s"]
+    if result:
+        passed = sum(value == "pass" for value in result["classes"].values())
+        lines.append(f"verdict: {result['verdict']} ({passed} of {len(result['classes'])} classes passed)")
+    for series in latency.get("series", []):
+        name = f"{series['operation']} over {series['interface'].upper()} ({series['client']} client)"
+        lines.append(f"median:  {name}: {series['service_ms']['p50']:.3f} ms")
+    lines += [f"report:  {path}" for path in (out / "certificate.html", out / "latency.html") if path.exists()]
+    print("\n" + "\n".join(lines))  # noqa: T201 - a demo talks
+
+
+def _read(path: Path) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    return document
+
+
+if __name__ == "__main__":
+    sys.exit(main())
