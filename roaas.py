@@ -23,6 +23,16 @@ _COMMANDS = {
     "selftest": ("conformance.cli.selftest", "selftest"),
     "contract": ("conformance.cli.contract", "contract"),
 }
+# What `roaas --help` says of them, so that it need not import every room.
+_SUMMARIES = {
+    "robot": "Run the reference robot.",
+    "certify": "Judge a robot by its contract.",
+    "load": "Measure SOAP against REST.",
+    "report": "Write the pages from the result files again.",
+    "compare": "Say whether a robot got slower between two load tests.",
+    "selftest": "Show that the suite catches faulty robots and blames no good one.",
+    "contract": "Show the requirements, export the contract's files.",
+}
 _EXTRAS = {"robot": "robot", "load": "load"}
 # Commands that leave a result file in --out, and that file: the reports room turns it into what people read.
 _RESULTS = {"certify": "result.json", "load": "latency.json"}
@@ -34,6 +44,10 @@ class _Rooms(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         return list(_COMMANDS)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's
+        with formatter.section("Commands"):
+            formatter.write_dl(list(_SUMMARIES.items()))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
