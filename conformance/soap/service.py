@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ipaddress
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from conformance.soap.description import Description, DescriptionError, describe, faults, read_file
 from conformance.soap.envelope import NotXmlError, parse
 from conformance.soap.names import WSDL_SOAP, clark
 from conformance.statement import StatementError
@@ -48,6 +51,7 @@ class SoapService:
     wsdl_exchange: Exchange | None = None
     contract_wsdl_path: Path | None = None
     address: str | None = None
+    _own_read: tuple[Description | None, str] | None = field(default=None, init=False, repr=False)
 
     @property
     def endpoint(self) -> str:
@@ -90,7 +94,67 @@ class SoapService:
         A client no longer asks an endpoint that let deadlines pass. Messages on which a robot may wait for more are
         sent apart, so that they do not silence the rest.
         """
-        return replace(self, client=HttpClient(self.client.base_url, self.client.connection))
+        twin = copy(self)
+        twin.client = HttpClient(self.client.base_url, self.client.connection)
+        return twin
+
+    @cached_property
+    def contract(self) -> Description:
+        """What the contract says of the service.
+
+        Raises:
+            DescriptionError: the contract's files cannot be used, or it has no such service.
+        """
+        if self.contract_wsdl_path is None:
+            raise DescriptionError(f"the contract has no {self.name} service")
+        return read_file(self.contract_wsdl_path)
+
+    @cached_property
+    def own(self) -> Description | None:
+        """What the robot says of the service; None where it says nothing that could be read (see own_problem)."""
+        return self._read_own()[0]
+
+    @property
+    def own_problem(self) -> str:
+        """Why there is no description of the robot's own; empty where there is one."""
+        return self._read_own()[1]
+
+    @cached_property
+    def described(self) -> Description:
+        """What a client would go by: the robot's own description where it can be used, else the contract's."""
+        return self.own if self.own is not None and not next(faults(self.own), "") else self.contract
+
+    def _read_own(self) -> tuple[Description | None, str]:
+        if self._own_read is None:
+            self._own_read = self._interpreted()
+        return self._own_read
+
+    def _interpreted(self) -> tuple[Description | None, str]:
+        if self.wsdl is None or self.wsdl_source is None:
+            return None, self.wsdl_problem
+        try:
+            return describe(self.wsdl, self.wsdl_source, self.fetch), ""
+        except DescriptionError as error:
+            return None, str(error)
+
+    def fetch(self, location: str) -> bytes:
+        """A document that the WSDL refers to: beside it when it is a file, else from the robot and no other host.
+
+        Raises:
+            OSError: it cannot be had.
+        """
+        if "://" not in location:
+            return Path(location).read_bytes()
+        source = self.wsdl_source if self.wsdl_source and "://" in self.wsdl_source else self.endpoint
+        # A robot behind a proxy or another name writes locations with its own: the same path is asked for here.
+        base, path = _split(source)[0], _split(location)[1]
+        try:
+            exchange = HttpClient(base, self.client.connection).send("GET", path)
+        except NoAnswerError as none:
+            raise OSError(str(none)) from none
+        if exchange.response is None or exchange.response.status != 200:  # noqa: PLR2004 - RFC 9110 15.3.1
+            raise OSError(f"GET {path} is answered with {exchange.came}")
+        return exchange.response.body
 
 
 def open_service(
