@@ -46,6 +46,7 @@ class Delivery:
         self._legs: list[tuple[float, float, float]] = []
         self._navigation_is_busy = False
         self._reported_at = -math.inf
+        self._report_is_due = False
         self._reports = node.create_publisher(String, names.topics.missions, LATCHED)
         self._report_later = node.create_timer(_REPORT_PERIOD_S, self._report)
         self._begin_later = node.create_timer(_RETRY_PERIOD_S, self._begin)
@@ -129,10 +130,12 @@ class Delivery:
         """Report the missions: at once, or when the last report is old enough."""
         if time.monotonic() - self._reported_at >= _REPORT_PERIOD_S:
             self._report()
-        else:
+        elif not self._report_is_due:
+            self._report_is_due = True
             self._report_later.reset()
 
     def _report(self) -> None:
         self._report_later.cancel()
+        self._report_is_due = False
         self._reported_at = time.monotonic()
         self._reports.publish(String(data=json.dumps([mission.plain() for mission in self._missions])))

@@ -7,6 +7,7 @@ client cannot see: the active goal, whoever sent it, and why the last refused on
 
 import json
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,7 +17,6 @@ from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.task import Future
 from std_msgs.msg import Header, String
 
 from reference_robot.names import RosNames
@@ -30,13 +30,27 @@ _PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time; t
 _PROGRESS_M: Final = 0.05
 
 
+class _DeferringActionServer(ActionServer):
+    """An action server whose goals are executing without a task of their own until they end.
+
+    rclpy resumes a task that awaits something again and again until it is done, which takes a whole
+    core; so a goal gets its task only when its result is there.
+    """
+
+    def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
+        """Note that a goal is executing, and nothing more."""
+
+    def finish(self, goal_handle: Any, result: Any) -> None:
+        """Hand out the result of a goal that is in a final state."""
+        super().notify_execute(goal_handle, lambda _: result)
+
+
 @dataclass
 class _Drive:
     """A goal on its way: its handle, its path, and what progress it makes."""
 
     handle: Any
     pursuit: Pursuit
-    ended: Future
     began: float
     nearest: float = float("inf")
     progressed: float = 0.0
@@ -77,11 +91,11 @@ class Navigation:
         self._rejections = node.create_publisher(String, names.topics.last_rejection, LATCHED)
         self._tell_current_goal()
         localisation.on_update = self._step
-        self._action = ActionServer(
+        self._action = _DeferringActionServer(
             node,
             NavigateToPose,
             names.actions.navigate_to_pose,
-            self._execute,
+            lambda _: NavigateToPose.Result(),
             goal_callback=self._judge,
             handle_accepted_callback=self._begin,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
@@ -101,21 +115,13 @@ class Navigation:
 
     def _begin(self, handle: Any) -> None:
         displaced, path = self._drive, self._path
-        self._drive = _Drive(handle, Pursuit(path), Future(), began=time.monotonic())
+        self._drive = _Drive(handle, Pursuit(path), began=time.monotonic())
         self._drive.progressed = self._drive.began
         if displaced is not None:
             displaced.handle.abort()
-            displaced.ended.set_result(NavigateToPose.Result(error_msg="preempted by a newer goal"))
+            self._action.finish(displaced.handle, NavigateToPose.Result(error_msg="preempted by a newer goal"))
         handle.execute()
         self._tell_current_goal()
-
-    async def _execute(self, handle: Any) -> NavigateToPose.Result:
-        """Wait for the end of a goal, which _step or a newer goal brings about."""
-        drive = self._drive
-        if drive is None or drive.handle is not handle:
-            # Displaced before this task came to run; its state is already final.
-            return NavigateToPose.Result(error_msg="preempted by a newer goal")
-        return await drive.ended
 
     def _step(self, pose: Pose) -> None:
         """Control once; runs after each odometry message."""
@@ -126,29 +132,28 @@ class Navigation:
             if not drive.canceling:
                 drive.canceling = True
                 self._tell_current_goal()
-            self._end(drive.handle.canceled, "")
+            self._end(drive, drive.handle.canceled)
             return
         command = drive.pursuit.command(*pose)
         if command.arrived:
-            self._end(drive.handle.succeed, "")
+            self._end(drive, drive.handle.succeed)
             return
         now = time.monotonic()
         if command.remaining < drive.nearest - _PROGRESS_M:
             drive.nearest, drive.progressed = command.remaining, now
         if (now - drive.progressed) * self._time_scale > _PATIENCE_S:
-            self._end(drive.handle.abort, f"no progress in {_PATIENCE_S:g} s")
+            self._end(drive, drive.handle.abort, f"no progress in {_PATIENCE_S:g} s")
             return
         self._command(command.linear, command.angular)
         if now - drive.reported >= _FEEDBACK_PERIOD_S:
             drive.reported = now
             self._tell_progress(drive, pose, command, now)
 
-    def _end(self, transition: Any, message: str) -> None:
-        drive, self._drive = self._drive, None
+    def _end(self, drive: _Drive, transition: Callable[[], None], message: str = "") -> None:
+        self._drive = None
         self._command(0.0, 0.0)
         transition()
-        if drive is not None:
-            drive.ended.set_result(NavigateToPose.Result(error_msg=message))
+        self._action.finish(drive.handle, NavigateToPose.Result(error_msg=message))
         self._tell_current_goal()
 
     def _command(self, linear: float, angular: float) -> None:
