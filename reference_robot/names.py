@@ -11,6 +11,7 @@ from typing import Any, Final, TypeVar
 
 DEFAULT_NAMES_FILE: Final = Path(__file__).with_name("names.toml")
 VELOCITY_MESSAGES: Final = ("auto", "Twist", "TwistStamped")
+_READ_ELSEWHERE: Final = frozenset({"web"})  # the web services' own table, which they read and check
 
 
 class NamesError(ValueError):
@@ -94,7 +95,7 @@ def load_names(path: Path | None = None) -> RosNames:
     except tomllib.TOMLDecodeError as error:
         raise NamesError(f"{source} is no TOML: {error}") from error
     known = [field.name for field in fields(RosNames)]
-    unknown = sorted(set(document) - set(known))
+    unknown = sorted(set(document) - set(known) - _READ_ELSEWHERE)
     if unknown:
         raise NamesError(f"{source}: unknown table or key {unknown[0]}; known are {', '.join(known)}")
     return RosNames(

@@ -40,7 +40,7 @@ class SimulatedRobot:
             "reference_robot.simulation",
             f"--domain-id={domain_id}",
             f"--time-scale={time_scale}",
-            *([f"--config={config}"] if config else []),
+            *([f"--names={config}"] if config else []),
         ]
         self._ending = threading.Event()
 
