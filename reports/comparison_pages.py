@@ -39,7 +39,8 @@ def sentence(of: Change) -> str:
     """One change in words."""
     return (
         f"{of.series}: the {of.time} time at {QUANTILE_WORDS[of.quantile]} went from {ms(of.old_ms)} to "
-        f"{ms(of.new_ms)} ms, {ratio(of.ratio)} times (95 % interval {interval(of.interval, of_ratio=True)}, noise up to {share(of.threshold)})."
+        f"{ms(of.new_ms)} ms, {ratio(of.ratio)} times (95 % interval {interval(of.interval, of_ratio=True)}, "
+        f"noise up to {share(of.threshold)})."
     )
 
 

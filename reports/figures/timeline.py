@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from reports.figures.canvas import COLOUR, INK, MARK, Panel, Picture, drawing, gather, log_time_axis
 
-_MOST_POINTS = 400
+_MOST_POINTS = 240
 _STALL_FACTOR = 20
 _STALL_FLOOR_MS = 20.0
 _STALL_COLOUR = "#F0E442"

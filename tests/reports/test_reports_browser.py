@@ -1,0 +1,134 @@
+"""The pages in a browser: everything is drawn, nothing is loaded, nothing hangs over the edge.
+
+Debian's Chromium shows the pages, as they are, in frames of a wrapper page, whose script measures them.
+"""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from reports.certificate import certificate_html
+from reports.comparison import compare
+from reports.comparison_pages import comparison_html
+from reports.latency import latency_html
+
+DATA = Path(__file__).parent / "data"
+WIDTHS = (1280, 390)
+PAGES = ("certificate", "latency", "compare")
+MEASURE = """<!doctype html><meta charset="utf-8"><title>wrapper</title><body><pre id="out"></pre><script>
+"use strict";
+const found = {};
+for (const frame of FRAMES) {
+  const element = document.createElement("iframe");
+  element.style = `border: 0; height: 900px; width: ${frame.width}px`;
+  element.src = frame.url;
+  element.addEventListener("load", () => {
+    const page = element.contentDocument, view = element.contentWindow;
+    const box = (node) => { const b = node.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; };
+    found[`${frame.name} ${frame.width}`] = {
+      width: page.documentElement.scrollWidth,
+      text: page.body.innerText.length,
+      verdict: box(page.querySelector("#verdict")),
+      drawings: Array.from(page.querySelectorAll("figure svg"), (svg) => ({
+        name: svg.id, box: box(svg),
+        marks: svg.querySelectorAll("path, use").length,
+        words: Array.from(svg.querySelectorAll("text"), (node) => box(node)),
+        within: Array.from(svg.querySelectorAll("text"), (node) => {
+          const inner = node.getBoundingClientRect(), outer = svg.getBoundingClientRect();
+          return inner.left >= outer.left - 2 && inner.right <= outer.right + 2 && inner.bottom <= outer.bottom + 2;
+        }),
+      })),
+      figures: page.querySelectorAll("figure").length,
+      buttons: page.querySelectorAll("button").length,
+      loaded: view.performance.getEntriesByType("resource").map((entry) => entry.name),
+    };
+    if (Object.keys(found).length === FRAMES.length) document.getElementById("out").textContent = JSON.stringify(found);
+  });
+  document.body.append(element);
+}
+</script>"""
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    """Show every page at every width, once, and return what was measured."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.fail("this test needs a browser: install Debian's package `chromium` (apt-get install chromium)")
+    folder = tmp_path_factory.mktemp("pages")
+    result = json.loads((DATA / "result-example.json").read_text(encoding="utf-8"))
+    latency = json.loads((DATA / "latency-example.json").read_text(encoding="utf-8"))
+    (folder / "certificate.html").write_text(certificate_html(result), encoding="utf-8")
+    (folder / "latency.html").write_text(latency_html(latency), encoding="utf-8")
+    both = compare(latency, latency, ("old", "new"), 0.05)
+    (folder / "compare.html").write_text(comparison_html(both, ("old", "new")), encoding="utf-8")
+    frames = [
+        {"name": name, "width": width, "url": (folder / f"{name}.html").as_uri()} for name in PAGES for width in WIDTHS
+    ]
+    wrapper = folder / "wrapper.html"
+    wrapper.write_text(MEASURE.replace("FRAMES", json.dumps(frames)), encoding="utf-8")
+    done = subprocess.run(
+        [
+            browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+            "--disable-background-networking", "--disable-component-update", "--disable-sync",
+            # Pages of one folder may look into each other: that is how the wrapper measures.
+            "--allow-file-access-from-files", f"--user-data-dir={folder / 'profile'}", "--window-size=1400,1000",
+            "--virtual-time-budget=20000", "--dump-dom", wrapper.as_uri(),
+        ],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    out = re.search(r'<pre id="out">(\{.*?\})</pre>', done.stdout, re.DOTALL)
+    assert out, f"the pages did not load: {done.stderr[-2000:]}"
+    return json.loads(out.group(1).replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">"))
+
+
+EACH = pytest.mark.parametrize("page", [f"{name} {width}" for name in PAGES for width in WIDTHS])
+
+
+@EACH
+def test_every_figure_is_drawn(seen, page):
+    found = seen[page]
+    assert found["figures"] == {"certificate": 0, "latency": 7, "compare": 2}[page.split()[0]]
+    assert len(found["drawings"]) == {"certificate": 0, "latency": 21, "compare": 9}[page.split()[0]]
+    for drawing in found["drawings"]:
+        assert drawing["box"][2] > 250, drawing["name"]
+        assert drawing["box"][3] > 100, drawing["name"]
+        assert drawing["marks"] > 10, drawing["name"]
+        assert len(drawing["words"]) > 5, drawing["name"]
+
+
+@EACH
+def test_no_word_is_cut_off(seen, page):
+    for drawing in seen[page]["drawings"]:
+        assert all(drawing["within"]), drawing["name"]
+
+
+@EACH
+def test_words_in_figures_are_readable(seen, page):
+    # Height of a line of text on the screen, in CSS pixels, upright ones only.
+    for drawing in seen[page]["drawings"]:
+        heights = [height for _, _, width, height in drawing["words"] if width > height]
+        assert min(heights) > 9, drawing["name"]
+
+
+@EACH
+def test_nothing_hangs_over_the_edge(seen, page):
+    assert seen[page]["width"] <= int(page.split()[1])
+
+
+@EACH
+def test_verdict_is_on_the_first_screen(seen, page):
+    _, top, width, height = seen[page]["verdict"]
+    assert top + height < 700
+    assert width > 300
+
+
+@EACH
+def test_page_works_and_loads_nothing(seen, page):
+    assert seen[page]["text"] > 1000
+    assert seen[page]["buttons"] > 1, "the page's script did not run: is its digest in the policy?"
+    assert seen[page]["loaded"] == []

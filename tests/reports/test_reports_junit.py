@@ -1,0 +1,114 @@
+"""junit.xml."""
+
+import copy
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from lxml import etree
+
+from reports.junit import junit
+
+SHAPE = etree.XMLSchema(etree.parse(Path(__file__).parent / "data" / "junit-shape.xsd"))
+
+
+def parsed(result):
+    root = etree.fromstring(junit(result))
+    SHAPE.assertValid(root)
+    return root
+
+
+def case(root, name):
+    return root.find(f".//testcase[@name='{name}']")
+
+
+def test_one_suite_for_each_class_and_one_case_for_each_requirement(result):
+    root = parsed(result)
+    assert [suite.get("name") for suite in root] == list(result["classes"])
+    names = {element.get("name") for element in root.iter("testcase")}
+    assert names >= {requirement["id"] for requirement in result["requirements"]}
+
+
+@pytest.mark.parametrize(
+    ("name", "outcome"),
+    [
+        ("rest.pose.type", None),
+        ("http.put-with-media-type", None),
+        ("rest.goal.delete-then-404", "failure"),
+        ("xml.still-responsive", "error"),
+        ("rest.velocity.converges", "skipped"),
+        ("safety.watchdog", "skipped"),
+    ],
+)
+def test_verdicts(result, name, outcome):
+    found = [child.tag for child in case(parsed(result), name) if child.tag != "system-out"]
+    assert found == ([outcome] if outcome else [])
+
+
+def test_counts_are_those_of_the_cases(result):
+    root = parsed(result)
+    for suite in root:
+        cases = suite.findall("testcase")
+        assert int(suite.get("tests")) == len(cases)
+        for outcome, attribute in (("failure", "failures"), ("error", "errors"), ("skipped", "skipped")):
+            assert int(suite.get(attribute)) == sum(c.find(outcome) is not None for c in cases)
+    assert int(root.get("failures")) == sum(int(suite.get("failures")) for suite in root)
+    assert int(root.get("tests")) == sum(int(suite.get("tests")) for suite in root)
+
+
+def test_failure_tells_how_to_see_it_again(result):
+    failure = case(parsed(result), "strict.soap.lexical").find("failure")
+    assert failure.get("message") == "message_code 'abc' was accepted with 200. (and 1 more findings)"
+    for wanted in ("expected: HTTP 500", "send it again: curl ", "answered 200 after 2.3 ms", "no response within 5 s"):
+        assert wanted in failure.text
+
+
+def test_warning_breaks_no_build_and_is_told(result):
+    assert "WARNING: PUT" in case(parsed(result), "http.put-with-media-type").findtext("system-out")
+
+
+def test_class_that_failed_without_a_failing_requirement_is_red(result):
+    result["classes"]["rest-delivery"] = "fail"
+    result["class_reasons"]["rest-delivery"] = "its prerequisite, the REST endpoint, was not given"
+    assert case(parsed(result), "class rest-delivery").find("failure").get("message").startswith("its prerequisite")
+
+
+def test_inconclusive_class_is_no_green_one(result):
+    assert case(parsed(result), "class equivalence").find("error") is not None
+
+
+def test_nothing_judged_is_an_error(result):
+    result.update(verdict="inconclusive", requirements=[], classes={}, class_reasons={})
+    root = parsed(result)
+    assert (root.get("tests"), root.get("errors")) == ("1", "1")
+
+
+def test_expected_failure_is_skipped(result):
+    requirement = next(r for r in result["requirements"] if r["id"] == "rest.goal.delete-then-404")
+    requirement["expected_failure"] = {"reason": "known since 2.3"}
+    element = case(parsed(result), "rest.goal.delete-then-404")
+    assert element.find("skipped").get("message") == "Expected by the baseline: known since 2.3"
+    assert element.find("failure") is None
+
+
+def test_hostile_text(hostile):
+    assert "\\x00" in etree.tostring(parsed(hostile), encoding="unicode")
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50, deadline=None)
+@given(body=st.text(st.characters(exclude_categories=())))
+def test_any_body_is_valid_xml(result, body):
+    changed = copy.deepcopy(result)
+    failure = next(r for r in changed["requirements"] if r["verdict"] == "fail")["failures"][0]
+    failure["response"]["body"] = failure["message"] = failure["request"]["curl"] = body
+    parsed(changed)
+
+
+def test_huge_body_is_cut(result):
+    failure = next(r for r in result["requirements"] if r["verdict"] == "fail")["failures"][0]
+    failure["response"]["body"] = "x" * 1_000_000
+    failure["request"]["curl"] = "y" * 1_000_000
+    document = junit(result)
+    assert len(document) < 60_000
+    assert b"of 1000000 characters are not shown" in document

@@ -1,0 +1,231 @@
+"""The latency report as page and as Markdown."""
+
+import copy
+import json
+from pathlib import Path
+
+import pytest
+from lxml import html
+
+from reports.errors import ResultInvalidError
+from reports.figures.load import load
+from reports.figures.shape import difference
+from reports.figures.spans import spans
+from reports.figures.timeline import stalls, timeline
+from reports.findings import headline, remarks, verdict
+from reports.histograms import all_series
+from reports.latency import latency_html, latency_markdown
+
+DATA = Path(__file__).parent / "data"
+FIGURES = ["ratios", "spectrum", "density", "difference", "spans", "timeline", "load"]
+
+
+@pytest.fixture(scope="module")
+def example():
+    """The example's page, drawn once for all tests that only look at it."""
+    return latency_html(json.loads((DATA / "latency-example.json").read_text(encoding="utf-8")))
+
+
+def page(result):
+    return html.document_fromstring(latency_html(result))
+
+
+def text(element):
+    return " ".join(element.text_content().split())
+
+
+def figures(document):
+    return [figure.get("id").removesuffix("-figure") for figure in document.iter("figure")]
+
+
+def test_everything_is_in_it(latency, example):
+    assert len(example) < 1_500_000
+    document = html.document_fromstring(example)
+    assert figures(document) == FIGURES
+    shown = text(document)
+    for wanted in (
+        "✗ 1 of 2 thresholds missed",
+        "SOAP takes 1.58 to 1.63 times as long as REST at the median for delivery, with the wire client",
+        "Of SOAP's extra 0.047 ms on average, the server spends 0.030 ms.",
+        "REST against itself, measured in the same way, comes to 0.98 to 1.03 times",
+        "1 stall in seconds 15 to 17: 400.2 ms",
+        "REST holds up to 4,000 requests/s",
+        "2 requests of 4,642 failed",
+        "the paper, delivery1.5002.5001.67",
+        "no complete response within 10 s",
+        "Example CPU @ 2.80GHz",
+        latency["environment"]["command"],
+        latency["environment"]["robot_command"],
+        "lost at 14.2 s",
+        "199 of 200 requests/s asked for",
+    ):
+        assert wanted in shown, wanted
+
+
+def test_every_figure_tells_what_it_shows(example):
+    document = html.document_fromstring(example)
+    drawings = document.xpath("//figure//*[local-name()='svg']")
+    assert len(drawings) == 21
+    assert all(len(drawing.get("aria-label")) > 20 for drawing in drawings)
+    assert all(text(caption) for caption in document.iter("figcaption"))
+
+
+def test_ids_are_unique(example):
+    ids = html.document_fromstring(example).xpath("//@id")
+    assert len(ids) == len(set(ids))
+
+
+def test_page_loads_nothing(example):
+    document = html.document_fromstring(example)
+    assert document.xpath("//meta[@http-equiv='Content-Security-Policy']/@content")[0].startswith("default-src 'none'")
+    assert all(str(link).startswith("#") for link in document.xpath("//@href | //@src"))
+    assert example.count("url(") == example.count("url(#")
+    assert "@import" not in example
+
+
+def test_same_result_same_octets(latency, example):
+    assert latency_html(latency) == example
+    assert latency_markdown(latency) == latency_markdown(copy.deepcopy(latency))
+
+
+def test_markdown_is_short_and_has_the_answer(latency):
+    source = latency_markdown(latency)
+    assert len(source) < 6000
+    assert "SOAP takes 1.58 to 1.63 times as long as REST" in source
+    assert "| delivery | SOAP | wire | 900 |" in source
+
+
+def test_only_what_must_be_there(latency):
+    latency["series"] = latency["series"][:2]
+    required = ("format", "valid", "invalid_because", "environment", "plan", "series", "comparisons")
+    document = page({key: latency[key] for key in required})
+    assert figures(document) == ["ratios", "spectrum", "density", "difference", "spans"]
+
+
+def emptied(latency):
+    """Return what a run leaves that was interrupted before its first answer."""
+    nothing = dict.fromkeys(("mean", "p50", "p90", "p95", "p99", "p999", "max"))
+    for series in latency["series"]:
+        series.update(
+            count=0, service_ms=nothing, response_ms=nothing, ci95_ms={"p50": None, "p99": None}, histogram="",
+            response_histogram="", spans_ms=dict.fromkeys(("build", "wire", "server", "parse")),
+            response_ci95_ms={"p50": None, "p99": None}, reasons={"p50": "0 samples"},
+        )  # fmt: skip
+    for comparison in latency["comparisons"]:
+        comparison.update(soap_minus_rest_ms=None, ratio=None, ci95=None, ci95_difference_ms=None, reason="0 samples")
+    latency.update(time_series={"width_s": 1.0, "series": []}, steps=[], knee=[], thresholds=[], noise_floor=[])
+    latency.update(interrupted=True, errors=[])
+    return latency
+
+
+def test_run_without_an_answer(latency):
+    document = page(emptied(latency))
+    assert figures(document) == []
+    shown = text(document)
+    assert "? Nothing was measured" in shown
+    assert "The run ended before its plan did" in shown
+    assert "0 samples" in shown
+    assert "Nothing was measured" in latency_markdown(latency)
+
+
+def test_no_series_at_all(latency):
+    latency.update(series=[], comparisons=[], valid=False, invalid_because=["the robot was gone"], time_series=None)
+    del latency["time_series"]
+    shown = text(page(latency))
+    assert "✗ Not valid" in shown
+    assert "the robot was gone" in shown
+
+
+def test_invalid_run_says_so_first(latency):
+    latency.update(valid=False, invalid_because=["generator CPU at 97 %"])
+    found = verdict(latency, all_series(latency, "x"))
+    assert (found.tone, found.words) == ("bad", "Not valid: these figures say nothing about the robot")
+
+
+def test_one_interface_alone(latency):
+    latency["series"] = [s for s in latency["series"] if s["interface"] == "rest"][:1]
+    latency.update(comparisons=[], steps=[])
+    document = page(latency)
+    assert "difference" not in figures(document)
+    assert "Half of delivery, REST requests took at most 0.074 ms (95 % interval 0.073 to 0.075 ms)" in text(document)
+
+
+def test_no_difference_is_not_called_one(latency):
+    for comparison in latency["comparisons"]:
+        comparison.update(ratio=1.01, ci95=[0.97, 1.05])
+    assert headline(latency, all_series(latency, "x")).startswith("No difference between SOAP and REST can be shown")
+
+
+def test_robot_without_server_timing(latency):
+    for series in latency["series"]:
+        series["spans_ms"]["server"] = None
+    assert "it sends no Server-Timing" in headline(latency, all_series(latency, "x"))
+    assert spans(all_series(latency, "x"))
+
+
+def test_negative_and_zero_figures(latency):
+    for comparison in latency["comparisons"]:
+        comparison.update(soap_minus_rest_ms=-0.01, ratio=0.9, ci95=[0.88, 0.92], ci95_difference_ms=[0.0, 0.02])
+    for step in latency["steps"]:
+        step.update(p50_ms=None, p99_ms=None, achieved_rate=0.0, count=0)
+    assert difference(all_series(latency, "x"), latency["comparisons"])
+    assert load(latency)
+    latency_markdown(latency)
+
+
+def test_one_request_in_each_series(latency):
+    from hdrh.histogram import HdrHistogram  # noqa: PLC0415 - this test alone makes one
+
+    histogram = HdrHistogram(1, 3_600_000_000, 3)
+    histogram.record_value(70)
+    latency.update(series=latency["series"][:2], steps=[])
+    for series in latency["series"]:
+        series.update(count=1, histogram=histogram.encode().decode(), response_histogram=histogram.encode().decode())
+    assert figures(page(latency)) == FIGURES[:-1]
+
+
+def test_stalls_are_found_and_those_of_one_moment_are_one(latency):
+    found = stalls(latency)
+    assert {(s.series, s.start_s, s.end_s) for s in found} == {
+        (("delivery", "wire", "rest"), 15.0, 17.0),
+        (("pose", "wire", "rest"), 15.0, 17.0),
+    }
+    assert sum("stall" in remark for remark in remarks(latency, all_series(latency, "x"))) == 1
+
+
+def test_interval_without_any_answer_is_a_stall(latency):
+    points = latency["time_series"]["series"][1]["points"]
+    points[5].update(count=0, errors=45, p50_ms=None, p99_ms=None, max_ms=None)
+    found = [s for s in stalls(latency) if s.series == ("delivery", "wire", "soap")]
+    assert [(s.start_s, s.longest_ms) for s in found] == [(points[5]["t_s"], None)]
+    assert timeline(latency)
+
+
+def test_long_run_keeps_its_stall_and_its_size(latency):
+    for series in latency["time_series"]["series"]:
+        point = series["points"][0]
+        series["points"] = [{**point, "t_s": float(second)} for second in range(20_000)]
+    latency["time_series"]["series"][0]["points"][777].update(max_ms=5000.0)
+    drawn = "".join(timeline(latency).panels)
+    assert len(drawn) < 500_000
+    assert "5,000 ms" in drawn
+
+
+def test_hostile_text_stays_text(latency):
+    latency.update(series=latency["series"][:2], steps=[], time_series={"width_s": 1.0, "series": []})
+    attack = "</svg></script><script>alert(1)</script>\x1b[2J\u202e"
+    latency["environment"].update(cpu=attack, command=attack, robot_command=attack)
+    latency["environment"]["robot"].update(name=attack, vendor=attack, version=attack, servers={attack: attack})
+    latency["errors"][0].update(kind=attack, message=attack)
+    latency["notes"] = [attack]
+    latency["thresholds"][0]["name"] = attack
+    document = page(latency)
+    assert len(document.findall(".//script")) == 1
+    assert not set(document.text_content()) & set("\x1b\u202e")
+    assert "\n<script" not in latency_markdown(latency)
+
+
+def test_bad_histogram_is_told(latency):
+    latency["series"][2]["histogram"] = "garbage"
+    with pytest.raises(ResultInvalidError, match=r"latency\.json: at \$\.series\[2\]\.histogram"):
+        latency_html(latency)
