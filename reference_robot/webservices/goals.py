@@ -187,16 +187,16 @@ class Goals:
         pose = message_from(shape_of(PoseStamped), described["goal"]["target_pose"])
         handle = await self._calls.result(lambda: self._publishers.send_goal(identity, pose), "the navigation")
         if not handle.accepted:
-            reason = await self._reason(identity.hex())
+            reason = await self._reason(described["goal"]["target_pose"])
             raise Problem(422, f"goal.target_pose is refused by the navigation: {reason}")
         return _Goal(identity, described, handle)
 
-    async def _reason(self, identity: str) -> str:
-        """Return why the robot refused a goal, which it tells on a topic of its own; Nav2 does not."""
+    async def _reason(self, target: dict[str, Any]) -> str:
+        """Return why the robot refused a goal, which ours tells on a topic of its own; Nav2 does not."""
         for _ in range(round(_REASON_COMES_WITHIN / _REASON_STEP)):
             try:
                 told = json.loads(self._subscribers.last_rejection or "{}")
-                if told.get("goal_id") == identity:
+                if told.get("pose") == target:
                     return str(told["reason"])
             except (ValueError, KeyError, AttributeError):
                 break
