@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,9 +17,8 @@ if TYPE_CHECKING:
 _DOMAIN_IDS = range(40, 102)
 
 
-@pytest.fixture
-def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """Yield a ROS domain id that no other test of any process on this machine holds."""
+@contextmanager
+def _held_domain_id() -> Iterator[int]:
     for candidate in _DOMAIN_IDS:
         lock = Path(tempfile.gettempdir(), f"roaas-domain-{candidate}.lock").open("w")  # noqa: SIM115 - held below
         try:
@@ -27,8 +27,22 @@ def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
             lock.close()
             continue
         with lock:
-            monkeypatch.setenv("ROS_DOMAIN_ID", str(candidate))
-            monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
             yield candidate
         return
     pytest.fail(f"all ROS domain ids from {_DOMAIN_IDS[0]} to {_DOMAIN_IDS[-1]} are taken by other tests")
+
+
+@pytest.fixture
+def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """Yield a ROS domain id that no other test of any process on this machine holds."""
+    with _held_domain_id() as held:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(held))
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield held
+
+
+@pytest.fixture(scope="session")
+def session_domain_id() -> Iterator[int]:
+    """Yield a domain id for a robot that many tests share; the environment is the user's affair."""
+    with _held_domain_id() as held:
+        yield held

@@ -27,6 +27,7 @@ class WebSettings:
         hold: How long the robot keeps a velocity that is not renewed, s (its own watchdog enforces it).
         settle: Within what time a new velocity is reached, s; declared, not enforced.
         deadline: How long to wait for an answer from ROS, s.
+        read_deadline: How long a client may take to send one request, s.
     """
 
     max_linear: float = 0.7
@@ -34,6 +35,7 @@ class WebSettings:
     hold: float = 1.0
     settle: float = 0.6
     deadline: float = 5.0
+    read_deadline: float = 10.0
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _BACKLOG: Final = 1024  # connections that may arrive at once
 _KEEP_ALIVE: Final = 60  # seconds that an idle connection is kept for its next request
 _LAST_WORDS: Final = 2  # seconds for answers under way when the robot stops
-_SWEEP: Final = 1.0  # seconds between looks for overdue requests
+_SWEEP: Final = 0.5  # seconds between looks for overdue requests
 
 
 class PortInUseError(OSError):
@@ -79,9 +79,11 @@ class EndpointPublisher:
 
     Args:
         interfaces: Each interface with the bound socket that it listens on.
+        read_deadline: Seconds that a client may take to send one request.
     """
 
-    def __init__(self, interfaces: list[tuple[Interface, socket.socket]]) -> None:
+    def __init__(self, interfaces: list[tuple[Interface, socket.socket]], read_deadline: float) -> None:
+        self._read_deadline = read_deadline
         self._listeners = [listener for _, listener in interfaces]
         self._servers = [_Server(_settings(interface)) for interface, _ in interfaces]
 
@@ -111,7 +113,7 @@ class EndpointPublisher:
             for server in self._servers:
                 connections: Any = list(server.server_state.connections)
                 for connection in connections:
-                    connection.close_if_overdue(now())
+                    connection.close_if_older(now() - self._read_deadline)
 
 
 def _settings(interface: Interface) -> uvicorn.Config:

@@ -85,7 +85,9 @@ class RobotWebServiceNodesRunner:
                 endpoints,
                 self._listening.authorization,
             )
-            publisher = EndpointPublisher(list(zip(pair, (rest, soap), strict=True)))
+            publisher = EndpointPublisher(
+                list(zip(pair, (rest, soap), strict=True)), self._configuration.web.read_deadline
+            )
             uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
 
     @contextlib.contextmanager

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 TARGET_LIMIT: Final = 8000  # octets (RFC 9110 4.1 asks for at least that)
 HEAD_LIMIT: Final = 64 * 1024  # octets: request line and fields (RFC 6585 5)
-READ_DEADLINE: Final = 10.0  # seconds from a request's first octet (or the connection's start) to its last one
 _LINGER: Final = 2.0  # seconds in which what a refused client still sends is read and dropped
 _DRAINED: Final = 16 * BODY_LIMIT  # octets of content beyond the limit that are dropped before the line is cut
 
@@ -137,13 +136,16 @@ class RobotHttpProtocol(HttpToolsProtocol):
             self.transport.write_eof()
         self.loop.call_later(_LINGER, self.transport.close)
 
-    def close_if_overdue(self, now: float) -> None:
-        """End the connection if its request has been arriving for longer than the deadline (RFC 9110 15.5.9)."""
-        if self._busy_since is None or now - self._busy_since < READ_DEADLINE or self.transport.is_closing():
+    def close_if_older(self, begun: float) -> None:
+        """End the connection if its request began to arrive before that time of the loop and still does.
+
+        Its sender is told so by a 408 (RFC 9110 15.5.9) as long as nobody works on the request yet.
+        """
+        if self._busy_since is None or self._busy_since > begun or self.transport.is_closing():
             return
         self._busy_since = None
         if self._head_octets and self._reading_head:
-            self._refusal = Problem(408, f"the request was not complete within {READ_DEADLINE:g} s")
+            self._refusal = Problem(408, "the request took too long to arrive")
             self.send_400_response("")
         else:
             self.transport.abort()
