@@ -1,0 +1,115 @@
+"""A clock that rings at an absolute time, inside gevent's loop.
+
+On Linux a timerfd on CLOCK_MONOTONIC, watched by the loop like a socket: it rings within some 50 us.
+gevent.sleep wakes on libev's millisecond grid, which would drown a service time of 0.1 ms. Where there is no
+timerfd the loop's own timer serves, and the result says so.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import time
+from typing import TYPE_CHECKING, Any, Protocol
+
+from gevent.hub import get_hub
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_SECOND_NS = 1_000_000_000
+_READ = 1  # libev's EV_READ
+_CLOCK_MONOTONIC = 1  # linux/time.h
+_TFD_TIMER_ABSTIME = 1  # linux/timerfd.h
+_TFD_FLAGS = os.O_NONBLOCK | os.O_CLOEXEC if hasattr(os, "O_CLOEXEC") else 0  # TFD_NONBLOCK | TFD_CLOEXEC
+
+
+class Alarm(Protocol):
+    """Calls back in the hub at the time that it was set to; setting it again replaces the earlier time."""
+
+    name: str
+
+    def set(self, at_ns: int) -> None:
+        """Ring at `at_ns` (time.monotonic_ns); a time gone by rings at once."""
+
+    def close(self) -> None:
+        """Ring no more."""
+
+
+class _Timespec(ctypes.Structure):
+    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
+
+
+class _Itimerspec(ctypes.Structure):
+    _fields_ = (("interval", _Timespec), ("value", _Timespec))
+
+
+class TimerfdAlarm:
+    """timerfd_create(2). Python has it as os.timerfd_create from 3.13 on; by ctypes it is the same everywhere."""
+
+    name = "timerfd"
+
+    def __init__(self, ring: Callable[[], None]) -> None:
+        self._ring = ring
+        libc = ctypes.CDLL(None, use_errno=True)
+        self._settime = libc.timerfd_settime
+        self._fd: int = libc.timerfd_create(_CLOCK_MONOTONIC, _TFD_FLAGS)
+        if self._fd < 0:
+            raise OSError(ctypes.get_errno(), "timerfd_create failed")
+        self._spec = _Itimerspec()
+        self._pointer = ctypes.byref(self._spec)
+        self._watcher: Any = get_hub().loop.io(self._fd, _READ)
+        self._watcher.start(self._readable)
+
+    def _readable(self) -> None:
+        try:
+            os.read(self._fd, 8)  # the number of expirations: reading it is what silences the descriptor
+        except BlockingIOError:  # set again since the loop saw it ring
+            return
+        self._ring()
+
+    def set(self, at_ns: int) -> None:
+        """Ring at `at_ns`; 0 would disarm (timerfd_settime(2)), so the earliest is 1."""
+        seconds, nanoseconds = divmod(max(at_ns, 1), _SECOND_NS)
+        self._spec.value.seconds = seconds
+        self._spec.value.nanoseconds = nanoseconds
+        if self._settime(self._fd, _TFD_TIMER_ABSTIME, self._pointer, None) != 0:
+            raise OSError(ctypes.get_errno(), "timerfd_settime failed")
+
+    def close(self) -> None:
+        """Ring no more."""
+        if self._fd >= 0:
+            self._watcher.stop()
+            self._watcher.close()
+            os.close(self._fd)
+            self._fd = -1
+
+
+class LoopAlarm:
+    """The event loop's timer, on its millisecond grid."""
+
+    name = "gevent.sleep"
+
+    def __init__(self, ring: Callable[[], None]) -> None:
+        self._ring = ring
+        self._timer: Any = None
+
+    def set(self, at_ns: int) -> None:
+        """Ring at `at_ns` or up to a millisecond later."""
+        self.close()
+        loop = get_hub().loop
+        self._timer = loop.timer(max(0.0, (at_ns - time.monotonic_ns()) / _SECOND_NS))
+        self._timer.start(self._ring, update=True)
+
+    def close(self) -> None:
+        """Ring no more."""
+        if self._timer is not None:
+            self._timer.stop()
+            self._timer.close()
+            self._timer = None
+
+
+def make_alarm(ring: Callable[[], None]) -> Alarm:
+    """The best alarm of this system."""
+    return TimerfdAlarm(ring) if sys.platform == "linux" else LoopAlarm(ring)

@@ -1,0 +1,150 @@
+"""`roaas load`: options, and the process that does the measuring."""
+
+from __future__ import annotations
+
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from loadtests import exits
+from loadtests.plan import CLIENTS, INTERFACES, OPERATIONS
+from loadtests.settings import (
+    DEFAULT_DURATION_S,
+    DEFAULT_RATE,
+    DEFAULT_WARMUP_S,
+    Settings,
+    SettingsError,
+    Wishes,
+    settle,
+)
+from loadtests.statement import Statement, StatementError
+from loadtests.statement import read as read_statement
+from loadtests.steps import STEP_S
+from loadtests.thresholds import ThresholdsError
+from loadtests.thresholds import read_file as read_thresholds
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+DEFAULT_OUT = "roaas-load"
+_FILE = click.Path(path_type=Path)
+
+
+def run_load(settings: Settings) -> tuple[int, Path]:
+    """Carry out a run in a process of its own; returns its exit code and the folder of its result.
+
+    The process has its own session, so that Ctrl-C comes to it through us, once: it then writes what it has.
+    """
+    child = subprocess.Popen(
+        [sys.executable, "-m", "loadtests.engine"], stdin=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+    def forward(number: int, _: FrameType | None) -> None:
+        child.send_signal(number)
+
+    earlier = {number: signal.signal(number, forward) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        if child.stdin is not None:
+            child.stdin.write(settings.to_json())
+            child.stdin.close()
+        code = child.wait()
+    finally:
+        for number, handler in earlier.items():
+            signal.signal(number, handler)
+    return (code if code >= 0 else exits.INCONCLUSIVE), Path(settings.out)
+
+
+def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[float, ...]:
+    if not value:
+        return ()
+    try:
+        return tuple(float(part) for part in value.split(","))
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is no list of rates such as 100,200,400") from None
+
+
+@click.command()
+@click.argument("statement", required=False, type=_FILE)
+@click.option("--rest", metavar="URL", help="The REST interface's base URL.")
+@click.option("--publishers-wsdl", metavar="URL|FILE", help="WSDL of the service that takes deliveries.")
+@click.option("--subscribers-wsdl", metavar="URL|FILE", help="WSDL of the service that tells the pose.")
+@click.option("--publishers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say.")
+@click.option("--subscribers-endpoint", metavar="URL", help="Likewise for the subscribers' service.")
+@click.option(
+    "--operation", "operations", multiple=True, type=click.Choice(OPERATIONS), help="What to call (repeatable)."
+)
+@click.option("--interface", "interfaces", multiple=True, type=click.Choice(INTERFACES), help="Only this interface.")
+@click.option("--client", "clients", multiple=True, type=click.Choice(CLIENTS), help="Only this client.")
+@click.option("--rate", type=float, help=f"Open model: requests per second (default {DEFAULT_RATE:g}).")
+@click.option("--users", type=int, help="Closed model: users that each wait for their answer.")
+@click.option("--arrivals", type=click.Choice(["constant", "poisson"]), default="constant", show_default=True)
+@click.option("--duration", type=float, help=f"Seconds to measure (default {DEFAULT_DURATION_S:g}).")
+@click.option("--warmup", type=float, help=f"Seconds of load before, not counted (default {DEFAULT_WARMUP_S:g}).")
+@click.option("--timeout", type=float, help="Deadline of a request in seconds.")
+@click.option("--seed", type=int, default=1, show_default=True, help="Fixes schedule, payloads and intervals.")
+@click.option("--processes", type=click.IntRange(1, 256), default=1, show_default=True, help="Workers on this machine.")
+@click.option(
+    "--expect-workers", type=click.IntRange(0, 1000), default=0, help="Workers in all, on other machines too."
+)
+@click.option("--master-host", default="127.0.0.1", show_default=True, help="Where the master listens for workers.")
+@click.option("--master-port", type=click.IntRange(0, 65535), default=0, help="Its port; 0 picks a free one.")
+@click.option("--web-port", type=click.IntRange(1, 65535), help="Show Locust's web UI on this port.")
+@click.option("--metrics-port", type=click.IntRange(1, 65535), help="Serve the histograms to Prometheus on this port.")
+@click.option("--steps", is_flag=True, help="Then step the load up to find where the robot gives way.")
+@click.option("--step-rates", callback=_rates, metavar="R,R,…", help="The rates to step through.")
+@click.option(
+    "--step-duration", type=float, default=STEP_S, show_default=True, help="Seconds for each step and interface."
+)
+@click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
+@click.option("--token-file", metavar="FILE", help="Holds the robot's bearer token.")
+@click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")
+@click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
+@click.option("--out", metavar="DIR", default=DEFAULT_OUT, show_default=True, help="Where the result goes.")
+@click.pass_context
+def load(ctx: click.Context, /, statement: Path | None, **options: Any) -> None:
+    """Measure how fast a robot answers, SOAP against REST.
+
+    Exit codes: 0 thresholds met, 1 missed, 2 usage, 3 robot not reachable, 4 measurement not valid, 130 interrupted.
+    """
+    try:
+        said = read_statement(statement) if statement is not None else Statement()
+        limits = read_thresholds(options.pop("thresholds")) if options["thresholds"] else []
+        options.pop("thresholds", None)
+        settings = settle(_wishes(options, limits), said)
+        _check_folder(Path(settings.out))
+    except (StatementError, ThresholdsError, SettingsError) as error:
+        click.echo(f"roaas load: {error}", err=True)
+        ctx.exit(exits.USAGE)
+    code, folder = run_load(settings)
+    after = (ctx.obj or {}).get("after_load") if isinstance(ctx.obj, dict) else None
+    if after is not None and (folder / "latency.json").exists():
+        after(folder)
+    ctx.exit(code)
+
+
+def _wishes(options: dict[str, Any], limits: list[Any]) -> Wishes:
+    renamed = {
+        "duration": "duration_s",
+        "warmup": "warmup_s",
+        "timeout": "timeout_s",
+        "step_duration": "step_s",
+        "expect_workers": "expect",
+    }
+    return Wishes(
+        **{renamed.get(key, key): value for key, value in options.items()},
+        thresholds=limits,
+        command=shlex.join(["roaas", *(Path(word).name if word.startswith("/") else word for word in sys.argv[1:])]),
+    )
+
+
+def _check_folder(folder: Path) -> None:
+    """Fail now rather than after the run."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingsError(f"--out {str(folder)!r}: {error.strerror or error}") from None

@@ -1,0 +1,87 @@
+"""Where a service listens, as a value, and what goes wrong on the way there.
+
+A URL may carry a base-path prefix (a robot behind a gateway), an IPv6 literal and either scheme.
+"""
+
+from __future__ import annotations
+
+import ssl
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+DEFAULT_PORTS = {"http": 80, "https": 443}
+
+
+class EndpointError(ValueError):
+    """A URL that no request can be sent to; the message shows it."""
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """An HTTP origin with a path prefix.
+
+    Attributes:
+        scheme: `http` or `https`.
+        host: name or address, without the brackets of an IPv6 literal.
+        port: TCP port.
+        path: prefix without a trailing slash; empty for none.
+    """
+
+    scheme: str
+    host: str
+    port: int
+    path: str
+
+    @classmethod
+    def parse(cls, url: str) -> Endpoint:
+        """Read a URL.
+
+        Raises:
+            EndpointError: no http(s) URL, no host, a port out of range, or user information in it.
+        """
+        try:
+            parts = urlsplit(url.strip())
+            port = parts.port
+        except ValueError as error:
+            raise EndpointError(f"{url!r} is no URL: {error}") from None
+        if parts.scheme not in DEFAULT_PORTS:
+            raise EndpointError(f"{url!r} does not begin with http:// or https://")
+        if not parts.hostname:
+            raise EndpointError(f"{url!r} names no host")
+        if parts.username is not None or parts.password is not None:
+            raise EndpointError(f"the URL of {parts.hostname} carries a password: give a --token-file instead")
+        if any(ord(character) <= 0x20 or ord(character) == 0x7F for character in parts.netloc + parts.path):  # noqa: PLR2004 -- RFC 3986 section 2: neither space nor control characters
+            raise EndpointError(f"{url!r} holds a space or a control character")
+        return cls(
+            parts.scheme,
+            parts.hostname,
+            DEFAULT_PORTS[parts.scheme] if port is None else port,
+            parts.path.rstrip("/"),
+        )
+
+    @property
+    def authority(self) -> str:
+        """The Host header's value (RFC 9110 section 7.2): the port only where it is not the scheme's own."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return host if self.port == DEFAULT_PORTS[self.scheme] else f"{host}:{self.port}"
+
+    @property
+    def url(self) -> str:
+        """The endpoint as a URL, without a trailing slash."""
+        return f"{self.scheme}://{self.authority}{self.path}"
+
+
+def tls_context(ca_file: Path | None) -> ssl.SSLContext:
+    """TLS as a careful client sets it up: certificate and host name are checked; `ca_file` adds trust.
+
+    Raises:
+        EndpointError: `ca_file` cannot be read or holds no certificate.
+    """
+    try:
+        return ssl.create_default_context(cafile=None if ca_file is None else str(ca_file))
+    except OSError as error:  # ssl.SSLError is one
+        raise EndpointError(f"ca_file {str(ca_file)!r}: {error}") from None

@@ -1,0 +1,300 @@
+"""The process that measures: `python -m loadtests.engine`, with the settings as JSON on its standard input.
+
+It is a process of its own because importing Locust makes gevent replace the sockets, locks and sleeps of
+everything in the process: front door, reports and tests keep the real ones.
+"""
+
+# Locust patches the standard library on import, which has to come before anything that uses it.
+import locust  # noqa: F401, I001
+
+import logging
+import os
+import resource
+import signal
+import sys
+from contextlib import ExitStack
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import gevent
+
+from loadtests.climb import climb
+from loadtests.crew import Crew, CrewError, LocalCrew
+from loadtests.document import Gone, Outcome, compose
+from loadtests.exits import INCONCLUSIVE, UNREACHABLE, USAGE
+from loadtests.failures import CallError
+from loadtests.leader import LedCrew
+from loadtests.metrics import Collector, serve
+from loadtests.plan import Plan
+from loadtests.preflight import preflight
+from loadtests.recorder import Recorder
+from loadtests.result import write
+from loadtests.robot import Robot
+from loadtests.settings import Settings
+from loadtests.terminal import final_words
+from loadtests.wsdl import WsdlError, address_in, fetch
+
+_DEAD_S = 3.0
+_DEAD_REQUESTS = 10
+_LEAST_USERS, _MOST_USERS = 32, 512
+_STALL_S = 3.0  # the stall that the users of an open model outlast before arrivals queue for one
+
+
+def tell(message: str) -> None:
+    """A line for the person who waits."""
+    sys.stderr.write(message + "\n")
+    sys.stderr.flush()
+
+
+class Run:
+    """One run, from settings to result.
+
+    Args:
+        settings: what to do.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.robot = Robot(
+            settings.rest if "rest" in settings.interfaces else None,
+            settings.publishers if "soap" in settings.interfaces else None,
+            settings.subscribers if "soap" in settings.interfaces else None,
+            settings.publishers_wsdl if "soap" in settings.interfaces else None,
+            settings.subscribers_wsdl if "soap" in settings.interfaces else None,
+            settings.ca_file,
+            settings.token,
+            settings.timeout_s,
+        )
+        self.outcome = Outcome(settings, self.robot, datetime.now(UTC))
+        self.collector: Collector | None = None
+        self._alive_at = (0.0, 0)
+        self._told = 0.0
+        self._parent = os.getppid()
+
+    def interrupt(self) -> None:
+        """Ctrl-C: end, keeping what there is."""
+        self.outcome.interrupted = True
+
+    # Before the measurement.
+
+    def resolve(self) -> None:
+        """Read the addresses that only a WSDL knows.
+
+        Raises:
+            Gone: a WSDL is wrong, or nobody answers.
+        """
+        services = {
+            "publishers": ("ExecuteDeliveryRequest", "publishers_wsdl"),
+            "subscribers": ("GetPose", "subscribers_wsdl"),
+        }
+        found: dict[str, Any] = {}
+        for service, (element, description) in services.items():
+            location = getattr(self.robot, description)
+            if getattr(self.robot, service) is not None or location is None:
+                continue
+            try:
+                found[service] = address_in(fetch(location, self.robot), location, element)
+            except WsdlError as error:
+                raise Gone(USAGE, str(error)) from None
+            except CallError as error:
+                raise Gone(UNREACHABLE, f"the robot cannot be reached: {error}") from None
+        self.robot = self.outcome.robot = replace(self.robot, **found)
+
+    def check(self) -> None:
+        """Call everything once.
+
+        Raises:
+            Gone: the robot does not answer as it should; what it did answer is kept for the result.
+        """
+        plan = self.first_plan()
+        names = [
+            (plan.operations[number], interface, client)
+            for client in plan.clients
+            for interface in plan.interfaces
+            for number in plan.offered(interface, client)
+        ]
+        if not names:
+            raise Gone(USAGE, "no operation can be measured with these endpoints")
+        self.outcome.findings = preflight(self.robot, names, self.settings.seed)
+        self.outcome.notes += self.outcome.findings.notes
+        if self.outcome.findings.unreachable:
+            raise Gone(UNREACHABLE, "the robot cannot be reached: " + "; ".join(self.outcome.findings.messages()))
+        if self.outcome.findings.failures:
+            raise Gone(
+                INCONCLUSIVE, "the robot does not answer as it should: " + "; ".join(self.outcome.findings.messages())
+            )
+        self.outcome.invalid += [
+            f"the interfaces' payloads are not equivalent: {reason}" for reason in self.outcome.findings.unequal
+        ]
+
+    def first_plan(self) -> Plan:
+        """The duel's plan."""
+        settings, robot = self.settings, self.robot
+        interfaces, offers, missing = [], {}, set()
+        for interface in settings.interfaces:
+            for client in settings.clients:
+                numbers = [
+                    number for number, name in enumerate(settings.operations) if robot.offers(interface, client, name)
+                ]
+                missing |= {
+                    f"{name} is not measured over {interface} ({client}): no endpoint or WSDL for it"
+                    for number, name in enumerate(settings.operations)
+                    if number not in numbers
+                }
+                offers[f"{interface}/{client}"] = numbers
+            if any(offers[f"{interface}/{client}"] for client in settings.clients):
+                interfaces.append(interface)
+        clients = tuple(
+            client for client in settings.clients if all(offers[f"{interface}/{client}"] for interface in interfaces)
+        )
+        self.outcome.notes = sorted(missing)
+        workers = max(1, settings.expect)
+        return Plan(
+            operations=settings.operations,
+            interfaces=tuple(interfaces),
+            clients=clients,
+            rate=settings.rate,
+            users=settings.users,
+            duration_s=settings.duration_s,
+            warmup_s=settings.warmup_s,
+            arrivals=settings.arrivals,
+            seed=settings.seed,
+            timeout_s=settings.timeout_s,
+            workers=workers,
+            connections=self.users(workers),
+            offers=offers,
+        )
+
+    def users(self, workers: int) -> int:
+        """How many users come up in all."""
+        settings = self.settings
+        if settings.users is not None and not settings.step_rates:
+            return settings.users
+        rate = max(settings.rate or 0.0, *settings.step_rates, 0.0)
+        each = min(_MOST_USERS, max(_LEAST_USERS, int(rate / workers * _STALL_S)))
+        return each * workers
+
+    # The measurement.
+
+    def measure(self) -> None:
+        """Come up, warm up, duel, step.
+
+        Raises:
+            Gone: the generator cannot work.
+        """
+        plan, settings = self.first_plan(), self.settings
+        with ExitStack() as stack:
+            try:
+                crew = self.outcome.crew = self._crew()
+                stack.callback(crew.close)
+                if settings.metrics_port is not None:
+                    self.collector = Collector(lambda: crew.recorder, settings.operations)
+                    stack.callback(serve(self.collector, "127.0.0.1", settings.metrics_port).stop)
+                if settings.web_port is not None:
+                    self._web(crew, settings.web_port)
+                crew.prepare(
+                    self.robot, settings.operations, settings.seed, zeep="zeep" in plan.clients, users=plan.connections
+                )
+            except CrewError as error:
+                raise Gone(USAGE, str(error)) from None
+            self._tell_plan(plan, crew)
+            self._carry_out(plan, crew)
+            self.outcome.plan = plan
+            if settings.step_rates and not self.outcome.interrupted and self.outcome.dead_at is None:
+                self.outcome.steps += climb(plan, crew, settings, lambda: self.outcome.interrupted, self._number, tell)
+
+    def _crew(self) -> Crew:
+        settings = self.settings
+        if settings.expect:
+            return LedCrew(settings.master_host, settings.master_port, settings.processes, settings.expect, tell)
+        return LocalCrew()
+
+    @staticmethod
+    def _web(crew: Crew, port: int) -> None:
+        """Locust's web UI, watching; it starts and stops nothing here."""
+        web = crew.environment.create_web_ui("127.0.0.1", port)
+        gevent.sleep(0.2)
+        if web.greenlet.ready():
+            raise CrewError(f"the web UI's port {port} is in use: choose another with --web-port")
+        tell(f"Locust's web UI: http://127.0.0.1:{port}")
+
+    def _carry_out(self, plan: Plan, crew: Crew) -> None:
+        """Run a plan, watching for its end, Ctrl-C and the robot's death."""
+        self._number(plan)
+        self.outcome.plan = plan
+        self._alive_at = (0.0, 0)
+        ceiling = self.settings.max_rate if not plan.open_model else None
+        crew.run(plan, ceiling, lambda elapsed: self._watch(plan, crew.recorder, elapsed))
+
+    def _watch(self, plan: Plan, recorder: Recorder, elapsed: float) -> bool:
+        """Whether to end now."""
+        self.outcome.elapsed_s = max(0.0, min(elapsed, plan.length_s))
+        if os.getppid() != self._parent:  # whoever started us is gone
+            self.outcome.interrupted = True
+        if plan.step_rate is None and self.outcome.dead_at is None:
+            recorder.flush()
+            succeeded = sum(cell.service.total for cell in recorder.cells.values())
+            failed = sum(failure.count for failure in recorder.failures.values())
+            since, before = self._alive_at
+            if succeeded > before or failed < _DEAD_REQUESTS:
+                self._alive_at = (elapsed, succeeded)
+            elif elapsed - since > _DEAD_S + (1.0 if self.settings.expect else 0.0):
+                self.outcome.dead_at = since
+                tell(f"the robot has answered nothing since {since:.1f} s: ending the run")
+        if elapsed - self._told >= 1.0 and plan.step_rate is None:
+            self._told = elapsed
+            done = sum(cell.service.total for cell in recorder.cells.values())
+            tell(f"{elapsed:6.1f} s of {plan.length_s:.0f} s: {done} requests answered")
+        return self.outcome.interrupted or self.outcome.dead_at is not None
+
+    def _number(self, plan: Plan) -> None:
+        """Have the metrics know a plan's segments."""
+        if self.collector is not None:
+            self.collector.series_of.update(plan.series_of())
+
+    @staticmethod
+    def _tell_plan(plan: Plan, crew: Crew) -> None:
+        load = f"{plan.rate:g} requests/s" if plan.open_model else f"{plan.users} users"
+        tell(
+            f"measuring {', '.join(plan.operations)} over {' and '.join(plan.interfaces)} at {load} "
+            f"for {plan.duration_s:g} s after {plan.warmup_s:g} s of warm-up, {plan.blocks} blocks, "
+            f"paced by {crew.pacing}"
+        )
+
+
+def _raise_file_limit() -> None:
+    """A connection is a descriptor: take as many as the system lets us have."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft < hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+
+
+def carry_out(settings: Settings) -> int:
+    """Do a run and write its result; returns the exit code."""
+    _raise_file_limit()
+    logging.getLogger("locust").setLevel(logging.ERROR)  # it warns of spawning fast, which is what we want
+    run = Run(settings)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        gevent.signal_handler(number, run.interrupt)
+    gone: Gone | None = None
+    try:
+        run.resolve()
+        run.check()
+        run.measure()
+    except Gone as reason:
+        gone = reason
+        tell(f"roaas load: {gone}")
+    code, document = compose(run.outcome, run.outcome.plan or run.first_plan(), gone)
+    if gone is None or gone.code != USAGE:
+        path = write(Path(settings.out), document)
+        tell(f"written: {path}")
+    if gone is None:
+        sys.stdout.write(final_words(document))
+        sys.stdout.flush()
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(carry_out(Settings.from_json(sys.stdin.read())))

@@ -1,0 +1,76 @@
+"""Why a call failed, in the few kinds that the result groups errors by."""
+
+from __future__ import annotations
+
+import re
+import socket
+import ssl
+
+
+class CallError(Exception):
+    """A call that brought no good answer.
+
+    Attributes:
+        kind: `refused`, `resolve`, `network`, `tls`, `closed`, `timeout`, `malformed`, `status`, `redirect`,
+            `fault` or `content`.
+    """
+
+    def __init__(self, kind: str, message: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+#: Kinds that say that nobody listens there, as against somebody who answers badly.
+UNREACHABLE = frozenset({"refused", "resolve", "network", "tls"})
+
+_FAULT_STRING = re.compile(rb"<(?:\w+:)?faultstring[^>]*>\s*(.*?)\s*</", re.DOTALL)
+_FAULT = re.compile(rb"<(?:\w+:)?Fault[\s>/]")
+_SHOWN = 160
+
+
+def connect_error(error: OSError, where: str) -> CallError:
+    """What kept a connection from being made."""
+    if isinstance(error, ssl.SSLCertVerificationError):
+        return CallError(
+            "tls",
+            f"{where}: its certificate was not accepted: {error.verify_message or error} "
+            "(is a ca_file missing in the statement?)",
+        )
+    if isinstance(error, ssl.SSLError):
+        return CallError("tls", f"{where}: TLS failed: {error.reason or error} (does the port speak https?)")
+    if isinstance(error, socket.gaierror):
+        return CallError("resolve", f"{where}: the host name does not resolve: {error.strerror}")
+    if isinstance(error, ConnectionRefusedError):
+        return CallError("refused", f"{where}: connection refused: nothing listens there")
+    if isinstance(error, TimeoutError):
+        return CallError("network", f"{where}: no connection within the deadline")
+    return CallError("network", f"{where}: {error.strerror or error}")
+
+
+def answer_error(status: int, location: str | None, body: bytes, expects: bytes) -> CallError | None:
+    """Judge an answer: None when it is what was asked for.
+
+    Args:
+        status: HTTP status.
+        location: the Location header, if any.
+        body: the whole body.
+        expects: octets that a good body holds; empty when any 2xx will do.
+    """
+    if 200 <= status < 300:  # noqa: PLR2004 -- RFC 9110 section 15.3: success
+        if expects not in body:
+            return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {shown(body)}")
+        return None
+    if 300 <= status < 400:  # noqa: PLR2004 -- RFC 9110 section 15.4: redirection
+        return CallError("redirect", f"status {status} to {location!r}: give that address as the endpoint")
+    if _FAULT.search(body):
+        found = _FAULT_STRING.search(body)
+        reason = found.group(1).decode("utf-8", "replace")[:_SHOWN] if found else shown(body)
+        return CallError("fault", f"status {status}, SOAP fault: {reason}")
+    hint = " (a token is needed: --token-file)" if status in {401, 403} else ""
+    return CallError("status", f"status {status}{hint}: {shown(body)}")
+
+
+def shown(body: bytes) -> str:
+    """The beginning of a body, for a message."""
+    text = body[:_SHOWN].decode("utf-8", "replace")
+    return (text + " …" if len(body) > _SHOWN else text) or "(no body)"

@@ -1,0 +1,211 @@
+"""What a run does when: segments of one client on one interface, a schedule that the seed fixes.
+
+A fair duel: REST and SOAP take turns in blocks of a tenth of a second or more, in quartets REST-SOAP-SOAP-REST
+or the reverse by lot (ABBA), so that a drift of the machine or the robot meets both alike. In every fifth
+quartet one interface meets itself under two names (A/A): what difference that shows is noise. The ordinary
+clients get quartets of their own, for their CPU time would delay the wire client's starts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+INTERFACES = ("rest", "soap")
+CLIENTS = ("wire", "zeep")
+OPERATIONS = ("delivery", "coffee", "pose")
+MOVES = frozenset({"delivery", "coffee"})
+
+#: The ordinary clients' rate for each worker: a call costs some 1.5 ms of the generator's time, and a generator
+#: that is busy for more than a fraction of it measures itself.
+ORDINARY_RATE = 100.0
+GAP_S = 0.010
+_BLOCK_S = 0.1
+_MAX_BLOCKS = 600  # bounds memory: each block keeps its own histograms
+_ARRIVALS_PER_BLOCK = 10
+_QUARTET = 4
+_LISTS = frozenset({"operations", "interfaces", "clients"})
+_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A stretch of time in which one client calls one interface.
+
+    Attributes:
+        start_ns, end_ns: offsets from the run's start.
+        phase: `warmup`, `duel`, `aa` or `step`.
+        label: in phase `aa` the name that the interface goes by, `a` or `b`.
+        pair: neighbours that are compared share a number.
+        rate: arrivals per second over all workers; 0 in the closed model.
+    """
+
+    start_ns: int
+    end_ns: int
+    phase: str
+    interface: str
+    client: str
+    label: str
+    pair: int
+    rate: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything that fixes a run. Workers rebuild the same plan from `as_message`.
+
+    Attributes:
+        offers: operation numbers by `interface/client`, where not all are offered.
+        first_segment: numbers the segments on from those of the plan before it.
+        step_rate: a step of the stepped load instead of a duel: arrivals per second.
+    """
+
+    operations: tuple[str, ...]
+    interfaces: tuple[str, ...]
+    clients: tuple[str, ...]
+    rate: float | None
+    users: int | None
+    duration_s: float
+    warmup_s: float
+    arrivals: str
+    seed: int
+    timeout_s: float
+    workers: int
+    connections: int
+    offers: dict[str, list[int]] = field(default_factory=dict)
+    step_rate: float | None = None
+    first_segment: int = 0
+    settle_s: float = field(default=0.5)
+
+    def as_message(self) -> dict[str, Any]:
+        """A form that msgpack carries."""
+        return asdict(self)
+
+    @classmethod
+    def from_message(cls, message: dict[str, Any]) -> Plan:
+        """Read what `as_message` wrote."""
+        fields: dict[str, Any] = {key: tuple(value) if key in _LISTS else value for key, value in message.items()}
+        return cls(**fields)
+
+    def offered(self, interface: str, client: str) -> tuple[int, ...]:
+        """The operations that a client can call over an interface, by number."""
+        found = self.offers.get(f"{interface}/{client}")
+        return tuple(range(len(self.operations))) if found is None else tuple(found)
+
+    @property
+    def open_model(self) -> bool:
+        """Requests start at their times, whether or not earlier ones have come back."""
+        return self.users is None or self.step_rate is not None
+
+    @cached_property
+    def blocks(self) -> int:
+        """How many blocks the duel has: whole quartets, or two where there is no time for four."""
+        least = max(_BLOCK_S, self.duration_s / _MAX_BLOCKS)
+        if self.rate:
+            least = max(least, _ARRIVALS_PER_BLOCK / self.rate)
+        blocks = int(self.duration_s / least + 1e-9)
+        return blocks - blocks % _QUARTET if blocks >= _QUARTET else 2
+
+    @property
+    def block_s(self) -> float:
+        """Length of a block."""
+        return self.duration_s / self.blocks
+
+    def rate_of(self, client: str) -> float:
+        """Arrivals per second over all workers while a client has its turn."""
+        rate = self.rate or 0.0
+        return rate if client == "wire" else min(rate, ORDINARY_RATE * self.workers)
+
+    @cached_property
+    def segments(self) -> list[Segment]:
+        """All segments in order; their numbers begin at `first_segment`."""
+        return self._steps() if self.step_rate is not None else [*self._warmup(), *self._duel()]
+
+    @cached_property
+    def length_s(self) -> float:
+        """From start to end."""
+        return self.segments[-1].end_ns / _NS if self.segments else 0.0
+
+    def _warmup(self) -> list[Segment]:
+        turns = [(client, interface) for client in self.clients for interface in self.interfaces]
+        if self.warmup_s <= 0:
+            return []
+        count = max(len(turns), round(self.warmup_s / _BLOCK_S))
+        made = []
+        for index in range(count):
+            client, interface = turns[index % len(turns)]
+            start, end = (int(self.warmup_s * edge / count * _NS) for edge in (index, index + 1))
+            made.append(Segment(start, end, "warmup", interface, client, "", -1, self.rate_of(client)))
+        return made
+
+    def _duel(self) -> list[Segment]:
+        lot = np.random.default_rng([self.seed, 1])
+        made: list[Segment] = []
+        for quartet in range((self.blocks + _QUARTET - 1) // _QUARTET):
+            made += self._quartet(quartet, bool(lot.integers(2)))
+        origin = self.warmup_s
+        placed = []
+        for index, segment in enumerate(made[: self.blocks]):
+            start, end = (int((origin + self.block_s * edge) * _NS) for edge in (index, index + 1))
+            placed.append(
+                Segment(
+                    start,
+                    end,
+                    segment.phase,
+                    segment.interface,
+                    segment.client,
+                    segment.label,
+                    index // 2,
+                    segment.rate,
+                )
+            )
+        return placed
+
+    def _quartet(self, number: int, swapped: bool) -> list[Segment]:  # noqa: FBT001 -- private, the lot's outcome
+        """Four blocks. Of five quartets the second goes to the ordinary clients and the fourth to A/A."""
+        turn = number % 5
+        client = self.clients[-1] if turn == 1 else self.clients[0]
+        if turn == 3:  # noqa: PLR2004 -- the fourth of five, as said above
+            interface = self.interfaces[(number // 5) % len(self.interfaces)]
+            sides = [("aa", interface, "a"), ("aa", interface, "b")]
+        else:
+            sides = [("duel", interface, "") for interface in self.interfaces]
+        if swapped:
+            sides.reverse()
+        first, second = sides[0], sides[-1]
+        rate = self.rate_of(client)
+        return [
+            Segment(0, 0, phase, interface, client, label, 0, rate)
+            for phase, interface, label in (first, second, second, first)
+        ]
+
+    def _steps(self) -> list[Segment]:
+        """One step of the stepped load: each interface for `duration_s`, with quiet between to drain what piled up."""
+        made = []
+        at = 0.0
+        for interface in self.interfaces:
+            pieces = max(1, round(self.duration_s / 0.5))
+            for piece in range(pieces):
+                start, end = (int((at + self.duration_s * edge / pieces) * _NS) for edge in (piece, piece + 1))
+                made.append(Segment(start, end, "step", interface, "wire", "", -1, float(self.step_rate or 0.0)))
+            at += self.duration_s + self.settle_s
+        return made
+
+    def series_of(self) -> dict[int, int]:
+        """The series number of each segment."""
+        return {
+            self.first_segment + index: SERIES.index((segment.phase, segment.interface, segment.client))
+            for index, segment in enumerate(self.segments)
+        }
+
+
+#: Every series that there can be: (phase, interface, client). Their numbers are the same in all plans and workers.
+SERIES = [
+    (phase, interface, client)
+    for phase in ("warmup", "duel", "aa", "step")
+    for interface in INTERFACES
+    for client in CLIENTS
+]

@@ -1,0 +1,49 @@
+"""Writing a result: latency.json and one .hgrm file for each series, each in one piece or not at all."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hdrh.histogram import HdrHistogram
+
+FORMAT = "roaas-latency/1"
+_TICKS = 5  # percentiles reported for each halving of the distance to 100 %
+_US_PER_MS = 1000.0
+
+
+def write(folder: Path, result: dict[str, Any]) -> Path:
+    """Write everything into a folder, which is made if need be; returns latency.json's path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for series in result["series"]:
+        stem = f"{series['operation']}-{series['interface']}-{series['client']}"
+        for time, key in (("service", "histogram"), ("response", "response_histogram")):
+            _replace(folder / f"{stem}-{time}.hgrm", percentile_distribution(series[key]))
+    path = folder / "latency.json"
+    _replace(path, json.dumps(result, indent=1, allow_nan=False) + "\n")
+    return path
+
+
+def _replace(path: Path, text: str) -> None:
+    """Put a file in place at once: a reader sees the old one or the new one, whole."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def percentile_distribution(encoded: str) -> str:
+    """HdrHistogram's percentile distribution as text, in milliseconds: what its plotter reads."""
+    histogram = HdrHistogram.decode(encoded)
+    text = io.BytesIO()
+    histogram.output_percentile_distribution(text, _US_PER_MS, _TICKS)
+    return text.getvalue().decode("ascii")

@@ -1,0 +1,42 @@
+"""What a run has to say in the end, for the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def _ms(value: float | None) -> str:
+    return "       -" if value is None else f"{value:8.3f}"
+
+
+def final_words(document: dict[str, Any]) -> str:
+    """A table of the series, the comparisons of medians, thresholds, and whether it is worth anything."""
+    lines = ["operation  interface  client     count  errors  service p50      p90      p99  response p99   (ms)"]
+    for entry in document["series"]:
+        service, response = entry["service_ms"], entry["response_ms"]
+        lines.append(
+            f"{entry['operation']:10} {entry['interface']:10} {entry['client']:6} {entry['count']:9} "
+            f"{entry['errors']:7}     {_ms(service['p50'])} {_ms(service['p90'])} {_ms(service['p99'])}      "
+            f"{_ms(response['p99'])}"
+        )
+    for entry in document["comparisons"]:
+        if entry["quantile"] == "p50" and entry["ratio"] is not None:
+            interval = entry["ci95"]
+            between = f" (95 %: {interval[0]:.3f} to {interval[1]:.3f})" if interval else ""
+            lines.append(
+                f"{entry['operation']} ({entry['client']}): SOAP takes {entry['ratio']:.3f}{between} times as long "
+                f"as REST at the median, {entry['soap_minus_rest_ms']:+.3f} ms"
+            )
+    for entry in document["knee"]:
+        highest = entry["highest_rate"]
+        reached = (
+            "no rate offered meets" if highest is None else f"{highest:g}/s is the highest rate offered that meets"
+        )
+        lines.append(f"{entry['interface']}: {reached}: {entry['criterion']}")
+    for entry in document["thresholds"]:
+        reason = f": {entry['reason']}" if entry["reason"] else ""
+        lines.append(f"threshold {entry['outcome']}: {entry['name']}{reason}")
+    lines += [f"{entry['count']} errors ({entry['kind']}): {entry['message']}" for entry in document["errors"][:5]]
+    lines += [f"note: {note}" for note in document["notes"]]
+    lines += [f"not valid: {reason}" for reason in document["invalid_because"]]
+    return "\n".join(lines) + "\n"
