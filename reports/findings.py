@@ -141,14 +141,17 @@ def _stalled(result: Mapping[str, Any]) -> list[str]:
 
 
 def _knees(result: Mapping[str, Any]) -> list[str]:
-    told = []
+    told: list[str] = []
+    explained: set[str] = set()
     for knee in result.get("knee", []):
         name = knee["interface"].upper()
-        criterion = f"({knee['criterion']})"
+        # One criterion serves both interfaces, as a rule: it is told once.
+        criterion = "" if knee["criterion"] in explained else f" ({knee['criterion']})"
+        explained.add(knee["criterion"])
         if knee["highest_rate"] is None:
-            told.append(f"{name} met the criterion at no offered rate {criterion}.")
+            told.append(f"{name} met the criterion at no offered rate{criterion}.")
             continue
-        sentence = f"{name} holds up to {rate(knee['highest_rate'])} requests/s {criterion}"
+        sentence = f"{name} holds up to {rate(knee['highest_rate'])} requests/s{criterion}"
         missed = knee.get("first_rate_missed")
         if missed is None:
             told.append(f"{sentence}, the highest rate offered: the knee lies above it.")

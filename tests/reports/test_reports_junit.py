@@ -33,12 +33,12 @@ def test_one_suite_for_each_class_and_one_case_for_each_requirement(result):
 @pytest.mark.parametrize(
     ("name", "outcome"),
     [
-        ("rest.pose.type", None),
-        ("http.put-with-media-type", None),
-        ("rest.goal.delete-then-404", "failure"),
-        ("xml.still-responsive", "error"),
-        ("rest.velocity.converges", "skipped"),
-        ("safety.watchdog", "skipped"),
+        ("rest-resources/pose-type", None),
+        ("http/put-with-media-type", None),
+        ("rest-resources/goal-delete-then-404", "failure"),
+        ("xml-security/still-responsive", "error"),
+        ("rest-resources/velocity-converges", "skipped"),
+        ("safety/watchdog", "skipped"),
     ],
 )
 def test_verdicts(result, name, outcome):
@@ -58,14 +58,14 @@ def test_counts_are_those_of_the_cases(result):
 
 
 def test_failure_tells_how_to_see_it_again(result):
-    failure = case(parsed(result), "strict.soap.lexical").find("failure")
+    failure = case(parsed(result), "strict-input/soap-lexical").find("failure")
     assert failure.get("message") == "message_code 'abc' was accepted with 200. (and 1 more findings)"
     for wanted in ("expected: HTTP 500", "send it again: curl ", "answered 200 after 2.3 ms", "no response within 5 s"):
         assert wanted in failure.text
 
 
 def test_warning_breaks_no_build_and_is_told(result):
-    assert "WARNING: PUT" in case(parsed(result), "http.put-with-media-type").findtext("system-out")
+    assert "WARNING: PUT" in case(parsed(result), "http/put-with-media-type").findtext("system-out")
 
 
 def test_class_that_failed_without_a_failing_requirement_is_red(result):
@@ -85,9 +85,9 @@ def test_nothing_judged_is_an_error(result):
 
 
 def test_expected_failure_is_skipped(result):
-    requirement = next(r for r in result["requirements"] if r["id"] == "rest.goal.delete-then-404")
+    requirement = next(r for r in result["requirements"] if r["id"] == "rest-resources/goal-delete-then-404")
     requirement["expected_failure"] = {"reason": "known since 2.3"}
-    element = case(parsed(result), "rest.goal.delete-then-404")
+    element = case(parsed(result), "rest-resources/goal-delete-then-404")
     assert element.find("skipped").get("message") == "Expected by the baseline: known since 2.3"
     assert element.find("failure") is None
 
