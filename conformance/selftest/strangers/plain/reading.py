@@ -1,0 +1,257 @@
+"""Input: JSON and XML into plain values, checked against a shape; what does not fit is refused by name and value."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass, field
+from typing import Any
+from xml.parsers import expat
+
+NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+# XML Schema's double may also end in a point.
+_DOUBLE = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
+_DEEPEST, _MOST_ATTRIBUTES, _LONGEST_NAME = 60, 60, 1000
+_INT32 = 2**31
+_XSI = "http://www.w3.org/2001/XMLSchema-instance"
+_HARMLESS = {f"{_XSI} {name}" for name in ("type", "schemaLocation", "noNamespaceSchemaLocation")}
+_TIME = {"sec": "int32", "nanosec": "uint32"}
+_HEADER = {"stamp?": _TIME, "frame_id": "string"}
+VECTOR3 = {"x": "double", "y": "double", "z": "double"}
+TWIST = {"linear": VECTOR3, "angular": VECTOR3}
+_POSE = {"position": VECTOR3, "orientation": {**VECTOR3, "w": "double"}}
+GOAL = {
+    "header?": _HEADER,
+    "goal_id?": {"stamp?": _TIME, "id": "id"},
+    "goal": {"target_pose": {"header": _HEADER, "pose": _POSE}},
+}
+DELIVERY = {
+    "depot_x": "double",
+    "depot_y": "double",
+    "destination_x": "double",
+    "destination_y": "double",
+    "message_code": "int32",
+    "source_x": "double",
+    "source_y": "double",
+}
+PLAN = {
+    "x": "double",
+    "y": "double",
+    "yaw?": "double",
+    "frame_id?": "string",
+    "tolerance?": "double",
+    "start_x?": "double",
+    "start_y?": "double",
+    "start_yaw?": "double",
+}
+
+
+class RefusedError(Exception):
+    """Input that is not taken.
+
+    Args:
+        status: what HTTP says of it.
+        detail: names the offending field and value.
+    """
+
+    def __init__(self, status: int, detail: str) -> None:
+        super().__init__(detail)
+        self.status = status
+
+
+@dataclass
+class Element:
+    """An XML element; a name is ``namespace local`` or ``local``."""
+
+    name: str
+    attributes: dict[str, str]
+    children: list[Element] = field(default_factory=list)
+    text: str = ""
+
+    @property
+    def namespace(self) -> str:
+        """Its namespace, empty where it has none."""
+        return self.name.rpartition(" ")[0]
+
+    @property
+    def local(self) -> str:
+        """Its name without the namespace."""
+        return self.name.rpartition(" ")[2]
+
+
+class UnsafeError(RefusedError):
+    """XML that is dangerous rather than wrong."""
+
+
+class MalformedError(RefusedError):
+    """No XML at all."""
+
+
+def parse_xml(body: bytes) -> Element:
+    """Read a document without any Document Type Declaration, entity, processing instruction or excess.
+
+    Raises:
+        MalformedError, UnsafeError: see there.
+    """
+    parser = expat.ParserCreate(namespace_separator=" ")
+    parser.buffer_text = True
+    top = Element("", {})
+    stack = [top]
+
+    def begin(name: str, attributes: dict[str, str]) -> None:
+        if len(stack) > _DEEPEST or len(attributes) > _MOST_ATTRIBUTES or len(name) > _LONGEST_NAME:
+            raise UnsafeError(422, "XML that is too deep, too long in a name or too rich in attributes")
+        element = Element(name, attributes)
+        stack[-1].children.append(element)
+        stack.append(element)
+
+    def end(_name: str) -> None:
+        stack.pop()
+
+    def text(data: str) -> None:
+        stack[-1].text += data
+
+    def unsafe(*_: object) -> None:
+        raise UnsafeError(422, "a Document Type Declaration or processing instruction")
+
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = begin, end, text
+    parser.StartDoctypeDeclHandler = unsafe
+    parser.ProcessingInstructionHandler = unsafe
+    try:
+        parser.Parse(body, True)  # noqa: FBT003 - the whole document at once
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise MalformedError(400, f"no XML: {error}") from None
+    return top.children[0]
+
+
+def parse_json(body: bytes) -> Any:
+    """Read JSON strictly (RFC 8259).
+
+    Raises:
+        RefusedError: it is none, or has a name twice.
+    """
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for name, value in pairs:
+            if name in found:
+                raise RefusedError(422, f"{name}: there twice, again with {_shown(value)}")
+            found[name] = value
+        return found
+
+    def none(text: str) -> Any:
+        raise RefusedError(400, f"no JSON: {text}")
+
+    try:
+        return json.loads(body.decode("utf-8"), object_pairs_hook=once, parse_constant=none)
+    except (ValueError, RecursionError) as error:
+        raise RefusedError(400, f"no JSON: {error}") from None
+
+
+def _shown(value: Any) -> str:
+    try:
+        return json.dumps(value)[:200]
+    except (ValueError, RecursionError):
+        return "a value that is too large to be shown"
+
+
+def fit(value: Any, shape: Any, path: str = "") -> Any:
+    """Fit a JSON value to a shape: a dict of fields (``?`` marks those that may be left out) or a simple type's name.
+
+    Raises:
+        RefusedError: it does not fit.
+    """
+    if isinstance(shape, dict):
+        if not isinstance(value, dict):
+            raise RefusedError(422, f"{path or 'body'}: {_shown(value)} is no object")
+        names = {name.rstrip("?"): (name.endswith("?"), part) for name, part in shape.items()}
+        for name in value:
+            if name not in names:
+                raise RefusedError(422, f"{_joined(path, name)}: unknown field, with {_shown(value[name])}")
+        for name, (optional, _) in names.items():
+            if name not in value and not optional:
+                raise RefusedError(422, f"{_joined(path, name)}: missing in {_shown(value)}")
+        return {name: fit(value[name], part, _joined(path, name)) for name, (_, part) in names.items() if name in value}
+    return _simple(value, shape, path)
+
+
+def _simple(value: Any, type_: str, path: str) -> Any:
+    wrong = RefusedError(422, f"{path}: {_shown(value)} is no {type_}")
+    if type_ in {"string", "id"}:
+        if not isinstance(value, str) or any("\ud800" <= char <= "\udfff" for char in value):
+            raise wrong
+        if type_ == "id" and not 0 < len(value) <= 255:  # noqa: PLR2004 - contract
+            raise wrong
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise wrong
+    if type_ == "double":
+        try:
+            number = float(value)
+        except OverflowError:
+            raise wrong from None
+        if not math.isfinite(number):
+            raise RefusedError(422, f"{path}: {value!r} is not finite")
+        return number
+    low, high = (-_INT32, _INT32) if type_ == "int32" else (0, 2 * _INT32)
+    if value != int(value) or not low <= value < high:
+        raise wrong
+    return int(value)
+
+
+def fit_element(  # noqa: C901 - one rule after another
+    element: Element, shape: Any, path: str, *, ordered: bool
+) -> Any:
+    """Fit an XML element's content to a shape, as fit() does; ``ordered`` asks for a sequence as XML Schema has it.
+
+    Raises:
+        RefusedError: it does not fit.
+    """
+    for name, value in element.attributes.items():
+        if name not in _HARMLESS:
+            raise RefusedError(422, f"{path}: attribute {name!r} with {value[:100]!r} is not known")
+    if not isinstance(shape, dict):
+        if element.children:
+            raise RefusedError(422, f"{path}: {element.children[0].name!r} stands where text should")
+        text = element.text
+        if shape in {"string", "id"}:
+            return _simple(text, shape, path)
+        return _simple(number(text.strip(" \t\r\n"), path, integer=shape != "double", pattern=_DOUBLE), shape, path)
+    if element.text.strip():
+        raise RefusedError(422, f"{path}: text {element.text.strip()[:100]!r} between elements")
+    found: dict[str, Any] = {}
+    names = {name.rstrip("?"): (name.endswith("?"), part) for name, part in shape.items()}
+    for child in element.children:
+        where = _joined(path, child.name)
+        if child.name not in names:
+            raise RefusedError(422, f"{where}: unknown element, with {child.text.strip()[:100]!r}")
+        if child.name in found:
+            raise RefusedError(422, f"{where}: there twice, again with {child.text.strip()[:100]!r}")
+        if ordered and found and list(names).index(child.name) < list(names).index(list(found)[-1]):
+            raise RefusedError(422, f"{where}: in the wrong place, with {child.text.strip()[:100]!r}")
+        found[child.name] = fit_element(child, names[child.name][1], where, ordered=ordered)
+    for name, (optional, _) in names.items():
+        if name not in found and not optional:
+            raise RefusedError(422, f"{_joined(path, name)}: missing in {element.local!r}")
+    return found
+
+
+def number(text: str, name: str, *, integer: bool = False, pattern: re.Pattern[str] = NUMBER) -> float | int:
+    """A number written as text.
+
+    Raises:
+        RefusedError: it is none, or not finite.
+    """
+    if integer:
+        if not _INTEGER.fullmatch(text) or len(text) > 200:  # noqa: PLR2004 - no int has that many digits
+            raise RefusedError(422, f"{name}: {text[:200]!r} is no integer")
+        return int(text)
+    if not pattern.fullmatch(text) or not math.isfinite(float(text)):
+        raise RefusedError(422, f"{name}: {text[:200]!r} is no finite number")
+    return float(text)
+
+
+def _joined(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name

@@ -1,0 +1,120 @@
+"""HTTP/1.0 on http.server, one thread and one connection for each request."""
+
+from __future__ import annotations
+
+import json
+import threading
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from email.message import Message
+
+MAX_BODY = 256 * 1024
+MAX_TARGET = 8000
+
+
+@dataclass
+class Answer:
+    """What to answer: a status, a body with its media type, further header fields."""
+
+    status: int
+    body: bytes = b""
+    media_type: str = ""
+    fields: dict[str, str] = field(default_factory=dict)
+
+
+class Application(Protocol):
+    """What answers requests."""
+
+    def answer(self, method: str, target: str, headers: Message, body: bytes) -> Answer:
+        """Answer one request."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.0"
+    timeout = 20
+    application: Application
+
+    def __getattr__(self, name: str) -> Any:
+        # http.server looks for do_METHOD: every method is this application's affair.
+        if name.startswith("do_"):
+            return self._do
+        raise AttributeError(name)
+
+    def _do(self) -> None:
+        refusal = self._refusal()
+        if refusal:
+            self.close_connection = True
+            self.send_error(*refusal)
+            return
+        length = int(self.headers.get("Content-Length") or 0)
+        body = self.rfile.read(length)
+        if len(body) < length:
+            return  # the client has gone in the middle of its request: nothing is done
+        answer = self.application.answer(self.command, self.path, self.headers, body)
+        self._send(answer)
+
+    def _refusal(self) -> tuple[int, str] | None:
+        """Why the request's head is not good enough (RFC 9112 3.2, 6.1, 6.3)."""
+        hosts = self.headers.get_all("Host") or []
+        lengths = set(self.headers.get_all("Content-Length") or [])
+        if len(hosts) > 1 or (not hosts and self.request_version != "HTTP/1.0"):
+            return 400, f"Host is there {len(hosts)} times"
+        if len(lengths) > 1 or any(not (text.isascii() and text.isdigit()) for text in lengths):
+            return 400, "Content-Length is not one number"
+        if "Transfer-Encoding" in self.headers:
+            return (400, "Content-Length beside Transfer-Encoding") if lengths else (411, "send Content-Length")
+        if len(self.path) > MAX_TARGET:
+            return 414, f"a target of {len(self.path)} octets"
+        if lengths and int(lengths.pop()) > MAX_BODY:
+            return 413, f"more than {MAX_BODY} octets"
+        return None
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Answer what http.server itself, or the head's check, refuses."""
+        self.request_version = "HTTP/1.0"  # a line that could not be read counts as HTTP/0.9, which has no status
+        document = {"status": int(code), "detail": message or explain or "refused"}
+        if not hasattr(self, "headers"):
+            self.command = "GET"
+        self._send(Answer(int(code), json.dumps(document).encode(), "application/problem+json"))
+
+    def _send(self, answer: Answer) -> None:
+        self.send_response(answer.status)
+        for name, value in answer.fields.items():
+            self.send_header(name, value)
+        if answer.media_type:
+            self.send_header("Content-Type", answer.media_type)
+        if answer.status != 204:  # noqa: PLR2004 - 204 has no body and no length (RFC 9110 8.6)
+            self.send_header("Content-Length", str(len(answer.body)))
+        self.send_header("Connection", "close")
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(answer.body)
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - http.server's own name
+        """Say nothing."""
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    request_queue_size = 128
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A connection that broke is the client's affair."""
+
+
+def start(application: Application, port: int) -> tuple[str, Callable[[], None]]:
+    """Serve an application on loopback. Returns its URL and what stops it."""
+    handler = type("Handler", (_Handler,), {"application": application})
+    server = _Server(("127.0.0.1", port), handler)
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
+    thread.start()
+
+    def stop() -> None:
+        server.shutdown()
+        server.server_close()
+
+    return f"http://127.0.0.1:{server.server_port}", stop
