@@ -1,0 +1,159 @@
+"""Messages that break a schema in one named way each.
+
+A mutation is a candidate only. Whether the message really is invalid is for both validators to say (see invalid_ones).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+from conformance.soap import lexical
+from conformance.soap.envelope import parse
+from conformance.soap.messages import declarations, sequences, simple_leaves, with_text
+from conformance.soap.names import XSI, clark, local, namespace
+from conformance.soap.node import Node
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from conformance.soap.schema import Types
+    from conformance.soap.shapes import Element
+
+STRANGE: Final = "urn:example:strange"
+_NOBODY: Final = "no_such_element"
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A message with one thing wrong.
+
+    Attributes:
+        kind: missing, unknown, duplicate, order, namespace, lexical, range, nil, non-finite or body.
+        what: what was done, naming the element.
+        payload: the children of the Body.
+        reason: why the validators refuse it; empty where no schema can (kinds non-finite and body).
+    """
+
+    kind: str
+    what: str
+    payload: tuple[Node, ...]
+    reason: str = ""
+
+
+def invalid_ones(mutants: Iterable[Mutant], types: Types) -> Iterator[Mutant]:
+    """Those that both validators refuse; and those that break a rule beyond the schema, which they cannot judge."""
+    for mutant in mutants:
+        if mutant.kind in {"body", "non-finite"}:
+            yield mutant
+            continue
+        reason = types.invalid(parse(mutant.payload[0].written()))
+        if reason:
+            yield replace(mutant, reason=reason)
+
+
+def mutants(element: Element, base: Node) -> Iterator[Mutant]:
+    """All single mutations of a valid message.
+
+    Args:
+        element: declaration of the Body's child.
+        base: a valid one.
+    """
+    for make in (_missing, _unknown, _duplicate, _order, _namespace, _values, _nil, _body):
+        yield from make(element, base)
+
+
+def _missing(element: Element, base: Node) -> Iterator[Mutant]:
+    for path, declared in declarations(element, base):
+        if declared.minimum > 0:
+            yield Mutant("missing", f"{local(declared.tag)} dropped", (base.changed(path, lambda _: ()),))
+
+
+def _unknown(element: Element, base: Node) -> Iterator[Mutant]:
+    for path in sequences(element, base):
+        parent = base.at(path)
+        for where, position in (("first", 0), ("last", len(parent.children))):
+            for space in ("", namespace(base.tag), STRANGE):
+                extra = Node(clark(space, _NOBODY), "1")
+                children = (*parent.children[:position], extra, *parent.children[position:])
+                changed = replace(parent, children=children)
+                made = base.changed(path, lambda _, new=changed: (new,)) if path else changed  # type: ignore[misc] # a default argument binds the loop's value
+                yield Mutant("unknown", f"{extra.tag} {where} in {parent.name}", (made,))
+
+
+def _duplicate(element: Element, base: Node) -> Iterator[Mutant]:
+    for path, declared in declarations(element, base):
+        if declared.maximum is not None:
+            yield Mutant(
+                "duplicate",
+                f"{local(declared.tag)} twice",
+                (base.changed(path, lambda node: (node, node)),),
+            )
+
+
+def _order(element: Element, base: Node) -> Iterator[Mutant]:
+    for path in sequences(element, base):
+        parent = base.at(path)
+        children = parent.children
+        orders = [("reversed", children[::-1])]
+        orders += [
+            (
+                f"{children[index].name} after {children[index + 1].name}",
+                (*children[:index], children[index + 1], children[index], *children[index + 2 :]),
+            )
+            for index in range(len(children) - 1)
+        ]
+        for what, order in orders:
+            if [child.tag for child in order] == [child.tag for child in children]:
+                continue
+            changed = replace(parent, children=tuple(order))
+            made = base.changed(path, lambda _, new=changed: (new,)) if path else changed  # type: ignore[misc] # as above
+            yield Mutant("order", f"children of {parent.name}: {what}", (made,))
+
+
+def _namespace(element: Element, base: Node) -> Iterator[Mutant]:
+    own = namespace(base.tag)
+    for space in ("", STRANGE):
+        yield Mutant(
+            "namespace", f"{base.name} in {space or 'no'} namespace", (replace(base, tag=clark(space, base.name)),)
+        )
+    for path, declared in declarations(element, base):
+        for space in ("", own, STRANGE):
+            tag = clark(space, local(declared.tag))
+            if tag != declared.tag:
+                yield Mutant(
+                    "namespace",
+                    f"{local(declared.tag)} in {space or 'no'} namespace",
+                    (base.changed(path, lambda node, new=tag: (replace(node, tag=new),)),),  # type: ignore[misc] # as above
+                )
+
+
+def _values(element: Element, base: Node) -> Iterator[Mutant]:
+    for path, simple in simple_leaves(element, base):
+        name = base.at(path).name
+        for text in lexical.unreadable(simple):
+            yield Mutant("lexical", f"{name} is {text!r}", (with_text(base, path, text),))
+        for text in lexical.outside(simple):
+            yield Mutant("range", f"{name} is {text}", (with_text(base, path, text),))
+        if simple.builtin in lexical.FLOATS:
+            for text in lexical.NON_FINITE:
+                yield Mutant("non-finite", f"{name} is {text}", (with_text(base, path, text),))
+
+
+def _nil(element: Element, base: Node) -> Iterator[Mutant]:
+    nil = (clark(XSI, "nil"), "true")
+    for path, declared in declarations(element, base):
+        if not declared.nillable:
+            empty = Node(declared.tag, "", (), (nil,))
+            yield Mutant(
+                "nil",
+                f"{local(declared.tag)} is xsi:nil",
+                (base.changed(path, lambda _, new=empty: (new,)),),  # type: ignore[misc] # as above
+            )
+
+
+def _body(_element: Element, base: Node) -> Iterator[Mutant]:
+    yield Mutant("body", "the Body is empty", ())
+    yield Mutant("body", f"{base.name} stands twice in the Body", (base, base))
+    yield Mutant("body", "a strange element stands beside it in the Body", (base, Node(clark(STRANGE, _NOBODY))))
+    yield Mutant("body", "a strange element stands before it in the Body", (Node(clark(STRANGE, _NOBODY)), base))
