@@ -19,6 +19,7 @@ from conformance.target.http import Connection, HttpClient, NoAnswerError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from conformance.soap.node import Node
     from conformance.target.exchange import Exchange
 
 MEDIA_TYPE = "text/xml; charset=utf-8"
@@ -40,6 +41,7 @@ class SoapService:
         wsdl_exchange: the request for it, where it was fetched.
         contract_wsdl_path: the contract's WSDL of this service, or None.
         address: what the WSDL says where the service is, or None.
+        examples: messages that the robot takes, by operation (see baseline).
     """
 
     name: str
@@ -51,6 +53,7 @@ class SoapService:
     wsdl_exchange: Exchange | None = None
     contract_wsdl_path: Path | None = None
     address: str | None = None
+    examples: dict[str, Node | None] = field(default_factory=dict, repr=False)
     _own_read: tuple[Description | None, str] | None = field(default=None, init=False, repr=False)
 
     @property

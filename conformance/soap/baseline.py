@@ -1,0 +1,86 @@
+"""Messages that a robot takes: what mutations start from, and what shows that it still answers.
+
+A contract may limit values beyond its schema. So a message is not believed to be valid before the robot has taken it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from conformance.soap import paper
+from conformance.soap.asking import call
+from conformance.soap.lexical import FLOATS, INTEGERS, bounds
+from conformance.soap.messages import ordinary, simple_leaves, with_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conformance.soap.description import Operation
+    from conformance.soap.node import Node
+    from conformance.soap.service import SoapService
+    from conformance.soap.shapes import Element
+
+# Whole numbers tried where a contract takes only some, such as codes.
+_NUMBERS: Final = (0, 1, 2, 3, 4, 5)
+
+
+def example(service: SoapService, operation: Operation) -> Node | None:
+    """A message that the robot takes for the operation, found once; None where it takes none of those tried.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+        DescriptionError: the contract cannot be used.
+    """
+    if operation.name not in service.examples:
+        service.examples[operation.name] = _found(service, operation)
+    return service.examples[operation.name]
+
+
+def _found(service: SoapService, operation: Operation) -> Node | None:
+    declared = service.contract.shape(operation.request) if operation.request else None
+    if declared is None:
+        return None
+    tried: set[bytes] = set()
+    for candidate in _candidates(service, operation, declared):
+        document = candidate.written()
+        if document not in tried and call(service, candidate).taken:
+            return candidate
+        tried.add(document)
+    return None
+
+
+def _candidates(service: SoapService, operation: Operation, declared: Element) -> Iterator[Node]:
+    if service.contract.target_namespace == paper.NAMESPACE:
+        yield from paper.examples(service, operation)
+    for optional in (False, True):
+        yield ordinary(declared, optional=optional)
+    full = ordinary(declared, optional=True)
+    for number in _NUMBERS:
+        made = full
+        for path, simple in simple_leaves(declared, full):
+            if simple.builtin in FLOATS and not simple.enumeration:
+                made = with_text(made, path, f"{number}.0")
+            elif simple.builtin in INTEGERS and not simple.enumeration:
+                low, high = bounds(simple)
+                made = with_text(made, path, str(min(max(number, low), high)))
+        yield made
+
+
+def quiet_example(service: SoapService) -> tuple[Operation, Node] | None:
+    """The first operation of the service with a message that the robot takes; None where there is none.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+        DescriptionError: the contract cannot be used.
+    """
+    # The operation that asks for least is the one that is least likely to be refused.
+    for operation in sorted(service.contract.operations, key=lambda item: _size(service, item)):
+        message = example(service, operation)
+        if message is not None:
+            return operation, message
+    return None
+
+
+def _size(service: SoapService, operation: Operation) -> int:
+    declared = service.contract.shape(operation.request) if operation.request else None
+    return len(ordinary(declared, optional=True).paths()) if declared is not None else 1000
