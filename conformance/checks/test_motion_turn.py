@@ -1,0 +1,173 @@
+"""Turning on the spot: renewed, bent into an arc, disturbed by what is refused, and at last left to itself."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from conformance.domain.drive import BusyError, Drive
+from conformance.domain.robot import STILL, Robot, Velocity
+from conformance.target.stillness import bring_to_rest
+
+if TYPE_CHECKING:
+    from conformance.session import Session
+    from conformance.verdict.judge import Judge
+
+pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+# Where no hold time is declared: a velocity is renewed so often, for so long, and has to end within so long, s.
+_RENEW_S: Final = 0.2
+_KEEP_S: Final = 1.5
+_ENDS_S: Final = 10.0
+_LINEAR: Final = slice(0, 3)
+
+
+@pytest.mark.requirement(
+    "rest-resources/velocity-integers",
+    "rest-resources/velocity-converges",
+    "rest-resources/linear-put",
+    "rest-resources/linear-keeps-angular",
+    "rest-resources/pose-rotation",
+    "safety/refused-keeps",
+    "safety/renewal",
+    "safety/hold",
+    "safety/watchdog",
+    "safety/limits-hold",
+)
+def test_turn(roaas: Session, judge: Judge) -> None:
+    """One turn of about three seconds; the robot ends it by itself."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    robot = Robot(roaas)
+    if not robot.actuated(5):
+        pytest.skip("the statement says that the robot cannot turn on the spot")
+    drive = Drive(robot)
+    try:
+        _turn(robot, drive, judge)
+    except BusyError as busy:
+        pytest.skip(str(busy))
+    drive.judge_motion()
+
+
+def _turn(robot: Robot, drive: Drive, judge: Judge) -> None:
+    limit = robot.limits.angular_rad_s
+    # 1 rad/s is the only whole number below the limits of most robots.
+    turning = Velocity(angular_z=1.0 if limit > 1.1 else 0.0)
+    started = time.monotonic()
+    drive.look()
+    if drive.command(turning, integers=True):
+        drive.reach(turning, "rest-resources/velocity-integers", "rest-resources/velocity-converges")
+    if not turning.angular_z:
+        turning = Velocity(angular_z=0.6 * limit)
+        drive.command(turning)
+        drive.reach(turning, "rest-resources/velocity-converges")
+    _refused(robot, drive, judge, turning)
+    if robot.actuated(0):
+        _arc(robot, drive, judge, turning)
+    _renew(robot, drive, judge, turning, started)
+    _let_go(robot, drive, judge, turning)
+
+
+def _refused(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
+    """What is beyond any limit, or not to be actuated, leaves the robot turning as it did."""
+    drive.command(turning)
+    for bad in (Velocity(angular_z=1e4), Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308)):
+        robot.put_velocity(bad)
+    robot.put_linear(Velocity(linear_x=1e3))
+    drive.keep(0.06)
+    velocity, exchange = drive.look()
+    judge.that(
+        "safety/refused-keeps",
+        velocity is not None and robot.near(velocity, turning, 2),
+        exchange,
+        f"the velocity that was there before the refused ones, {turning}",
+        found=str(velocity) if velocity else "",
+        cause="changed",
+    )
+
+
+def _arc(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
+    """A linear part beside the angular one, and away again."""
+    ahead = Velocity(linear_x=0.3 * robot.limits.linear_m_s)
+    drive.command(turning)
+    full = drive.sent
+    if not drive.command_linear(ahead):
+        return
+    drive.reach(ahead, "rest-resources/linear-put", part=_LINEAR)
+    # Whether a PUT of the linear part renews the angular one too is the robot's affair: so in time.
+    hold = robot.limits.hold_s
+    velocity, exchange = drive.look()
+    if hold is not None and time.monotonic() > full + 0.9 * hold:
+        drive.command(turning)
+        drive.command_linear(ahead)
+        velocity, exchange = drive.look()
+    judge.that(
+        "rest-resources/linear-keeps-angular",
+        velocity is not None and robot.near(Velocity(0.0, 0.0, 0.0, *velocity[3:]), turning, 1.5),
+        exchange,
+        f"the angular part as it was before the linear PUT, {turning}",
+        found=str(velocity) if velocity else "",
+        cause="changed",
+    )
+
+
+def _renew(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started: float) -> None:
+    """Keep turning beyond the time at which the first command would have ended."""
+    hold = robot.limits.hold_s
+    until = started + _KEEP_S if hold is None else started + hold + robot.limits.settle_s + 0.1
+    drive.command(turning)
+    drive.reach(turning)
+    while True:
+        if time.monotonic() > drive.answered + (_RENEW_S if hold is None else 0.4 * hold):
+            drive.command(turning)
+        velocity, exchange = drive.look()
+        judge.that(
+            "safety/renewal",
+            velocity is not None and abs(velocity.angular_z) > 0.5 * abs(turning.angular_z),
+            exchange,
+            f"{turning} as long as it is renewed",
+            found=str(velocity) if velocity else "",
+            cause="ended",
+        )
+        if time.monotonic() > until:
+            return
+
+
+def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
+    """No more renewal: the velocity holds for its time, and then ends by itself."""
+    limits = robot.limits
+    if not drive.command(turning):
+        return
+    holds_until = drive.sent + (0.95 * limits.hold_s - 0.02 if limits.hold_s is not None else 0.0)
+    ends_by = drive.answered + (1.1 * limits.hold_s + robot.settle_s if limits.hold_s is not None else _ENDS_S)
+    calm = 0
+    if limits.hold_s is None:
+        judge.note("safety/hold", "no hold time is declared: judged is only that a velocity lasts until it is reached")
+    while True:
+        asked = time.monotonic()
+        velocity, exchange = drive.look()
+        there = velocity is not None and robot.near(velocity, turning, 1.5)
+        if time.monotonic() < holds_until or (limits.hold_s is None and not calm and asked < drive.answered + 0.1):
+            judge.that(
+                "safety/hold",
+                there,
+                exchange,
+                f"{turning} for {limits.hold_s or 0:g} s after the command",
+                found=str(velocity) if velocity else "",
+                cause="ended early",
+            )
+        calm = calm + 1 if velocity is not None and robot.near(velocity, STILL) else 0
+        if calm > 1 or asked > ends_by:
+            break
+    judge.that(
+        "safety/watchdog",
+        calm > 0,
+        exchange,
+        f"rest within {ends_by - drive.answered:.1f} s of a command that is not renewed",
+        found=str(velocity) if velocity else "",
+        cause="goes on",
+    )
+    if not calm:
+        robot.put_velocity(STILL)

@@ -1,0 +1,62 @@
+"""Plane geometry: headings, frames, distances."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class Pose(NamedTuple):
+    """Where something is in the plane: x and y in metres, yaw in radians."""
+
+    x: float
+    y: float
+    yaw: float
+
+    def distance(self, other: Pose) -> float:
+        """How far away another pose is, m."""
+        return math.hypot(other.x - self.x, other.y - self.y)
+
+    def ahead(self, distance: float, turn: float = 0.0) -> Pose:
+        """The pose ``distance`` metres away in the direction of the heading turned by ``turn``, looking there."""
+        yaw = wrapped(self.yaw + turn)
+        return Pose(self.x + distance * math.cos(yaw), self.y + distance * math.sin(yaw), yaw)
+
+    def seen_from(self, frame: Pose) -> Pose:
+        """This pose, given in a frame which lies at ``frame``, in the frame that ``frame`` is given in."""
+        cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
+        return Pose(
+            frame.x + cos * self.x - sin * self.y,
+            frame.y + sin * self.x + cos * self.y,
+            wrapped(self.yaw + frame.yaw),
+        )
+
+
+def wrapped(angle: float) -> float:
+    """The same direction within -pi to pi, rad."""
+    return math.remainder(angle, math.tau)
+
+
+def length_of(quaternion: Mapping[str, Any]) -> float:
+    """The length of a quaternion {x, y, z, w}."""
+    return math.hypot(*(float(quaternion[axis]) for axis in "xyzw"))
+
+
+def yaw_of(quaternion: Mapping[str, Any]) -> float:
+    """The heading that a quaternion of any length gives, rad, counterclockwise from x (REP 103)."""
+    x, y, z, w = (float(quaternion[axis]) for axis in "xyzw")
+    return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
+def quaternion_of(yaw: float, length: float = 1.0) -> dict[str, float]:
+    """The quaternion of a heading, of any length."""
+    return {"x": 0.0, "y": 0.0, "z": length * math.sin(yaw / 2), "w": length * math.cos(yaw / 2)}
+
+
+def pose_of(pose: Mapping[str, Any]) -> Pose:
+    """The plane pose in a geometry_msgs/Pose."""
+    position = pose["position"]
+    return Pose(float(position["x"]), float(position["y"]), yaw_of(pose["orientation"]))

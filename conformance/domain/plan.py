@@ -1,0 +1,103 @@
+"""Asking for plans, and finding poses near the robot that it can reach."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlencode
+
+from conformance.domain.geometry import Pose, pose_of
+from conformance.domain.robot import PLAN
+from conformance.domain.shapes import GET_PLAN, read_as
+
+if TYPE_CHECKING:
+    from conformance.domain.robot import Robot
+    from conformance.target.exchange import Exchange
+
+_TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
+# A way so much longer than the distance goes around something: not what a short drive is for.
+_DETOUR: Final = 1.3
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A nav_msgs/Path.
+
+    Attributes:
+        frames: of the path and of its poses.
+        poses: at least one.
+    """
+
+    frames: frozenset[str]
+    poses: tuple[Pose, ...]
+
+    @property
+    def length(self) -> float:
+        """From the first pose to the last, m."""
+        return sum(one.distance(two) for one, two in itertools.pairwise(self.poses))
+
+    @property
+    def longest_step(self) -> float:
+        """The greatest distance between two poses that follow each other, m."""
+        return max((one.distance(two) for one, two in itertools.pairwise(self.poses)), default=0.0)
+
+
+def plan_of(message: Any) -> Plan:
+    """The plan in a nav_msgs/GetPlan response of the right shape."""
+    path = message["plan"]
+    frames = {path["header"]["frame_id"], *(pose["header"]["frame_id"] for pose in path["poses"])}
+    return Plan(frozenset(frames), tuple(pose_of(pose["pose"]) for pose in path["poses"]))
+
+
+def query(**parameters: float | str | None) -> str:
+    """The target of a plan request; parameters that are None are left out."""
+    given = {
+        name: value if isinstance(value, str) else repr(float(value))
+        for name, value in parameters.items()
+        if value is not None
+    }
+    return f"{PLAN}?{urlencode(given)}"
+
+
+def ask(
+    robot: Robot, goal: Pose, start: Pose | None = None, **more: float | str | None
+) -> tuple[str, Plan | None, Exchange]:
+    """Ask for a plan in the frame of goals.
+
+    Returns:
+        What is wrong with the answer (empty for a plan), the plan, and the evidence.
+    """
+    parameters: dict[str, float | str | None] = {"x": goal.x, "y": goal.y, "yaw": goal.yaw}
+    if start is not None:
+        parameters |= {"start_x": start.x, "start_y": start.y, "start_yaw": start.yaw}
+    parameters |= more
+    if robot.statement.motion.frame != "map":
+        parameters.setdefault("frame_id", robot.statement.motion.frame)
+    exchange = robot.get(query(**parameters))
+    message, problem = read_as(exchange.response, GET_PLAN)
+    return problem, None if problem else plan_of(message), exchange
+
+
+def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list[Pose]:
+    """Poses about ``distance`` metres from the robot, inside the arena, to which the robot says there is a plain way.
+
+    Declared goals come first, where they are about so far away; a distance at which there is nothing is halved once.
+    """
+    found = [
+        pose
+        for pose in itertools.starmap(Pose, robot.statement.motion.goals)
+        if distance / 2 <= here.distance(pose) <= 2 * distance
+    ][:count]
+    for reach in (distance, distance / 2):
+        for turn in _TURNS:
+            if len(found) >= count:
+                return found
+            goal = here.ahead(reach, turn)
+            if not robot.in_arena(goal):
+                continue
+            _, plan, _ = ask(robot, goal)
+            if plan is not None and plan.length <= _DETOUR * here.distance(goal) + 0.1:
+                found.append(goal)
+    return found
