@@ -10,12 +10,14 @@ from typing import Any
 
 from reports.pages import html_page, markdown_page
 
-SHOWN_FAILURES = 10
+SHOWN_FAILURES = 5
 """Findings shown for each requirement; the rest are counted. Result files hold them all."""
 SHOWN_BODY = 3000
 """Characters of a request's or response's body that are shown."""
-SHOWN_CURL = 12_000
+SHOWN_CURL = 8000
 """A longer command (a size attack's) is of no use on a clipboard: it is cut, and the page says so."""
+SHOWN_IDS = 12
+"""Requirements of one reason that are named at once; a longer list is folded, or counted."""
 
 VERDICT_WORDS = {
     "conformant": "Conformant",
@@ -195,4 +197,5 @@ def _values(result: Mapping[str, Any]) -> dict[str, Any]:
         "shown_failures": SHOWN_FAILURES,
         "shown_body": SHOWN_BODY,
         "shown_curl": SHOWN_CURL,
+        "shown_ids": SHOWN_IDS,
     }

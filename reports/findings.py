@@ -46,7 +46,7 @@ def verdict(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
     if outcomes:
         words = "The threshold is met" if len(outcomes) == 1 else f"All {len(outcomes)} thresholds are met"
         return Verdict("good", "✓", words, found)
-    return Verdict("quiet", "✓", "Valid measurement", found)
+    return Verdict("quiet", "✓", _in_short(result), found)
 
 
 def headline(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> str:
@@ -77,6 +77,16 @@ def _leading(result: Mapping[str, Any]) -> Mapping[str, Any] | None:
     usable = [c for c in result["comparisons"] if c["quantile"] == "p50" and c["ci95"] and c["ratio"]]
     order = {"delivery": 0, "pose": 1, "coffee": 2}
     return min(usable, key=lambda c: (c["client"] != "wire", order[c["operation"]]), default=None)
+
+
+def _in_short(result: Mapping[str, Any]) -> str:
+    leading = _leading(result)
+    if leading is None:
+        return "Valid measurement"
+    low, high = leading["ci95"]
+    if low <= 1 <= high:
+        return "No difference between SOAP and REST can be shown"
+    return f"SOAP takes {ratio(leading['ratio'])} times as long as REST"
 
 
 def _alone(series: Mapping[tuple[str, str, str], Series]) -> str:

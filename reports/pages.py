@@ -80,6 +80,7 @@ def _environment(*, html: bool) -> Environment:
         code_block=code_block,
         excerpt=excerpt,
         grouped=grouped,
+        opened=opened,
         plain=plain,
     )
     return environment
@@ -90,6 +91,11 @@ def _finalize(value: Any) -> Any:
     if isinstance(value, str) and not isinstance(value, Markup):
         return visible(value)
     return value
+
+
+def opened(text: str) -> str:
+    """The text with a capital letter at its beginning: a reason that stands as a sentence of its own."""
+    return text[:1].upper() + text[1:]
 
 
 def grouped(number: float) -> str:

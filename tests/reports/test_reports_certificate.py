@@ -121,7 +121,7 @@ def test_many_findings_are_counted(result):
     requirement = next(r for r in result["requirements"] if r["verdict"] == "fail")
     requirement["failures"] = requirement["failures"] * 500
     source = certificate_html(result)
-    assert "490 more findings" in source
+    assert "495 more findings" in source
     assert len(source) < 300_000
 
 
@@ -167,3 +167,10 @@ def test_page_loads_nothing(result):
     assert all(str(link).startswith("#") for link in document.xpath("//@href | //@src"))
     assert "@import" not in certificate_html(result)
     assert "url(" not in certificate_html(result)
+
+
+def test_long_list_of_untested_requirements_is_folded(result):
+    skipped = next(r for r in result["requirements"] if r["verdict"] == "skip")
+    result["requirements"] += [{**skipped, "id": f"rest-resources/more-{number}"} for number in range(30)]
+    assert "32 requirements" in text(page(result))
+    assert "and 20 more" in certificate_markdown(result)

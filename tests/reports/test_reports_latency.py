@@ -229,3 +229,18 @@ def test_bad_histogram_is_told(latency):
     latency["series"][2]["histogram"] = "garbage"
     with pytest.raises(ResultInvalidError, match=r"latency\.json: at \$\.series\[2\]\.histogram"):
         latency_html(latency)
+
+
+def test_valid_run_without_thresholds_is_headed_by_its_finding(latency):
+    latency["thresholds"] = []
+    assert verdict(latency, all_series(latency, "x")).words == "SOAP takes 1.60 times as long as REST"
+    for comparison in latency["comparisons"]:
+        comparison["ci95"] = [0.97, 1.05]
+    assert verdict(latency, all_series(latency, "x")).words.startswith("No difference")
+
+
+def test_noise_floor_of_a_short_run(latency):
+    latency.update(series=latency["series"][:1], steps=[], time_series={"width_s": 1.0, "series": []})
+    for noise in latency["noise_floor"]:
+        noise.update(ci95=None, reason="fewer than 6 pairs of blocks")
+    assert "too short to tell how far an interface differs from itself (fewer than 6 pairs" in text(page(latency))
