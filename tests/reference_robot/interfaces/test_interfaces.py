@@ -1,0 +1,136 @@
+"""The interface packages: their definitions, and messages that cross processes bit for bit."""
+
+import random
+import struct
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+from mybot_delivery_app.msg import DeliveryRequestMsg
+from nav2_msgs.action import ComputePathToPose, NavigateToPose
+
+import reference_robot
+from reference_robot.ros import RosRuntime
+
+INTERFACES = Path(reference_robot.__file__).with_name("interfaces")
+DOUBLES = ("depot_x", "depot_y", "destination_x", "destination_y", "source_x", "source_y")
+
+# Another process: writes each message that it gets as hexadecimal, code first.
+LISTENER = """
+import struct, sys, threading
+from mybot_delivery_app.msg import DeliveryRequestMsg
+from reference_robot.ros import RosRuntime
+
+wanted, ended = int(sys.argv[1]), threading.Event()
+got = []
+
+def take(message):
+    doubles = [getattr(message, name) for name in sys.argv[2:]]
+    got.append(struct.pack(">i6d", message.message_code, *doubles).hex())
+    if len(got) == wanted:
+        ended.set()
+
+with RosRuntime() as ros:
+    ros.create_node("listener").create_subscription(DeliveryRequestMsg, "/DeliveryRequestMsg/from_json", take, 1000)
+    ros.start()
+    ended.wait(60)
+print("\\n".join(got))
+"""
+
+
+def requests():
+    tiny, huge = 5e-324, sys.float_info.max
+    yield 4, (68.269, 38.718, 60.633, 37.51, 76.02, 41.35)  # the paper's example
+    yield -(2**31), (-0.0, 0.0, tiny, -tiny, huge, -huge)
+    yield 2**31 - 1, (0.1 + 0.2, 1 / 3, 2.0**-1022, sys.float_info.epsilon, 1e308, -1e-308)
+    chance = random.Random(20)
+    for _ in range(200):
+        doubles = [0.0] * 6
+        for place in range(6):
+            bits = chance.getrandbits(64)
+            while (bits >> 52) & 0x7FF == 0x7FF:  # infinities and NaN
+                bits = chance.getrandbits(64)
+            (doubles[place],) = struct.unpack(">d", bits.to_bytes(8))
+        yield chance.randrange(-(2**31), 2**31), tuple(doubles)
+
+
+def test_delivery_requests_reach_another_process_bit_for_bit(domain_id):
+    sent = list(requests())
+    with (
+        subprocess.Popen(
+            [sys.executable, "-c", LISTENER, str(len(sent)), *DOUBLES], stdout=subprocess.PIPE, text=True
+        ) as listener,
+        RosRuntime(domain_id) as ros,
+    ):
+        publisher = ros.create_node("sender").create_publisher(
+            DeliveryRequestMsg, "/DeliveryRequestMsg/from_json", 1000
+        )
+        ros.start()
+        deadline = time.monotonic() + 30
+        while not publisher.get_subscription_count():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        for code, doubles in sent:
+            publisher.publish(DeliveryRequestMsg(message_code=code, **dict(zip(DOUBLES, doubles, strict=True))))
+        received, _ = listener.communicate(timeout=90)
+    assert received.split() == [struct.pack(">i6d", code, *doubles).hex() for code, doubles in sent]
+
+
+def test_the_delivery_request_has_the_papers_fields():
+    assert DeliveryRequestMsg.get_fields_and_field_types() == {
+        "message_code": "int32",
+        **dict.fromkeys(DOUBLES, "double"),
+    }
+    assert DeliveryRequestMsg.COURIER_DELIVERY_MESSAGE_CODE == 3
+    assert DeliveryRequestMsg.COFFEE_DELIVERY_MESSAGE_CODE == 4
+
+
+def test_the_actions_are_nav2s():
+    assert NavigateToPose.Goal.get_fields_and_field_types() == {
+        "pose": "geometry_msgs/PoseStamped",
+        "behavior_tree": "string",
+    }
+    assert NavigateToPose.Result.get_fields_and_field_types() == {
+        "error_code": "uint16",
+        "error_msg": "string",
+    }
+    assert NavigateToPose.Feedback.get_fields_and_field_types() == {
+        "current_pose": "geometry_msgs/PoseStamped",
+        "navigation_time": "builtin_interfaces/Duration",
+        "estimated_time_remaining": "builtin_interfaces/Duration",
+        "number_of_recoveries": "int16",
+        "distance_remaining": "float",
+    }
+    assert ComputePathToPose.Goal.get_fields_and_field_types() == {
+        "goal": "geometry_msgs/PoseStamped",
+        "start": "geometry_msgs/PoseStamped",
+        "planner_id": "string",
+        "use_start": "boolean",
+    }
+    assert ComputePathToPose.Result.get_fields_and_field_types() == {
+        "path": "nav_msgs/Path",
+        "planning_time": "builtin_interfaces/Duration",
+        "error_code": "uint16",
+        "error_msg": "string",
+    }
+    assert NavigateToPose.Result.NONE == ComputePathToPose.Result.NONE == 0
+
+
+@pytest.mark.parametrize("name", ["mybot_delivery_app", "nav2_msgs"])
+def test_a_package_is_what_colcon_expects(name):
+    folder = INTERFACES / name
+    manifest = ET.parse(folder / "package.xml").getroot()  # noqa: S314 - our own file
+    assert manifest.get("format") == "3"
+    assert manifest.findtext("name") == name
+    assert manifest.findtext("export/build_type") == "ament_cmake"
+    assert manifest.findtext("member_of_group") == "rosidl_interface_packages"
+    cmake = (folder / "CMakeLists.txt").read_text()
+    assert f"project({name})" in cmake
+    definitions = [path.relative_to(folder).as_posix() for path in folder.glob("*/*.[ma]*")]
+    assert definitions
+    for definition in definitions:
+        assert f'"{definition}"' in cmake
+    assert "wheels" not in cmake  # what pip needs beyond colcon stays out of it

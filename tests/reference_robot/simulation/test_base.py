@@ -1,0 +1,104 @@
+"""The base on the graph: setpoints, limits, watchdog, both command messages, odometry and sensors."""
+
+import itertools
+import math
+import time
+
+import pytest
+from observer import until
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import BatteryState, Imu, LaserScan
+
+from reference_robot.simulation.office import DEPOT, OFFICE
+
+REAL_TIME = pytest.mark.parametrize("robot", [{"time_scale": 1.0}], indirect=True)
+
+
+@REAL_TIME
+def test_a_setpoint_is_reached_held_for_a_second_and_given_up(robot):
+    commanded = time.monotonic()
+    robot.command(0.5, -1.0)
+    until(lambda: robot.velocity == (0.5, -1.0), 0.6 + 5)
+    until(lambda: robot.rests)
+    held = [at for at, message in robot.odometry if message.twist.twist.linear.x == 0.5]
+    assert held[0] - commanded < 0.6
+    assert 0.9 < held[-1] - commanded < 1.6
+
+
+@REAL_TIME
+def test_a_renewed_setpoint_goes_on(robot):
+    begin = time.monotonic()
+    while time.monotonic() - begin < 1.6:
+        robot.command(0.3)
+        time.sleep(0.1)
+    assert robot.velocity == (0.3, 0.0)
+    distance = math.dist(robot.pose[:2], DEPOT)
+    assert 0.3 < distance < 0.3 * (time.monotonic() - begin) + 0.05
+
+
+@pytest.mark.parametrize("robot", [{"velocity": "Twist"}, {"velocity": "TwistStamped"}], indirect=True)
+def test_either_command_message_moves_it_and_limits_hold(robot):
+    robot.command(5.0, -9.0)
+    until(lambda: robot.velocity == (0.7, -2.5))
+    robot.command(-5.0, 9.0)
+    until(lambda: robot.velocity == (-0.7, 2.5))
+    until(lambda: robot.rests)
+    assert max(abs(message.twist.twist.linear.x) for _, message in robot.odometry) <= 0.7
+    assert max(abs(message.twist.twist.angular.z) for _, message in robot.odometry) <= 2.5
+
+
+def test_a_command_that_is_no_number_changes_nothing(robot):
+    robot.command(0.2)
+    until(lambda: robot.velocity == (0.2, 0.0))
+    robot.command(math.nan)
+    robot.command(0.4, math.inf)
+    robot.command(0.2, 0.1)  # in order: when this one shows, the others have been judged
+    until(lambda: robot.velocity == (0.2, 0.1))
+    assert max(message.twist.twist.linear.x for _, message in robot.odometry) == 0.2
+
+
+def test_a_base_against_a_wall_stays_inside(robot):
+    deadline = time.monotonic() + 20
+    while robot.pose[0] < 82.7 and time.monotonic() < deadline:
+        robot.command(0.7)
+        time.sleep(0.05)
+    for _ in range(10):
+        robot.command(0.7)
+        time.sleep(0.02)
+    assert robot.pose[0] < 83.0 - 0.05 - 0.18 + 1e-6
+    assert robot.velocity == (0.7, 0.0)
+
+
+@REAL_TIME
+def test_odometry_comes_at_50_hz_with_advancing_stamps_and_unit_quaternions(robot):
+    robot.odometry.clear()
+    until(lambda: len(robot.odometry) > 60)
+    messages = [message for _, message in robot.odometry]
+    seconds = robot.odometry[-1][0] - robot.odometry[0][0]
+    assert 35 < (len(robot.odometry) - 1) / seconds < 65
+    stamps = [message.header.stamp.sec + message.header.stamp.nanosec * 1e-9 for message in messages]
+    assert all(later > earlier for earlier, later in itertools.pairwise(stamps))
+    assert abs(stamps[-1] - time.time()) < 2
+    for message in messages:
+        turn = message.pose.pose.orientation
+        assert math.hypot(turn.x, turn.y, turn.z, turn.w) == pytest.approx(1.0)
+        assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
+    assert messages[0].pose.covariance[0] > 0
+
+
+def test_the_sensors_report_what_is_there(robot):
+    seen = {}
+    for kind, topic in ((LaserScan, "scan"), (Imu, "imu"), (BatteryState, "battery_state")):
+        robot.node.create_subscription(
+            kind, topic, lambda message: seen.update({type(message): message}), qos_profile_sensor_data
+        )
+    until(lambda: len(seen) == 3)
+    scan = seen[LaserScan]
+    beams = [scan.angle_min + number * scan.angle_increment for number in range(len(scan.ranges))]
+    assert beams[-1] == pytest.approx(scan.angle_max, abs=1e-4)
+    for beam, distance in zip(beams, scan.ranges, strict=True):
+        end = (DEPOT[0] + distance * math.cos(beam), DEPOT[1] + distance * math.sin(beam))
+        assert distance == scan.range_max or not OFFICE.grown(0.01).is_free(*end)
+    assert seen[Imu].linear_acceleration.z == pytest.approx(9.81)
+    assert 0.9 < seen[BatteryState].percentage <= 1.0
+    assert {message.header.frame_id for message in seen.values()} == {"base_link"}

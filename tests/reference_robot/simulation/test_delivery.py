@@ -1,0 +1,89 @@
+"""The delivery application on the graph: missions drive, wait, overflow, fail and are called off."""
+
+import json
+
+import pytest
+from observer import pose, until
+
+from reference_robot.simulation.office import DEPOT, DESTINATION, SOURCE
+
+FAST = pytest.mark.parametrize("robot", [{"time_scale": 10.0}], indirect=True)
+NEAR = ((69.0, 38.7), (69.0, 39.2), (68.3, 38.7))  # a mission of a few seconds
+
+
+@FAST
+def test_the_papers_coffee_goes_source_destination_depot(robot):
+    robot.request(SOURCE, DESTINATION, DEPOT)
+    until(lambda: robot.states == ["done"])
+    goals = {goal["goal_id"]: goal["pose"]["pose"]["position"] for goal in map(json.loads, filter(None, robot.goals))}
+    assert [(position["x"], position["y"]) for position in goals.values()] == [SOURCE, DESTINATION, DEPOT]
+    assert robot.is_at(*DEPOT)
+    (mission,) = json.loads(robot.reports[-1])
+    assert mission["request"] == {
+        "message_code": 4,
+        "depot_x": DEPOT[0],
+        "depot_y": DEPOT[1],
+        "destination_x": DESTINATION[0],
+        "destination_y": DESTINATION[1],
+        "source_x": SOURCE[0],
+        "source_y": SOURCE[1],
+    }
+    seen = [json.loads(report)[0]["state"] for report in robot.reports]
+    assert seen[-1] == "done"
+    assert "active" in seen
+
+
+@FAST
+def test_missions_run_one_after_the_other_and_the_queue_is_bounded(robot):
+    robot.request(SOURCE, DESTINATION, DEPOT)
+    until(lambda: robot.states == ["active"])
+    for _ in range(22):
+        robot.request(*NEAR, code=3)
+    until(lambda: len(robot.states) == 23)
+    assert robot.states == ["active", *["queued"] * 20, "dropped", "dropped"]
+    until(lambda: robot.states[:2] == ["done", "active"])
+
+
+@FAST
+def test_a_request_with_another_code_is_ignored(robot):
+    robot.request(*NEAR, code=5)
+    robot.request(*NEAR, code=0)
+    robot.request(*NEAR, code=3)
+    until(lambda: robot.states == ["done"])
+
+
+@FAST
+def test_a_stop_outside_the_map_fails_its_mission_and_the_next_one_runs(robot):
+    robot.request((0.0, 0.0), NEAR[1], NEAR[2])
+    robot.request((float("nan"), 1.0), NEAR[1], NEAR[2])
+    robot.request(*NEAR)
+    until(lambda: robot.states == ["failed", "failed", "done"])
+
+
+def test_a_cancel_from_outside_fails_the_mission_and_drops_the_queue(robot):
+    for _ in range(3):
+        robot.request(SOURCE, DESTINATION, DEPOT)
+    until(lambda: robot.states == ["active", "queued", "queued"])
+    until(lambda: robot.velocity[0] > 0.3)
+    response = robot.cancel_all()
+    assert len(response.goals_canceling) == 1
+    until(lambda: robot.states == ["failed", "dropped", "dropped"])
+    until(lambda: robot.rests and robot.current_goal is None)
+
+
+def test_a_mission_waits_while_somebody_elses_goal_is_active(robot, statuses):
+    handle = robot.send(pose(70.5, 38.7))
+    until(lambda: robot.current_goal)
+    robot.request(*NEAR)
+    until(lambda: robot.states == ["queued"])
+    assert robot.end_of(handle) == statuses.STATUS_SUCCEEDED
+    until(lambda: robot.states == ["done"])
+
+
+def test_a_goal_that_displaces_a_mission_drops_the_queue(robot, statuses):
+    robot.request(SOURCE, DESTINATION, DEPOT)
+    robot.request(*NEAR)
+    until(lambda: robot.states == ["active", "queued"] and robot.current_goal)
+    handle = robot.send(pose(67.0, 38.7))
+    until(lambda: robot.states == ["failed", "dropped"])
+    assert robot.end_of(handle) == statuses.STATUS_SUCCEEDED

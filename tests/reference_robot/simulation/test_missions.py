@@ -1,0 +1,85 @@
+"""The mission queue: order, overflow, abandonment, memory."""
+
+import json
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reference_robot.simulation.missions import DeliveryRequest, Missions, MissionState
+
+
+def request(number=0):
+    return DeliveryRequest(4, float(number), 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+def states(missions):
+    return [mission.state.value for mission in missions]
+
+
+def test_the_stops_are_source_destination_depot():
+    assert DeliveryRequest(4, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0).stops() == ((5.0, 6.0), (3.0, 4.0), (1.0, 2.0))
+
+
+def test_missions_begin_in_the_order_they_came():
+    missions = Missions()
+    added = [missions.add(request(number), (number, 0)) for number in range(3)]
+    for mission in added:
+        assert missions.begin() is mission
+        assert missions.begin() is None  # one at a time
+        missions.finish(MissionState.DONE)
+    assert missions.begin() is None
+    assert states(missions) == ["done"] * 3
+
+
+def test_a_request_beyond_the_capacity_is_dropped_and_those_that_wait_stay():
+    missions = Missions(capacity=20)
+    for number in range(22):
+        missions.add(request(number), (number, 0))
+    assert states(missions) == ["dropped", "dropped", *["queued"] * 20]
+
+
+def test_abandoning_fails_the_active_mission_and_drops_the_rest():
+    missions = Missions()
+    for number in range(3):
+        missions.add(request(number), (number, 0))
+    missions.begin()
+    missions.abandon()
+    assert states(missions) == ["dropped", "dropped", "failed"]
+    assert missions.begin() is None
+
+
+def test_a_mission_in_plain_values_is_what_the_topic_carries():
+    missions = Missions()
+    assert json.loads(json.dumps(missions.add(request(1), (12, 34)).plain())) == {
+        "request": {
+            "message_code": 4,
+            "depot_x": 1.0,
+            "depot_y": 2.0,
+            "destination_x": 3.0,
+            "destination_y": 4.0,
+            "source_x": 5.0,
+            "source_y": 6.0,
+        },
+        "state": "queued",
+        "accepted": {"sec": 12, "nanosec": 34},
+    }
+
+
+@given(st.lists(st.sampled_from(["add", "begin", "done", "failed", "abandon"]), max_size=200))
+def test_whatever_happens_the_bounds_hold(events):
+    missions = Missions(capacity=3)
+    for number, event in enumerate(events):
+        if event == "add":
+            missions.add(request(number), (number, 0))
+        elif event == "begin":
+            missions.begin()
+        elif event == "abandon":
+            missions.abandon()
+        else:
+            missions.finish(MissionState(event))
+        now = states(missions)
+        assert now.count("active") <= 1
+        assert now.count("queued") <= 3
+        assert len(now) <= 100
+        numbers = [mission.accepted[0] for mission in missions]
+        assert numbers == sorted(numbers, reverse=True)

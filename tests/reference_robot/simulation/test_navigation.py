@@ -1,0 +1,134 @@
+"""Navigation on the graph: goals are reached, cancelled, displaced and refused; plans are exact."""
+
+import itertools
+import json
+import math
+import time
+
+import pytest
+from geometry_msgs.msg import PoseStamped
+from nav2_msgs.action import ComputePathToPose
+from observer import pose, until
+
+from reference_robot.simulation.office import DEPOT, SOURCE
+
+
+def test_a_goal_is_reached_with_feedback_and_shown_while_it_is_active(robot, statuses):
+    goal = pose(71.0, 36.0, 2.0)
+    handle = robot.send(goal)
+    assert handle.accepted
+    shown = until(lambda: robot.current_goal)
+    assert shown["goal_id"] == bytes(handle.goal_id.uuid).hex()
+    assert shown["status"] == statuses.STATUS_EXECUTING
+    assert shown["pose"]["header"]["frame_id"] == "map"
+    assert shown["pose"]["pose"]["position"] == {"x": 71.0, "y": 36.0, "z": 0.0}
+    assert robot.end_of(handle) == statuses.STATUS_SUCCEEDED
+    until(lambda: robot.current_goal is None)
+    until(lambda: robot.rests)
+    assert robot.is_at(71.0, 36.0, 2.0)
+    left = [message.feedback.distance_remaining for message in robot.feedback]
+    assert len(left) >= 2
+    assert left[0] > left[-1] > 0
+
+
+@pytest.mark.parametrize("robot", [{"time_scale": 1.0}], indirect=True)
+def test_a_cancelled_goal_leaves_the_robot_at_rest_within_the_settle_time(robot, statuses):
+    handle = robot.send(pose(81.0, 39.0))
+    until(lambda: robot.velocity[0] > 0.5)
+    cancelled_at = time.monotonic()
+    response = robot.await_future(handle.cancel_goal_async())
+    assert len(response.goals_canceling) == 1
+    assert robot.end_of(handle) == statuses.STATUS_CANCELED
+    until(lambda: robot.rests)
+    assert robot.odometry[-1][0] - cancelled_at < 0.6
+    until(lambda: robot.current_goal is None)
+    here = robot.pose
+    later = len(robot.odometry) + 10
+    until(lambda: len(robot.odometry) > later)
+    assert robot.pose == here
+
+
+def test_a_newer_goal_displaces_an_older_one_which_ends_aborted(robot, statuses):
+    older = robot.send(pose(81.0, 39.0))
+    until(lambda: robot.velocity[0] > 0.3)
+    newer = robot.send(pose(66.0, 37.0, 1.0))
+    assert robot.end_of(older) == statuses.STATUS_ABORTED
+    until(lambda: robot.current_goal["goal_id"] == bytes(newer.goal_id.uuid).hex())
+    assert robot.end_of(newer) == statuses.STATUS_SUCCEEDED
+    assert robot.is_at(66.0, 37.0, 1.0)
+
+
+def test_after_a_goal_the_robot_obeys_velocity_commands_again(robot, statuses):
+    assert robot.end_of(robot.send(pose(68.5, 38.7))) == statuses.STATUS_SUCCEEDED
+    until(lambda: robot.current_goal is None and robot.rests)
+    robot.command(0.25)
+    until(lambda: robot.velocity == (0.25, 0.0))
+
+
+@pytest.mark.parametrize("unreachable", [(0.0, 0.0), (82.0, 47.0), (72.0, 35.0), (math.nan, 38.0)])
+def test_an_unreachable_goal_is_refused_and_the_reason_is_told(robot, unreachable):
+    assert not robot.send(pose(*unreachable)).accepted
+    told = json.loads(until(lambda: robot.rejections)[-1])
+    assert "goal" in told["reason"]
+    assert told["pose"]["pose"]["position"]["y"] == unreachable[1]
+    assert robot.current_goal is None
+
+
+def test_a_refused_goal_leaves_the_active_one_alone(robot, statuses):
+    handle = robot.send(pose(70.0, 38.7))
+    assert not robot.send(pose(0.0, 0.0)).accepted
+    assert robot.end_of(handle) == statuses.STATUS_SUCCEEDED
+
+
+def test_a_goal_in_an_unknown_frame_or_without_orientation_is_refused(robot):
+    assert not robot.send(pose(70.0, 38.7, frame_id="moon")).accepted
+    until(lambda: robot.rejections and "'moon'" in robot.rejections[-1])
+    skewed = pose(70.0, 38.7)
+    skewed.pose.orientation.w = 0.5
+    assert not robot.send(skewed).accepted
+    until(lambda: "length" in robot.rejections[-1])
+
+
+def check_plan(plan, start, goal):
+    assert plan.header.frame_id == goal.header.frame_id
+    points = [(item.pose.position.x, item.pose.position.y) for item in plan.poses]
+    assert points[0] == pytest.approx(start, abs=1e-9)
+    assert plan.poses[-1].pose == goal.pose
+    assert all(item.header.frame_id == goal.header.frame_id for item in plan.poses)
+    assert max(math.dist(a, b) for a, b in itertools.pairwise(points)) <= 0.25
+
+
+@pytest.mark.parametrize("frame_id", ["map", "odom"])
+def test_get_plan_starts_at_the_robot_and_ends_at_the_asked_pose_in_the_asked_frame(robot, frame_id):
+    goal = pose(*SOURCE, 0.3, frame_id)
+    check_plan(robot.plan(goal), DEPOT, goal)
+
+
+def test_get_plan_takes_a_start(robot):
+    goal = pose(*DEPOT, -1.0)
+    check_plan(robot.plan(goal, start=pose(*SOURCE)), SOURCE, goal)
+
+
+def test_get_plan_is_empty_where_no_way_leads(robot):
+    for goal in (pose(82.0, 47.0), pose(0.0, 0.0), pose(70.0, 38.7, frame_id="moon"), PoseStamped()):
+        assert not robot.plan(goal).poses
+
+
+def test_compute_path_to_pose_plans_or_says_why_not(robot, statuses):
+    def compute(goal, start=None):
+        message = ComputePathToPose.Goal(goal=goal, use_start=start is not None)
+        if start is not None:
+            message.start = start
+        handle = robot.await_future(robot.compute.send_goal_async(message))
+        return robot.await_future(handle.get_result_async())
+
+    goal = pose(*SOURCE, 0.3)
+    found = compute(goal)
+    assert found.status == statuses.STATUS_SUCCEEDED
+    assert found.result.error_code == ComputePathToPose.Result.NONE
+    check_plan(found.result.path, DEPOT, goal)
+    check_plan(compute(pose(*DEPOT), start=goal).result.path, SOURCE, pose(*DEPOT))
+    refused = compute(pose(82.0, 47.0))
+    assert refused.status == statuses.STATUS_ABORTED
+    assert refused.result.error_code == ComputePathToPose.Result.NO_VALID_PATH
+    assert "82" in refused.result.error_msg

@@ -1,0 +1,82 @@
+"""The simulation as a process: its one line, its ends, and a flood of requests."""
+
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import pytest
+from observer import Observer, pose, until
+
+from reference_robot.names import RosNames
+from reference_robot.ros import RosRuntime
+
+COMMAND = [sys.executable, "-m", "reference_robot.simulation"]
+
+
+@contextmanager
+def simulation(domain_id):
+    process = subprocess.Popen(
+        [*COMMAND, "--domain-id", str(domain_id)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout.readline() == "ready\n"
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT, "stdin"])
+def test_it_ends_cleanly(domain_id, end):
+    with simulation(domain_id) as process:
+        if end == "stdin":
+            process.stdin.close()
+            process.stdin = None  # or communicate() would flush it
+        else:
+            process.send_signal(end)
+        assert process.wait(15) == 0
+        assert process.stdout.read() == ""
+        assert process.stderr.read() == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--names", "missing.toml"], "missing.toml"),
+        (["--domain-id", "102"], "102"),
+        (["--time-scale", "0"], "0"),
+    ],
+)
+def test_what_it_cannot_use_it_names(arguments, named):
+    done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert named in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_flood_of_requests_neither_blocks_the_sender_nor_stops_the_odometry(domain_id):
+    with simulation(domain_id), RosRuntime(domain_id) as ros:
+        robot = Observer(ros, RosNames())
+        ros.start()
+        until(robot.is_connected)
+        sent, slowest, begin = 0, 0.0, time.monotonic()
+        while (now := time.monotonic()) - begin < 2.0:
+            while sent < (now - begin) * 20_000:
+                robot.request((70.0, 38.7), (71.0, 38.7), (69.0, 38.7))
+                sent += 1
+                slowest = max(slowest, time.monotonic() - now)
+                now = time.monotonic()
+            time.sleep(0.001)
+        during = [at for at, _ in robot.odometry if begin < at < begin + 2.0]
+        assert len(during) > 40  # of 100 on an idle machine
+        assert slowest < 1.0
+        until(lambda: "dropped" in robot.states)
+        assert robot.states.count("queued") <= 20
+        assert robot.plan(pose(70.0, 38.7)).poses  # it still answers
