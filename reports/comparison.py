@@ -1,17 +1,21 @@
 """Did it get slower? Two latency results, compared quantile by quantile with an interval and a noise threshold.
 
-For each series that both results hold, the ratio new / old of the median and of the 99th percentile gets a 95
-% interval from the two intervals that the results carry (which come from resampled blocks): on the
-logarithmic scale, where a ratio is a difference, by the method of variance estimates recovery (Zou and
-Donner, Statistics in Medicine 27, 2008). A change counts only where the whole interval lies beyond the
-threshold: the greater of what was asked for and of what either result measured of an interface against
-itself. Two runs differ for more reasons than one run's blocks do, and that is what the threshold is there
-for.
+For each series that both results hold, the ratio new / old of the median and of the 99th percentile gets an
+interval from the two intervals that the results carry (which come from resampled blocks): on the logarithmic
+scale, where a ratio is a difference, by the method of variance estimates recovery (Zou and Donner, Statistics
+in Medicine 27, 2008). The more quantiles are looked at, the likelier is one of them to look slower by chance:
+the intervals are widened so that all of them hold together at 95 % (Bonferroni).
+
+A change counts only where its whole interval lies beyond the threshold: the greater of what was asked for and
+of what either result measured of an interface against itself. Two runs differ for more reasons than one run's
+blocks do, and that is what the threshold is there for. A response time also carries the generator's own lag;
+a difference that is no greater than that lag is none of the robot's.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from statistics import NormalDist
 from typing import Any
 
 from reports.errors import ResultsIncompatibleError
@@ -19,6 +23,8 @@ from reports.histograms import Series, all_series
 from reports.numbers import rate
 
 QUANTILES = ("p50", "p99")
+_ASCENDING = ("p50", "p90", "p99")
+_CONFIDENCE = 0.95
 TIMES = {"service": ("service_ms", "ci95_ms"), "response": ("response_ms", "response_ci95_ms")}
 _SAME_RATE = 0.02
 """Rates that differ by less than this share count as one."""
@@ -37,7 +43,8 @@ class Change:
         old_ms: the old value; None where that run supports none.
         new_ms: the new one.
         ratio: new / old.
-        interval: the ratio's 95 % interval.
+        interval: the ratio's interval; those of all changes hold together at 95 %.
+        lag_ms: the generator's own lag at the quantile, which is in a response time; 0 for a service time.
         threshold: the share by which it has to change to count, 0.05 for 5 %.
         verdict: "slower", "faster", "same", "unclear" (the interval reaches over the threshold) or "no
             figure".
@@ -53,7 +60,8 @@ class Change:
     ratio: float | None
     interval: tuple[float, float] | None
     threshold: float
-    verdict: str
+    lag_ms: float = 0.0
+    verdict: str = "no figure"
 
     @property
     def series(self) -> str:
@@ -121,7 +129,14 @@ def compare(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, st
         )
         raise ResultsIncompatibleError(f"the two results have no series in common ({held})")
     noise = [*old.get("noise_floor", []), *new.get("noise_floor", [])]
-    changes = tuple(change for key in common for change in _changes(old_series[key], new_series[key], noise, threshold))
+    lag = _lag(old, new)
+    drafts = [
+        replace(change, lag_ms=lag[change.quantile] if change.time == "response" else 0.0)
+        for key in common
+        for change in _changes(old_series[key], new_series[key], noise, threshold)
+    ]
+    together = sum(change.interval is not None for change in drafts)
+    changes = tuple(_settled(change, together, threshold) for change in drafts)
     return Comparison(old, new, old_series, new_series, changes, tuple(_remarks(old, new, old_series, new_series)))
 
 
@@ -156,19 +171,45 @@ def _changes(old: Series, new: Series, noise: Sequence[Mapping[str, Any]], thres
             ratio = after / before if before and after is not None else None
             interval = ratio_interval(before, intervals[0], after, intervals[1])
             operation, client, interface = new.key
-            yield Change(
-                operation, interface, client, time, quantile, before, after, ratio, interval, limit,
-                judge(interval, limit),
-            )  # fmt: skip
+            yield Change(operation, interface, client, time, quantile, before, after, ratio, interval, limit)
+
+
+def _settled(change: Change, together: int, asked: float) -> Change:
+    """Widen a change's interval so that `together` of them hold at once, and judge it."""
+    if change.interval is None or change.ratio is None or change.old_ms is None or change.new_ms is None:
+        return change
+    interval = widened(change.ratio, change.interval, together)
+    verdict = judge(interval, change.threshold, asked)
+    if verdict in {"slower", "faster"} and abs(change.new_ms - change.old_ms) <= change.lag_ms:
+        verdict = "unclear"
+    return replace(change, interval=interval, verdict=verdict)
+
+
+def widened(ratio: float, interval: tuple[float, float], together: int) -> tuple[float, float]:
+    """The interval of one ratio of many at the confidence at which all of them hold together, normal on a log scale."""
+    alone, all_of_them = (NormalDist().inv_cdf(1 - (1 - _CONFIDENCE) / 2 / count) for count in (1, together))
+    factor = all_of_them / alone
+    low, high = (math.log(bound / ratio) * factor for bound in interval)
+    return ratio * math.exp(low), ratio * math.exp(high)
+
+
+def _lag(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, float]:
+    lags = [result.get("generator", {}).get("lag_ms") or {} for result in (old, new)]
+    return {quantile: max(lag.get(quantile) or 0.0 for lag in lags) for quantile in QUANTILES}
 
 
 def noise_of(noise: Sequence[Mapping[str, Any]], series: Series, quantile: str) -> float:
-    """How far an interface's ratio to itself may lie from 1: the farthest bound measured for these; 0 if none was."""
+    """How far an interface's ratio to itself may lie from 1: the farthest bound measured for these; 0 if none was.
+
+    A higher quantile is never the steadier one: it takes the noise of the lower ones where its own is not
+    known.
+    """
+    lower = _ASCENDING[: _ASCENDING.index(quantile) + 1]
     operation, client, _ = series.key
     bounds = [
         bound
         for entry in noise
-        if (entry["operation"], entry["client"], entry["quantile"]) == (operation, client, quantile)
+        if (entry["operation"], entry["client"]) == (operation, client) and entry["quantile"] in lower
         for bound in entry["ci95"] or ()
         if bound > 0
     ]
@@ -197,17 +238,20 @@ def ratio_interval(
     return math.exp(change - math.hypot(new_low, old_high)), math.exp(change + math.hypot(new_high, old_low))
 
 
-def judge(interval: tuple[float, float] | None, threshold: float) -> str:
-    """What an interval of new / old says, given the share that is noise."""
-    if interval is None:
-        return "no figure"
+def judge(interval: tuple[float, float], threshold: float, asked: float) -> str:
+    """What an interval of new / old says.
+
+    Args:
+        interval: of the ratio.
+        threshold: the share beyond which a change is none of the noise's.
+        asked: the share within which there is no change worth a word; the noise does not make it greater.
+    """
     low, high = interval
-    slowest, fastest = 1 + threshold, 1 / (1 + threshold)
-    if low > slowest:
+    if low > 1 + threshold:
         return "slower"
-    if high < fastest:
+    if high < 1 / (1 + threshold):
         return "faster"
-    return "same" if low >= fastest and high <= slowest else "unclear"
+    return "same" if low >= 1 / (1 + asked) and high <= 1 + asked else "unclear"
 
 
 def _remarks(

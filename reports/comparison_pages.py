@@ -32,7 +32,7 @@ def verdict(comparison: Comparison) -> Verdict:
     if unclear:
         widest = sentence(max(unclear, key=_width))
         return Verdict("quiet", "=", "No change can be shown", f"The least certain: {widest} Longer runs narrow it.")
-    return Verdict("quiet", "=", "No change", "Every quantile with an interval stayed within its noise threshold.")
+    return Verdict("quiet", "=", "No change", "Every quantile with an interval stayed within the threshold.")
 
 
 def sentence(of: Change) -> str:

@@ -27,8 +27,11 @@ def rate(value: float | None) -> str:
 
 
 def share(value: float | None) -> str:
-    """A share as a percentage with two significant digits: 0.043 %."""
-    return NONE if value is None else f"{value * 100:.2g} %"
+    """A share as a percentage with two significant digits, and whole from 10 % on: 0.043 %, 120 %."""
+    if value is None:
+        return NONE
+    percent = value * 100
+    return f"{percent:,.0f} %" if percent >= 10 else f"{percent:.2g} %"  # noqa: PLR2004 - two significant digits
 
 
 def interval(bounds: Sequence[float] | None, *, of_ratio: bool = False) -> str:

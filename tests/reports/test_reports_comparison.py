@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from reports.comparison import compare, judge, ratio_interval
+from reports.comparison import compare, judge, ratio_interval, widened
 from reports.comparison_pages import comparison_html, comparison_markdown, table, verdict
 from reports.errors import ResultsIncompatibleError
 
@@ -73,7 +73,6 @@ def test_noise_floor_raises_the_threshold(latency):
 @pytest.mark.parametrize(
     ("interval", "expected"),
     [
-        (None, "no figure"),
         ((1.06, 1.2), "slower"),
         ((1.04, 1.2), "unclear"),
         ((0.99, 1.01), "same"),
@@ -82,7 +81,12 @@ def test_noise_floor_raises_the_threshold(latency):
     ],
 )
 def test_judgement(interval, expected):
-    assert judge(interval, 0.05) == expected
+    assert judge(interval, 0.05, 0.05) == expected
+
+
+def test_noise_makes_nothing_the_same():
+    assert judge((1.02, 1.13), 0.2, 0.05) == "unclear"
+    assert judge((1.06, 1.13), 0.2, 0.05) == "unclear"
 
 
 def test_ratio_interval_is_that_of_independent_estimates():
@@ -189,3 +193,48 @@ def test_table_is_aligned(latency):
     lines = table(compared(latency, latency)).split("\n")
     assert len(lines) == 33
     assert len({line.index("%") for line in lines[1:]}) == 1
+
+
+def test_intervals_hold_together():
+    assert widened(1.2, (1.1, 1.3), 1) == pytest.approx((1.1, 1.3))
+    low, high = widened(1.2, (1.1, 1.3), 20)
+    # 1 - 0.05 / 20 on both sides: 3.02 standard errors for 1.96.
+    assert math.log(1.2 / low) == pytest.approx(math.log(1.2 / 1.1) * 3.0233 / 1.9600, rel=1e-3)
+    assert math.log(high / 1.2) == pytest.approx(math.log(1.3 / 1.2) * 3.0233 / 1.9600, rel=1e-3)
+
+
+def test_no_false_alarm_among_many_quantiles(latency):
+    # Each quantile of an unchanged robot, drawn anew within its own interval, over 60 pairs of runs.
+    generator = np.random.default_rng(11)
+
+    def drawn():
+        changed = copy.deepcopy(latency)
+        for series in changed["series"]:
+            for values, bounds in (("service_ms", "ci95_ms"), ("response_ms", "response_ci95_ms")):
+                for name, interval in series[bounds].items():
+                    if interval is None:
+                        continue
+                    error = generator.normal(0, math.log(interval[1] / interval[0]) / 3.92)
+                    series[values][name] *= math.exp(error)
+                    series[bounds][name] = [bound * math.exp(error) for bound in interval]
+        return changed
+
+    alarms = sum(compared(drawn(), drawn(), 0.0).slower for _ in range(60))
+    assert alarms <= 6
+
+
+def test_difference_within_the_generators_lag_is_none_of_the_robots(latency):
+    changed = scaled(latency, 1.5)
+    slower = {c.time for c in compared(latency, changed).with_verdict("slower")}
+    assert slower == {"service", "response"}
+    changed["generator"]["lag_ms"].update(p50=5.0, p99=500.0)
+    assert {c.time for c in compared(latency, changed).with_verdict("slower")} == {"service"}
+
+
+def test_noise_of_a_quantile_that_was_not_measured(latency):
+    noisy = copy.deepcopy(latency)
+    noisy["noise_floor"] = [n for n in noisy["noise_floor"] if n["quantile"] == "p50"]
+    for noise in noisy["noise_floor"]:
+        noise["ci95"] = [0.8, 1.1]
+    found = {c.threshold for c in compared(noisy, noisy).changes if c.client == "wire"}
+    assert found == {1 / 0.8 - 1}
