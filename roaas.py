@@ -5,14 +5,14 @@ Rooms are imported when their command is used, so that ``roaas certify`` needs n
 
 from __future__ import annotations
 
-import functools
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
 _COMMANDS = {
     "robot": ("reference_robot.cli", "robot"),
@@ -73,20 +73,27 @@ class _Rooms(click.Group):
 def _render_afterwards(command: click.Command, result: str) -> None:
     """Have the reports room render what the command left, also when it failed or was interrupted."""
     run = command.callback
-    if run is None or hasattr(run, "__wrapped__"):
+    if run is None or isinstance(run, _RunAndRender):
         return
+    command.callback = _RunAndRender(run, result)
 
-    @functools.wraps(run)
-    def run_and_render(*args: Any, out: Path, **options: Any) -> Any:
-        before = _changed(out / result)
+
+class _RunAndRender:
+    """A command's callback that has the reports room render what it left."""
+
+    def __init__(self, run: Callable[..., Any], result: str) -> None:
+        self._run = run
+        self._result = result
+
+    def __call__(self, *args: Any, out: Path | str, **options: Any) -> Any:
+        file = Path(out, self._result)
+        before = _changed(file)
         try:
-            return run(*args, out=out, **options)
+            return self._run(*args, out=out, **options)
         finally:
-            if _changed(out / result) != before:
-                for path in import_module("reports").render(out):
+            if _changed(file) != before:
+                for path in import_module("reports").render(file.parent):
                     click.echo(f"report: {path}")
-
-    command.callback = run_and_render
 
 
 def _changed(path: Path) -> int:
