@@ -133,7 +133,9 @@ def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort
             document = spell(envelope([paper.delivery(operation)]), syntax)
             _answered(judge, "soap-delivery/syntax", operation, ask(publishers, document), f"the same with {what}")
     explore(
-        st.tuples(st.sampled_from(_BOTH), syntaxes()), lambda case: taken(*case, "several changes of syntax"), cases=60
+        st.tuples(st.sampled_from(_BOTH), syntaxes()),
+        lambda case: taken(case[0], case[1], "several changes of syntax"),
+        cases=60,
     )
 
 

@@ -113,6 +113,15 @@ def read(document: bytes) -> Envelope:
         root = parse(document)
     except NotXmlError as error:
         raise NotSoapError(f"no well-formed XML: {error}") from error
+    return read_root(root)
+
+
+def read_root(root: etree._Element) -> Envelope:
+    """Read a message that is parsed already.
+
+    Raises:
+        NotSoapError: it is no SOAP 1.1 envelope with a Body.
+    """
     if root.tag != clark(ENVELOPE, "Envelope"):
         raise NotSoapError(f"the document element is {root.tag}, not SOAP 1.1's Envelope")
     parts = elements(root)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from lxml import etree
 
-from conformance.soap.envelope import Envelope, Fault, NotSoapError, NotXmlError, elements, parse, read
+from conformance.soap.envelope import Envelope, Fault, NotSoapError, NotXmlError, elements, parse, read_root
 from conformance.soap.names import ENVELOPE, clark, local, namespace
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ class SoapObserver:
         that("R1008", root.getroottree().docinfo.internalDTD is None, exchange, "no DOCTYPE", lambda: "a DOCTYPE")
         that("R1009", not _has_instruction(root), exchange, "no processing instruction", lambda: "one")
         try:
-            message = read(response.body)
+            message = read_root(root)
         except NotSoapError as error:
             problem = str(error)
             that("R2712", False, exchange, "a SOAP 1.1 message", lambda: problem)  # noqa: FBT003 - the condition
