@@ -44,10 +44,11 @@ class Change:
         new_ms: the new one.
         ratio: new / old.
         interval: the ratio's interval; those of all changes hold together at 95 %.
-        lag_ms: the generator's own lag at the quantile, which is in a response time; 0 for a service time.
         threshold: the share by which it has to change to count, 0.05 for 5 %.
-        verdict: "slower", "faster", "same", "unclear" (the interval reaches over the threshold) or "no
-            figure".
+        lag_ms: the generator's own lag at the quantile, which is in a response time; 0 for a service time.
+        verdict: "slower", "faster", "same", "unclear" (the interval lies neither beyond the threshold nor
+            within the one
+            that was asked for) or "no figure".
     """
 
     operation: str

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from reports.certificate import certificate_html, certificate_markdown
-from reports.errors import ResultMissingError, ResultUnreadableError
+from reports.errors import ReportError, ResultMissingError, ResultUnreadableError
 from reports.junit import junit
 from reports.pages import write_page
 from reports.reading import LATENCY_NAME, RESULT_NAME, read_latency, read_result
@@ -13,7 +13,8 @@ def render(directory: Path) -> list[Path]:
     """Write what belongs to the result files in a directory, beside them.
 
     `result.json` gives certificate.html, certificate.md and junit.xml; `latency.json` gives latency.html and
-    latency.md. Each file is replaced at once, so that a reader never sees half of one.
+    latency.md. Each file is replaced at once, so that a reader never sees half of one. Where one of the two
+    results is broken, the other's pages are written before the error is raised.
 
     Returns:
         The files written.
@@ -30,11 +31,22 @@ def render(directory: Path) -> list[Path]:
     result, latency = directory / RESULT_NAME, directory / LATENCY_NAME
     if not result.exists() and not latency.exists():
         raise ResultMissingError(f"{directory}: it holds neither {RESULT_NAME} nor {LATENCY_NAME}")
-    pages: dict[str, str] = {}
-    if result.exists():
-        pages.update(_conformance(result))
-    if latency.exists():
-        pages.update(_latency(latency))
+    written: list[Path] = []
+    problems: list[ReportError] = []
+    for path, pages_of in ((result, _conformance), (latency, _latency)):
+        if not path.exists():
+            continue
+        try:
+            written += _write(directory, pages_of(path))
+        except ReportError as error:
+            problems.append(error)
+    if problems:
+        # One result is no worse for the other's fault: what could be written is there by now.
+        raise problems[0]
+    return written
+
+
+def _write(directory: Path, pages: dict[str, str]) -> list[Path]:
     try:
         return [write_page(directory / name, text) for name, text in pages.items()]
     except OSError as error:

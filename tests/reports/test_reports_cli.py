@@ -119,3 +119,13 @@ def test_unwritable_place(tmp_path, latency):
     done = run(compare, old, old, "--out", tmp_path / "file" / "below")
     assert done.exit_code == 2
     assert "cannot write" in done.stderr
+
+
+def test_broken_result_does_not_keep_the_other_from_being_written(tmp_path, result):
+    put(tmp_path, "result.json", result)
+    (tmp_path / "latency.json").write_text("{", encoding="utf-8")
+    done = run(report, tmp_path)
+    assert done.exit_code == 2
+    assert "latency.json: line 1" in done.stderr
+    assert (tmp_path / "certificate.html").exists()
+    assert not (tmp_path / "latency.html").exists()
