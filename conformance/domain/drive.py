@@ -49,7 +49,7 @@ class Drive:
         self.robot = robot
         self.trace: list[Odometry] = []
         self.sent = self.answered = time.monotonic()
-        self._fastest = Velocity()
+        self._fastest: Velocity | None = None
         self._pending: _Reading | None = None
         self._turn_at = 0.0
 
@@ -81,7 +81,8 @@ class Drive:
         answer = exchange.response
         if answer is not None and answer.status == _BUSY and self.robot.goal()[0] is not None:
             raise BusyError("the robot follows a goal of its own")
-        self._fastest = Velocity(*(max(pair) for pair in zip(self._fastest, map(abs, velocity), strict=True)))
+        fastest = self._fastest or Velocity()
+        self._fastest = Velocity(*(max(pair) for pair in zip(fastest, map(abs, velocity), strict=True)))
         kind, shape = ("Vector3", VECTOR3) if name == "linear-put" else ("Twist", TWIST)
         expected = f"200 with the accepted {kind}, or 204"
         problem = ""
@@ -113,8 +114,8 @@ class Drive:
         velocity, exchange = self.robot.velocity()
         linear, linear_exchange = self.robot.linear()
         self._pending = _Reading(at, velocity, exchange, linear, linear_exchange)
-        if velocity is not None and not self.robot.limits_declared:
-            self._judge_speed(velocity, exchange)
+        if velocity is not None and self._fastest is not None and not self.robot.limits_declared:
+            self._judge_speed(velocity, self._fastest, exchange)
         return velocity, exchange
 
     def _judge_pending(self) -> None:
@@ -150,13 +151,13 @@ class Drive:
                 cause="differs",
             )
 
-    def _judge_speed(self, velocity: Velocity, exchange: Exchange) -> None:
+    def _judge_speed(self, velocity: Velocity, fastest: Velocity, exchange: Exchange) -> None:
         """Without declared limits: the robot is not faster than it was asked to be, however it overshoots."""
         self.robot.judge.that(
             "safety/limits-hold",
-            all(abs(one) <= 1.5 * asked + 0.2 for one, asked in zip(velocity, self._fastest, strict=True)),
+            all(abs(one) <= 1.5 * asked + 0.2 for one, asked in zip(velocity, fastest, strict=True)),
             exchange,
-            f"a speed that was asked for, at most {_rounded(self._fastest)}",
+            f"a speed that was asked for, at most {_rounded(fastest)}",
             found=str(velocity),
         )
 

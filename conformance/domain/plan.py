@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
 # A way so much longer than the distance goes around something: not what a short drive is for.
 _DETOUR: Final = 1.3
+# How far from the robot, or from the given start, a path may begin: a planner's grid is not finer, m.
+START_OFF: Final = 0.25
 
 
 @dataclass(frozen=True)
@@ -101,3 +103,19 @@ def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list
             if plan is not None and plan.length <= _DETOUR * here.distance(goal) + 0.1:
                 found.append(goal)
     return found
+
+
+def judge_start(robot: Robot, plan: Plan, before: Pose, exchange: Exchange) -> None:
+    """Judge that a path begins where the robot was just before, and may have moved from since."""
+    after = robot.map_pose()
+    if after is None:
+        return
+    first = plan.poses[0]
+    robot.judge.that(
+        "rest-resources/plan-start",
+        first.distance(before) <= START_OFF + before.distance(after),
+        exchange,
+        f"a path that starts at the robot, ({before.x:.3f}, {before.y:.3f})",
+        found=f"({first.x:.3f}, {first.y:.3f})",
+        cause="starts elsewhere",
+    )

@@ -1,0 +1,286 @@
+"""The life of a goal: put, read, repeated, contradicted, displaced, cancelled, reached, and put again."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from conformance.domain.drive import Drive
+from conformance.domain.goal import (
+    CANCELLED,
+    NEW,
+    REPEATED,
+    await_goal,
+    await_none,
+    difference,
+    goal_body,
+    put_goal,
+    status_fault,
+)
+from conformance.domain.goals import choose_goals
+from conformance.domain.plan import ask, judge_start
+from conformance.domain.robot import STILL, Robot, Velocity
+from conformance.target.stillness import bring_to_rest
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from conformance.domain.geometry import Pose
+    from conformance.session import Session
+    from conformance.target.exchange import Exchange
+    from conformance.verdict.judge import Judge
+
+pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+_ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
+# For so long after a cancelled goal the robot has to stay where it is, s.
+_STAYS_S: Final = 0.4
+# A robot that comes no nearer for so long does not drive, s; and how long one that does is waited for, by effort.
+_NO_PROGRESS_S: Final = 5.0
+_LONGEST_S: Final = {"quick": 12.0}
+_LONGEST_DEFAULT_S: Final = 30.0
+
+
+@pytest.fixture
+def robot(roaas: Session) -> Robot:
+    """The robot, at rest."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    return Robot(roaas)
+
+
+def _put_new(robot: Robot, judge: Judge, body: dict[str, Any], *ids: str) -> bool:
+    """Put a goal that is new, and judge the status and what GET then shows."""
+    exchange = put_goal(robot, body)
+    status = exchange.response.status if exchange.response else 0
+    holds = judge.that("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal")
+    if status not in NEW and status not in REPEATED:
+        return False
+    goal, problem, shown = await_goal(robot, body)
+    for id_ in ("rest-resources/goal-get", *ids):
+        judge.that(id_, not problem, shown, "the goal that was put", found=problem)
+    if goal is not None:
+        wrong = status_fault(goal)
+        judge.that(
+            "rest-resources/goal-status", not wrong, shown, "status {code, text} with code 1, 2 or 3", found=wrong
+        )
+    return holds and not problem
+
+
+def _cancel(robot: Robot, judge: Judge) -> Exchange:
+    """Cancel the active goal; judge the status, that it is gone, and that the robot stands still in time."""
+    drive = Drive(robot)
+    exchange = robot.delete_goal()
+    drive.answered = time.monotonic()
+    status = exchange.response.status if exchange.response else 0
+    none = await_none(robot)
+    gone = none.response is not None and none.response.status == 404
+    judge.that(
+        "rest-resources/goal-delete",
+        status in CANCELLED and gone,
+        exchange if status not in CANCELLED else none,
+        "204, then 404 for GET",
+        found="" if status not in CANCELLED else f"GET of the goal is answered {none.came}",
+    )
+    drive.reach(STILL, "safety/cancel")
+    return exchange
+
+
+@pytest.mark.requirement(
+    "rest-resources/goal-none",
+    "rest-resources/goal-put",
+    "rest-resources/goal-get",
+    "rest-resources/goal-status",
+    "rest-resources/goal-id",
+    "rest-resources/goal-repeat",
+    "rest-resources/goal-conflict",
+    "rest-resources/goal-preempt",
+    "rest-resources/goal-fills-in",
+    "rest-resources/velocity-goal",
+    "rest-resources/goal-delete",
+    "rest-resources/goal-delete-none",
+    "rest-resources/goal-delete-none-success",
+    "safety/cancel",
+    "safety/cancel-stays",
+)
+def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge) -> None:
+    """One goal through all that clients do with it, then another in its place, then none."""
+    _judge_none(robot, judge)
+    there, back = choose_goals(robot, 1.5, 2)
+    frame = robot.statement.motion.frame
+    first = goal_body(there, frame, _ID)
+    if not _put_new(robot, judge, first, "rest-resources/goal-id"):
+        return
+    _repeat(robot, judge, first, goal_body(back, frame, _ID))
+    _velocity_meanwhile(robot, judge)
+    if robot.goal()[0] is None:
+        put_goal(robot, first)  # a robot may end a goal when it takes a velocity
+    second = goal_body(back, frame)
+    second["goal"]["target_pose"]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
+    if _put_new(robot, judge, second, "rest-resources/goal-preempt"):
+        goal, exchange = robot.goal()
+        filled = goal is not None and goal["goal_id"]["id"] != _ID
+        judge.that("rest-resources/goal-fills-in", filled, exchange, "a header and a goal_id of the robot's own")
+    _await_motion(robot)
+    _cancel(robot, judge)
+    _stays(robot, judge)
+
+
+def _judge_none(robot: Robot, judge: Judge) -> None:
+    """There is no goal, and none to cancel."""
+    for _ in range(3):
+        exchange = await_none(robot)
+        none = exchange.response is not None and exchange.response.status == 404
+        judge.that("rest-resources/goal-none", none, exchange, "404 without an active goal")
+        exchange = robot.delete_goal()
+        status = exchange.response.status if exchange.response else 0
+        judge.that("rest-resources/goal-delete-none", status == 404, exchange, "404 where there is nothing to cancel")
+        judge.that(
+            "rest-resources/goal-delete-none-success", status in {404, 200, 204}, exchange, "404 or 204 without a goal"
+        )
+
+
+def _repeat(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, Any]) -> None:
+    """The same goal again changes nothing; another pose under its id is refused."""
+    for _ in range(3):
+        exchange = put_goal(robot, body)
+        status = exchange.response.status if exchange.response else 0
+        goal, shown = robot.goal()
+        changed = shown.came if goal is None else difference(goal, body)
+        judge.that(
+            "rest-resources/goal-repeat",
+            status in REPEATED and not changed,
+            exchange if status not in REPEATED else shown,
+            "200, 202 or 204 for the goal that is active already, which stays as it is",
+            found=exchange.came if status not in REPEATED else changed,
+        )
+    exchange = put_goal(robot, other)
+    status = exchange.response.status if exchange.response else 0
+    goal, shown = robot.goal()
+    changed = shown.came if goal is None else difference(goal, body)
+    judge.that(
+        "rest-resources/goal-conflict",
+        status == 409 and not changed,
+        exchange if status != 409 else shown,
+        "409 for another pose under the active goal's id, and the goal as it was",
+        found=exchange.came if status != 409 else changed,
+    )
+
+
+def _velocity_meanwhile(robot: Robot, judge: Judge) -> None:
+    """A velocity while a goal is active is taken, or refused with 409."""
+    exchange = robot.put_velocity(Velocity(angular_z=0.1 * robot.limits.angular_rad_s))
+    status = exchange.response.status if exchange.response else 0
+    judge.that(
+        "rest-resources/velocity-goal", status in {200, 204, 409}, exchange, "200, 204 or 409 while a goal is active"
+    )
+
+
+def _await_motion(robot: Robot) -> None:
+    """Wait a little until the robot moves, so that there is something to cancel."""
+    until = time.monotonic() + min(1.0, robot.settle_s)
+    while time.monotonic() < until:
+        velocity, _ = robot.velocity()
+        if velocity is None or not robot.near(velocity, STILL, 3):
+            return
+        time.sleep(0.02)
+
+
+def _stays(robot: Robot, judge: Judge) -> None:
+    """No motion and no goal come back."""
+    until = time.monotonic() + _STAYS_S
+    while time.monotonic() < until:
+        velocity, exchange = robot.velocity()
+        goal, shown = robot.goal()
+        moving = velocity is not None and not robot.near(velocity, STILL, 2)
+        judge.that(
+            "safety/cancel-stays",
+            not moving and goal is None,
+            exchange if moving else shown,
+            "rest, and no goal, after the goal was cancelled",
+            found=f"velocity {velocity}" if moving else "a goal is active again",
+            cause="does not stay",
+        )
+        time.sleep(0.02)
+
+
+@pytest.mark.requirement(
+    "rest-resources/goal-put",
+    "rest-resources/goal-drives",
+    "rest-resources/goal-ended",
+    "rest-resources/goal-id-again",
+    "rest-resources/plan-start",
+    "rest-resources/velocity-odometry",
+    "rest-resources/pose-motion",
+)
+def test_goal_until_it_is_reached(robot: Robot, judge: Judge, roaas: Session) -> None:
+    """A goal nearby is driven to and is then no longer current; its id can be used again."""
+    here = robot.map_pose()
+    if here is None:
+        pytest.skip("the robot's pose cannot be read")
+    (there,) = choose_goals(robot, 0.6, 1)
+    body = goal_body(there, robot.statement.motion.frame, "reached")
+    exchange = put_goal(robot, body)
+    status = exchange.response.status if exchange.response else 0
+    if not judge.that("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal"):
+        return
+    if not _drive_to(robot, judge, there, here, _LONGEST_S.get(roaas.effort.name, _LONGEST_DEFAULT_S)):
+        return
+    # Away from where it was at first: a plan that always starts there is seen now.
+    before = robot.map_pose()
+    _, plan, asked = ask(robot, here)
+    if plan is not None and before is not None:
+        judge_start(robot, plan, before, asked)
+    again = put_goal(robot, body)
+    status = again.response.status if again.response else 0
+    judge.that(
+        "rest-resources/goal-id-again",
+        status in NEW,
+        again,
+        "201 or 202 for a goal whose id has ended before",
+    )
+    await_none(robot, 0.1)
+    robot.delete_goal()
+
+
+def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: float) -> bool:
+    """Watch until the goal has ended; judge that the robot drove and where it is."""
+    drive = Drive(robot)
+    began = progress = time.monotonic()
+    nearest, yaw, here = start.distance(there), start.yaw, start
+    exchange: Exchange | None = None
+    while True:
+        drive.look()
+        goal, exchange = robot.goal()
+        if drive.trace:
+            here = robot.in_map(drive.trace[-1].pose)
+        now = time.monotonic()
+        if here.distance(there) < nearest - 0.02 or abs(here.yaw - yaw) > 0.05:
+            progress, nearest, yaw = now, min(nearest, here.distance(there)), here.yaw
+        if goal is None or now > progress + _NO_PROGRESS_S or now > began + longest_s:
+            break
+    drive.judge_motion()
+    left = here.distance(there)
+    # A robot may take a goal for reached a quarter of a metre before it.
+    moved = 0.15 if start.distance(there) > 0.5 else 0.0
+    ended = goal is None
+    if not ended and left > 0.35 and now <= progress + _NO_PROGRESS_S:
+        return False  # slow, but on its way: nothing to be said against it
+    drove = judge.that(
+        "rest-resources/goal-drives",
+        left < 0.4 and start.distance(here) > moved,
+        exchange,
+        f"the robot at ({there.x:.2f}, {there.y:.2f}), where its goal was",
+        found=f"it is {left:.2f} m away, having moved {start.distance(here):.2f} m",
+        cause="not driven" if start.distance(here) <= moved else "not reached",
+    )
+    judge.that(
+        "rest-resources/goal-ended",
+        ended and exchange is not None and exchange.response is not None and exchange.response.status == 404,
+        exchange,
+        "404 when the goal has been reached",
+        found="" if ended else "the goal is still current",
+    )
+    return ended and drove
