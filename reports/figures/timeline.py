@@ -102,9 +102,12 @@ def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
     points = _thinned([point for point in series["points"] if point["p50_ms"] is not None])
     colour = COLOUR[interface]
     times = [point["t_s"] for point in points]
+    # Unlike dashes keep the two apart where colours are one grey.
+    dash = "-" if interface == "rest" else (0, (5, 1.5))
     panel.axes.plot(
-        times, [point["p50_ms"] for point in points], color=colour, linewidth=1.5, label=f"{interface.upper()} median"
-    )
+        times, [point["p50_ms"] for point in points], color=colour, linewidth=1.5, linestyle=dash,
+        label=f"{interface.upper()} median",
+    )  # fmt: skip
     panel.axes.plot(
         times, [point["max_ms"] for point in points], MARK[interface],
         color=colour, markersize=3, fillstyle="none", markeredgewidth=0.9, label=f"{interface.upper()} longest",
