@@ -1,0 +1,107 @@
+"""JSON as it came over the wire, read more strictly than programs usually do (RFC 8259)."""
+
+from __future__ import annotations
+
+import codecs
+import json
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+# An integer with more digits is beyond every double; Python refuses to read 5,000 of them.
+_DIGITS_READ = 400
+
+
+@dataclass(frozen=True)
+class JsonText:
+    """What a JSON text holds, and what is wrong with it.
+
+    Attributes:
+        value: what it holds; None where it is no JSON.
+        malformed: why it is no JSON, or empty.
+        encoding: why it is not UTF-8 without a byte order mark, or empty.
+        non_finite: the first NaN, Infinity or number beyond every double, or empty.
+        twice: the first name that stands twice in one object, or empty.
+    """
+
+    value: Any = None
+    malformed: str = ""
+    encoding: str = ""
+    non_finite: str = ""
+    twice: str = ""
+
+    @property
+    def problem(self) -> str:
+        """The first thing that is wrong, or empty."""
+        if self.non_finite:
+            return f"the number {self.non_finite}"
+        return self.malformed or self.encoding or (f"the name {self.twice!r} twice" if self.twice else "")
+
+
+class _Reader:
+    """Hooks for ``json.loads`` that keep what it would let pass."""
+
+    def __init__(self) -> None:
+        self.non_finite = ""
+        self.twice = ""
+
+    def constant(self, name: str) -> float:
+        """NaN and the Infinities, which are no JSON."""
+        self.non_finite = self.non_finite or name
+        return {"NaN": math.nan, "Infinity": math.inf}.get(name, -math.inf)
+
+    def real(self, lexeme: str) -> float:
+        """A number with a fraction or an exponent."""
+        number = float(lexeme)
+        if math.isinf(number):
+            self.non_finite = self.non_finite or lexeme[:40]
+        return number
+
+    def whole(self, lexeme: str) -> int | float:
+        """An integer of any length."""
+        if len(lexeme) <= _DIGITS_READ:
+            return int(lexeme)
+        self.non_finite = self.non_finite or f"{lexeme[:12]}... ({len(lexeme)} digits)"
+        return -math.inf if lexeme.startswith("-") else math.inf
+
+    def members(self, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        """An object."""
+        result = dict(pairs)
+        if len(result) < len(pairs):
+            names = [name for name, _ in pairs]
+            self.twice = self.twice or next(name for name in names if names.count(name) > 1)
+        return result
+
+
+@lru_cache(maxsize=4)
+def read_json(body: bytes) -> JsonText:
+    """Read a JSON text; nothing that comes raises.
+
+    Several readers look at one body one after another: what was read is kept for a moment, and must not be changed.
+    """
+    encoding = ""
+    if body.startswith(codecs.BOM_UTF8):
+        encoding = "a byte order mark before the JSON"
+        body = body[3:]
+    try:
+        text = body.decode("utf-8")
+    except UnicodeDecodeError as error:
+        encoding = f"octets that are not UTF-8 at position {error.start}"
+        text = body.decode("utf-8", "replace")
+    reader = _Reader()
+    value = None
+    malformed = ""
+    try:
+        value = json.loads(
+            text,
+            object_pairs_hook=reader.members,
+            parse_constant=reader.constant,
+            parse_float=reader.real,
+            parse_int=reader.whole,
+        )
+    except json.JSONDecodeError as error:
+        malformed = f"no JSON: {error.msg} at line {error.lineno} column {error.colno}"
+    except RecursionError:
+        malformed = "JSON that is nested too deeply to be read"
+    return JsonText(value, malformed, encoding, reader.non_finite, reader.twice)

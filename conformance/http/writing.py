@@ -1,0 +1,87 @@
+"""JSON and XML as they are sent: also what no JSON library would write."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from lxml import etree
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+@dataclass(frozen=True)
+class Token:
+    """A piece of JSON text that is written as it is: ``NaN``, ``1e400``, ``0x1``."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """An object as a list of its members, so that a name can stand in it twice."""
+
+    members: tuple[tuple[str, Any], ...]
+
+
+def json_text(value: Any) -> str:
+    """A value as JSON; Token and Pairs may stand anywhere in it."""
+    if isinstance(value, Token):
+        return value.text
+    if isinstance(value, Pairs):
+        return _object(value.members)
+    if isinstance(value, dict):
+        return _object(value.items())
+    if isinstance(value, list):
+        return "[" + ", ".join(json_text(item) for item in value) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _object(members: Iterable[tuple[str, Any]]) -> str:
+    return "{" + ", ".join(f"{json.dumps(name, ensure_ascii=False)}: {json_text(item)}" for name, item in members) + "}"
+
+
+def xml_bytes(value: Any, root: str, like: etree._Element | None = None) -> bytes:
+    """A value as XML: a child per field, one child per array item.
+
+    Args:
+        value: JSON value; Pairs makes an element stand twice, Token's text is written as it is.
+        root: name of the root element.
+        like: an element that the robot sent for such a value: gives namespace and order of the fields.
+    """
+    namespace = etree.QName(like).namespace if like is not None else None
+    element = etree.Element(etree.QName(namespace, root), nsmap={None: namespace} if namespace else None)  # type: ignore[dict-item] # lxml's own default prefix
+    _fill(element, value, like)
+    return etree.tostring(element, encoding="utf-8", xml_declaration=True)
+
+
+def _fill(element: etree._Element, value: Any, like: etree._Element | None) -> None:
+    if isinstance(value, dict | Pairs):
+        members = list(value.items() if isinstance(value, dict) else value.members)
+        patterns = (
+            {}
+            if like is None
+            else {etree.QName(child).localname: child for child in like if isinstance(child.tag, str)}
+        )
+        order = {name: index for index, name in enumerate(patterns)}
+        members.sort(key=lambda member: order.get(member[0], len(order)))
+        for name, item in members:
+            pattern = patterns.get(name)
+            namespace = etree.QName(pattern if pattern is not None else element).namespace
+            for one in item if isinstance(item, list) else [item]:
+                _fill(etree.SubElement(element, etree.QName(namespace, name)), one, pattern)
+    elif value is not None:
+        element.text = text_of(value)
+
+
+def text_of(value: Any) -> str:
+    """A single value as it stands in XML, a path or a query."""
+    if isinstance(value, Token):
+        return value.text
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, list):
+        return ",".join(text_of(item) for item in value)
+    return str(value)
