@@ -20,6 +20,7 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 import rclpy
+from rclpy.action import ActionClient, ActionServer
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, ShutdownException
 from rclpy.logging import get_logger
@@ -88,6 +89,10 @@ class RosRuntime:
         if self._thread is not None:
             self._thread.join(_JOIN_S)
         for node in reversed(self._nodes):
+            # destroy_node leaves actions alone, and one that is left keeps its node on the graph.
+            for entity in list(node.waitables):
+                if isinstance(entity, ActionClient | ActionServer):
+                    entity.destroy()
             node.destroy_node()
         self.context.try_shutdown()
 
