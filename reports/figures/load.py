@@ -18,8 +18,8 @@ def load(result: Mapping[str, Any]) -> Picture | None:
         return gather(
             "load",
             "A load that rises in steps. Latency: response time, 99th percentile as a line, median dashed. "
-            "Throughput: what came through of what was offered; on the grey line everything did. Vertical lines: the highest rate "
-            "that met the criterion. Hollow: a step that did not meet it.",
+            "Throughput: what came through of what was offered; on the grey line everything did. "
+            "Vertical lines: the highest rate that met the criterion. Hollow: a step that did not meet it.",
             [_latency(steps, knees), _throughput(steps, knees)],
         )
 
