@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # How long a robot that stopped answering is given to come back before the rest of the run is called off, s.
 _GRACE_S = 3.0
+# How many answers tell how fast a robot usually is.
+_LOOKS = 3
 # The interfaces that a class needs; those of "any" need one of the three, those of "all" each that the contract has.
 INTERFACES: dict[str, tuple[str, ...]] = {
     "rest-resources": ("rest",),
@@ -109,16 +111,25 @@ class Session:
         return "/"
 
     def _look(self, name: str, client: HttpClient, path: str) -> None:
-        try:
-            times = []
-            for _ in range(3):
-                answer = client.send("GET", path).response
-                times.append(answer.elapsed_ms if answer else 0.0)
-        except NoAnswerError as none:
-            self.silence[name] = str(none)
-            return
-        usual = max(self.effort.usual_ms, statistics.median(times)) if self.effort.usual_ms else 0.0
-        self.effort = Effort(self.effort.name, usual, self.effort.minutes)
+        """Put an interface down as silent unless it answers something, and see how fast it answers."""
+        times = []
+        # Should the resource hang, another one may not: that is one broken resource, not a robot that is not there.
+        for method, target in (("GET", path), ("GET", path), ("GET", path), ("OPTIONS", path), ("GET", "/")):
+            try:
+                answer = client.send(method, target).response
+            except NoAnswerError as none:
+                self.silence[name] = str(none)
+                if none.kind in {"refused", "tls"}:
+                    return
+                continue
+            self.silence.pop(name, None)
+            times.append(answer.elapsed_ms if answer else 0.0)
+            if len(times) == _LOOKS:
+                break
+        if times:
+            self.silence.pop(name, None)
+            usual = max(self.effort.usual_ms, statistics.median(times))
+            self.effort = Effort(self.effort.name, usual, self.effort.minutes)
 
     @property
     def reached(self) -> bool:
@@ -144,12 +155,15 @@ class Session:
         ]
         while True:
             for client, path in clients:
-                try:
-                    # Another target than the checks', so that an endpoint known to hang is no reason not to ask.
-                    client.send("OPTIONS", path, fresh=True, timeout_s=min(_GRACE_S, self.connection.timeout_s))
-                except NoAnswerError:
-                    continue
-                return True
+                # Several targets, so that an endpoint known to hang is no reason to call the robot dead.
+                for method, target in (("GET", path), ("OPTIONS", path), ("GET", "/")):
+                    try:
+                        client.send(method, target, fresh=True, timeout_s=min(_GRACE_S, self.connection.timeout_s))
+                    except NoAnswerError as none:
+                        if none.kind == "refused":
+                            break
+                        continue
+                    return True
             if time.monotonic() > until:
                 return False
             time.sleep(0.1)

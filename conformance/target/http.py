@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 Headers = tuple[tuple[str, str], ...]
 # An endpoint that has let this many deadlines pass is not asked again: a hang costs its deadline twice at most.
 _HANGS = 2
+# A server may close an idle connection at any time (RFC 9112 9.3.1), so a request that met the end of one is sent again.
+# From a server that has kept connections open this often, so many closed ones are dropped requests, and told as such.
+_KEPT = 10
+_DROPS = 3
 
 
 class NoAnswerError(Exception):
@@ -92,6 +96,8 @@ class HttpClient:
         self.prefix = parts.path
         self.authority = parts.netloc.rsplit("@", 1)[-1]
         self._hangs: Counter[str] = Counter()
+        self._kept = 0
+        self._dropped = 0
         self._pool = self._new_pool()
 
     def _new_pool(self) -> httpcore.ConnectionPool:
@@ -205,6 +211,7 @@ class HttpClient:
                     )
                 )
                 content = _read(answer)
+                self._kept += not opened
                 return Response(
                     answer.status,
                     tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in answer.headers),
@@ -214,14 +221,18 @@ class HttpClient:
                 )
             except Exception as error:
                 none = _no_answer(error, deadline)
-                # A server may close an idle connection at any time (RFC 9112 9.3.1): that answered no request.
-                if none.kind == "closed" and not opened and attempt == 1:
+                if none.kind == "closed" and not opened and attempt == 1 and not self._drops_requests():
                     continue
                 raise none from error
             finally:
                 if pool is not self._pool:
                     pool.close()
         raise AssertionError("unreachable: the second attempt returns or raises")
+
+    def _drops_requests(self) -> bool:
+        """Count a connection that ended with a request on it, and say whether that is this server's habit."""
+        self._dropped += 1
+        return self._kept >= _KEPT and self._dropped >= _DROPS
 
 
 def _read(answer: httpcore.Response) -> bytes:
