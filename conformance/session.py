@@ -140,19 +140,7 @@ class Session:
     def alive(self) -> bool:
         """Whether the robot answers HTTP at all, on any interface that it answered at the start."""
         until = time.monotonic() + _GRACE_S
-        clients = [
-            (client, path)
-            for name, client, path in (
-                ("rest", self.rest, self.rest_path()),
-                ("publishers", self.publishers and self.publishers.client, self.publishers and self.publishers.path),
-                (
-                    "subscribers",
-                    self.subscribers and self.subscribers.client,
-                    self.subscribers and self.subscribers.path,
-                ),
-            )
-            if client is not None and path is not None and name not in self.silence
-        ]
+        clients = self._answering()
         while True:
             for client, path in clients:
                 # Several targets, so that an endpoint known to hang is no reason to call the robot dead.
@@ -167,3 +155,14 @@ class Session:
             if time.monotonic() > until:
                 return False
             time.sleep(0.1)
+
+    def _answering(self) -> list[tuple[HttpClient, str]]:
+        """A client and a path for each interface that answered at the start."""
+        found: list[tuple[HttpClient, str]] = []
+        if self.rest is not None and "rest" not in self.silence:
+            found.append((self.rest, self.rest_path()))
+        for name in ("publishers", "subscribers"):
+            service: SoapService | None = getattr(self, name)
+            if service is not None and name not in self.silence:
+                found.append((service.client, service.path))
+        return found

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Headers = tuple[tuple[str, str], ...]
 # An endpoint that has let this many deadlines pass is not asked again: a hang costs its deadline twice at most.
 _HANGS = 2
-# A server may close an idle connection at any time (RFC 9112 9.3.1), so a request that met the end of one is sent again.
+# A server may close an idle connection at any time (RFC 9112 9.3.1): a request that met the end of one is sent again.
 # From a server that has kept connections open this often, so many closed ones are dropped requests, and told as such.
 _KEPT = 10
 _DROPS = 3
@@ -112,7 +112,7 @@ class HttpClient:
         """Close the connections that are open."""
         self._pool.close()
 
-    def send(  # noqa: PLR0913 - each is one property of a request
+    def send(
         self,
         method: str,
         path: str,
@@ -180,7 +180,7 @@ class HttpClient:
         # An empty Accept given by the caller means: send none at all.
         return tuple(pair for pair in fields if pair != ("Accept", ""))
 
-    def _exchange(  # noqa: PLR0913 - the parts of one request
+    def _exchange(
         self, method: str, path: str, fields: list[tuple[str, str]], body: bytes, deadline: float, *, fresh: bool
     ) -> Response:
         url = httpcore.URL(
