@@ -1,0 +1,177 @@
+"""Two descriptions of one service, compared by what a client sees of them; layout, prefixes and type names are free."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from conformance.soap.description import DescriptionError, name
+from conformance.soap.names import WSDL, WSDL_SOAP, clark, local
+from conformance.soap.schema import SchemaError
+from conformance.soap.shapes import Complex, Element, Group, Simple
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conformance.soap.description import Description, Operation
+
+
+def names(contract: Description, robot: Description) -> Iterator[str]:
+    """In which names the robot's description is another.
+
+    Raises:
+        DescriptionError: the robot's has no binding or no port type.
+    """
+    for what, wanted, found in (
+        ("target namespace", contract.target_namespace, robot.target_namespace),
+        ("port type", name(contract.port_type), name(robot.port_type)),
+        ("binding", name(contract.binding), name(robot.binding)),
+    ):
+        if wanted != found:
+            yield f"{what} {found!r}, not {wanted!r}"
+    for what, here, there in (
+        ("service", _services(contract), _services(robot)),
+        ("port", {name(port) for port in contract.ports}, {name(port) for port in robot.ports}),
+    ):
+        # A robot may have further services and ports, such as one for SOAP 1.2.
+        for missing in sorted(here - there):
+            yield f"{what} {', '.join(sorted(there)) or 'none'!r}, not {missing!r}"
+
+
+def _services(description: Description) -> set[str]:
+    parents = [port.getparent() for port in description.ports]
+    return {name(service) for service in parents if service is not None}
+
+
+def operations(contract: Description, robot: Description) -> Iterator[str]:
+    """In which operations the robot's description is another.
+
+    Raises:
+        DescriptionError: the robot's has no binding or no port type.
+    """
+    there = {operation.name: operation for operation in robot.operations}
+    actions = _soap_actions(contract), _soap_actions(robot)
+    for wanted in contract.operations:
+        found = there.get(wanted.name)
+        if found is None:
+            yield f"there is no operation {wanted.name!r}"
+            continue
+        for what, here, other in (
+            ("input element", wanted.request, found.request),
+            ("output element", wanted.response, found.response),
+            ("messages", ", ".join(wanted.messages), ", ".join(found.messages)),
+            ("parts", str(wanted.parts), str(found.parts)),
+            ("soapAction", actions[0].get(wanted.name), actions[1].get(wanted.name)),
+        ):
+            if here != other:
+                yield f"{wanted.name} has {what} {other or 'none'}, not {here or 'none'}"
+
+
+def _soap_actions(description: Description) -> dict[str, str]:
+    """SoapAction by operation; left out is the same as empty (WSDL 1.1, 3.4)."""
+    found: dict[str, str] = {}
+    for operation in description.binding.findall(clark(WSDL, "operation")):
+        bound = operation.find(clark(WSDL_SOAP, "operation"))
+        if bound is not None:
+            found[name(operation)] = bound.get("soapAction") or ""
+    return found
+
+
+def actions(contract: Description, robot: Description) -> Iterator[str]:
+    """Which wsam:Action is none that the contract allows: as printed there, or with ``Request`` as JAX-WS RI has it."""
+    there = {operation.name: operation for operation in robot.operations}
+    for wanted in contract.operations:
+        found = there.get(wanted.name)
+        if found is None:
+            continue
+        yield from _action(wanted, "input", wanted.input_action, found.input_action, ("", "Request"))
+        yield from _action(wanted, "output", wanted.output_action, found.output_action, ("",))
+
+
+def _action(
+    operation: Operation, side: str, wanted: str | None, found: str | None, ends: tuple[str, ...]
+) -> Iterator[str]:
+    allowed = [f"{wanted}{end}" for end in ends]
+    if wanted is not None and found not in allowed:
+        yield f"{operation.name}: wsam:Action of the {side} is {found!r}, not {' or '.join(map(repr, allowed))}"
+
+
+def types(contract: Description, robot: Description) -> Iterator[str]:
+    """In which types of their messages the descriptions differ, element by element."""
+    for operation in contract.operations:
+        for tag in (operation.request, operation.response):
+            if tag is None:
+                continue
+            wanted = contract.shape(tag)
+            try:
+                found = robot.shape(tag)
+            except SchemaError as error:
+                yield f"the schemas do not compile: {error}"
+                return
+            if wanted is None:
+                continue
+            if found is None:
+                yield f"no schema has the element {tag}"
+            else:
+                yield from _element(wanted, found, local(tag))
+
+
+def _element(wanted: Element, found: Element, where: str) -> Iterator[str]:
+    if wanted.tag != found.tag:
+        yield f"{where} is {found.tag!r}, not {wanted.tag!r}"
+        return
+    if (wanted.minimum, wanted.maximum) != (found.minimum, found.maximum):
+        yield f"{where} occurs {_often(found)}, not {_often(wanted)}"
+    if isinstance(wanted.type, Simple) or isinstance(found.type, Simple):
+        yield from _simple(wanted.type, found.type, where)
+        return
+    here, there = _content(wanted.type), _content(found.type)
+    if [child.tag for child in here] != [child.tag for child in there]:
+        yield f"{where} holds {_listed(there)}, not {_listed(here)}"
+        return
+    if len(here) > 1 and _model(wanted.type) != _model(found.type):
+        yield f"{where} is a {_model(found.type)}, not a {_model(wanted.type)}"
+    for one, other in zip(here, there, strict=True):
+        yield from _element(one, other, f"{where}/{local(one.tag)}")
+
+
+def _simple(wanted: Simple | Complex, found: Simple | Complex, where: str) -> Iterator[str]:
+    if not isinstance(wanted, Simple) or not isinstance(found, Simple):
+        yield f"{where} has {'a simple' if isinstance(found, Simple) else 'a complex'} type"
+    elif wanted.builtin != found.builtin:
+        yield f"{where} is of type {found.builtin}, not {wanted.builtin}"
+    elif wanted.enumeration and sorted(wanted.enumeration) != sorted(found.enumeration):
+        yield f"{where} takes {', '.join(found.enumeration) or 'anything'}, not {', '.join(wanted.enumeration)}"
+
+
+def _content(kind: Simple | Complex) -> tuple[Element, ...]:
+    if isinstance(kind, Simple) or kind.content is None:
+        return ()
+    return _flat(kind.content)
+
+
+def _flat(group: Group) -> tuple[Element, ...]:
+    found: list[Element] = []
+    for item in group.items:
+        found += [item] if isinstance(item, Element) else _flat(item)
+    return tuple(found)
+
+
+def _model(kind: Complex | Simple) -> str:
+    return kind.content.model if isinstance(kind, Complex) and kind.content is not None else "value"
+
+
+def _often(element: Element) -> str:
+    return f"{element.minimum} to {'any number of' if element.maximum is None else element.maximum} times"
+
+
+def _listed(elements: tuple[Element, ...]) -> str:
+    return ", ".join(child.tag for child in elements) or "nothing"
+
+
+def broken(robot: Description) -> str:
+    """Why a description cannot be compared; empty where it can."""
+    try:
+        _ = robot.binding, robot.port_type
+    except DescriptionError as error:
+        return str(error)
+    return ""
