@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
+from conformance.contract.ledger import CLASS_TITLES
 
 if TYPE_CHECKING:
     import datetime as dt
@@ -73,6 +74,7 @@ def result_document(
             "libraries": {name: _installed(name) for name in _LIBRARIES},
         },
         "classes": {name: value for name, (value, _) in classes.items()},
+        "class_titles": {name: CLASS_TITLES[name] for name in classes},
         "class_reasons": {name: reason for name, (_, reason) in classes.items() if reason},
         "requirements": [_requirement(verdict) for verdict in verdicts],
         "notes": notes,
@@ -97,6 +99,7 @@ def _target(session: Session) -> dict[str, Any]:
 def _requirement(verdict: Verdict) -> dict[str, Any]:
     requirement = verdict.requirement
     shown = verdict.value not in {"not-claimed", "skip"}
+    expected = verdict.expected_failure
     return {
         "id": requirement.id,
         "class": requirement.class_,
@@ -109,6 +112,7 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
         "untestable": requirement.untestable,
         "checks": sorted(verdict.evidence.checks - {""}),
         "failures": [_failure(finding) for finding in verdict.evidence.findings.values()] if shown else [],
+        **({"expected_failure": {"reason": expected[0], "expires": expected[1]}} if expected else {}),
     }
 
 

@@ -11,20 +11,22 @@ if TYPE_CHECKING:
 
 LEVELS = ("MUST", "SHOULD", "MAY")
 NEEDS = ("motion", "observer", "probe")
-CLASSES = (
-    "rest-resources",
-    "rest-delivery",
-    "rest-formats",
-    "http",
-    "soap-delivery",
-    "soap-subscribers",
-    "soap-basic-profile",
-    "strict-input",
-    "xml-security",
-    "equivalence",
-    "safety",
-    "describe",
-)
+# What each conformance class holds.
+CLASS_TITLES = {
+    "rest-resources": "Table 1 of the paper over REST, as JSON",
+    "rest-delivery": "The delivery PUT",
+    "rest-formats": "The same resources as XML and plain text, chosen by Accept",
+    "http": "Method, negotiation and error rules of RFC 9110, 9457 and 8259",
+    "soap-delivery": "The publishers service with its two operations",
+    "soap-subscribers": "The subscribers service: the read side of Table 1 over SOAP",
+    "soap-basic-profile": "Rules of message and fault of WS-I Basic Profile 1.1 and SOAP 1.1",
+    "strict-input": "Contract-invalid input is refused over both interfaces and never reaches ROS",
+    "xml-security": "DTD, entity, expansion, depth and size attacks are refused, and the robot stays responsive",
+    "equivalence": "SOAP, REST and ROS tell the same story",
+    "safety": "Velocity stops by itself, limits hold, cancel takes effect at once",
+    "describe": "WSDL, OpenAPI and WADL are served and agree with behaviour",
+}
+CLASSES = tuple(CLASS_TITLES)
 PROFILES = {"paper": ("rest-resources", "rest-delivery", "soap-delivery"), "full": CLASSES}
 _KEYS = {"level", "text", "source", "needs", "own", "untestable"}
 

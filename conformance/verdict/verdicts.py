@@ -25,12 +25,14 @@ class Verdict:
         value: pass, fail, warn, skip, not-claimed or error.
         reason: why, where it is not simply passed.
         evidence: what was seen.
+        expected_failure: reason and last day of the baseline's entry that accepts the failure, or None.
     """
 
     requirement: Requirement
     value: str
     reason: str
     evidence: Evidence
+    expected_failure: tuple[str, str] | None = None
 
 
 def verdict_of(requirement: Requirement, evidence: Evidence, claims: Iterable[str]) -> Verdict:
@@ -111,7 +113,8 @@ def overall(classes: Mapping[str, tuple[str, str]]) -> str:
 
 def expected_failure(verdict: Verdict, reason: str, expires: str) -> Verdict:
     """The verdict of a requirement whose failure a baseline expects."""
-    return replace(verdict, value="warn", reason=f"expected until {expires} ({reason}): {verdict.reason}")
+    told = f"expected until {expires} ({reason}): {verdict.reason}"
+    return replace(verdict, value="warn", reason=told, expected_failure=(reason, expires))
 
 
 def broken_baseline(verdict: Verdict, problem: str) -> Verdict:
