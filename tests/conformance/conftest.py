@@ -66,6 +66,7 @@ def web_server():
 
     class _NotFound(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
+        wbufsize = -1  # an answer in one piece, or each waits 40 ms for an acknowledgement
 
         def _answer(self) -> None:
             self.rfile.read(int(self.headers.get("Content-Length") or 0))
