@@ -1,0 +1,83 @@
+"""Interoperability: zeep, the common SOAP client for Python, is made from the description and calls everything."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from conformance.soap import paper
+from conformance.target.http import NoAnswerError
+
+if TYPE_CHECKING:
+    from conformance.effort import Effort
+    from conformance.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.soap.zeep_client import ZeepCaller
+    from conformance.verdict.judge import Judge
+
+
+def _client(judge: Judge, id_: str, service: SoapService | None) -> ZeepCaller | None:
+    # Imported late: zeep costs a quarter of a second that other checks need not pay.
+    from conformance.soap.zeep_client import ZeepCaller  # noqa: PLC0415
+
+    if service is None:
+        pytest.skip("the service has no address")
+    try:
+        return ZeepCaller(service)
+    except NoAnswerError:
+        raise
+    except Exception as error:  # noqa: BLE001 - whatever zeep finds wrong with a description is the finding
+        judge.that(
+            id_,
+            False,
+            service.wsdl_exchange,
+            "a description from which zeep makes a client",
+            found=f"{type(error).__name__}: {error}"[:300],
+        )
+        return None
+
+
+@pytest.mark.phase("delivery")
+@pytest.mark.needs("publishers")
+@pytest.mark.motion
+@pytest.mark.requirement("soap-delivery/interop")
+def test_publishers(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Both operations are called."""
+    client = _client(judge, "soap-delivery/interop", roaas.publishers)
+    if client is None:
+        return
+    for code in (paper.COFFEE, paper.COURIER) * effort.cases(4):
+        values: dict[str, Any] = {key: float(text) for key, text in paper.COORDINATES.items()} | {"message_code": code}
+        for operation in ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest"):
+            if operation == "ExecuteCoffeeRequest":
+                values["message_code"] = paper.COFFEE
+            _, problem, exchange = client.call(operation, values)
+            judge.that("soap-delivery/interop", not problem, exchange, f"{operation} by zeep", found=problem)
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.needs("subscribers")
+@pytest.mark.requirement("soap-subscribers/interop")
+def test_subscribers(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """All operations are called; those that may have nothing to tell may answer with a fault."""
+    id_ = "soap-subscribers/interop"
+    client = _client(judge, id_, roaas.subscribers)
+    if client is None or roaas.subscribers is None:
+        return
+    x, y = paper.position(roaas.subscribers) or (0.0, 0.0)
+    for _ in range(effort.cases(5)):
+        for operation, arguments in (
+            ("GetPose", {}),
+            ("GetVelocity", {}),
+            ("GetSensors", {}),
+            ("GetNavigationServices", {}),
+            ("GetGoal", {}),
+            ("GetPlan", {"x": x, "y": y}),
+        ):
+            result, problem, exchange = client.call(operation, **arguments)
+            if problem.startswith("fault") and operation in {"GetGoal", "GetPlan"}:
+                problem = ""
+            elif not problem and result is None and operation in {"GetPose", "GetVelocity"}:
+                problem = "zeep returns None"
+            judge.that(id_, not problem, exchange, f"{operation} by zeep", found=problem)
