@@ -41,7 +41,7 @@ def run_load(settings: Settings) -> tuple[int, Path]:
     The process has its own session, so that Ctrl-C comes to it through us, once: it then writes what it has.
     """
     child = subprocess.Popen(
-        [sys.executable, "-m", "loadtests.engine"], stdin=subprocess.PIPE, text=True, start_new_session=True
+        [sys.executable, "-m", "loadtests"], stdin=subprocess.PIPE, text=True, start_new_session=True
     )
 
     def forward(number: int, _: FrameType | None) -> None:
@@ -56,7 +56,9 @@ def run_load(settings: Settings) -> tuple[int, Path]:
     finally:
         for number, handler in earlier.items():
             signal.signal(number, handler)
-    return (code if code >= 0 else exits.INCONCLUSIVE), Path(settings.out)
+    if code < 0:  # ended by a signal: before it could take Ctrl-C as a wish, or by force
+        code = exits.INTERRUPTED if -code in earlier else exits.INCONCLUSIVE
+    return code, Path(settings.out)
 
 
 def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[float, ...]:

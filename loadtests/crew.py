@@ -17,6 +17,7 @@ from locust import User, task
 from locust.env import Environment
 from locust.event import Events
 
+from loadtests.failures import CrewError
 from loadtests.recorder import Recorder
 from loadtests.session import Session
 
@@ -29,10 +30,6 @@ if TYPE_CHECKING:
 _NS = 1_000_000_000
 LEAD_S = 0.3  # from the message to the plan's beginning
 now_ns = time.monotonic_ns
-
-
-class CrewError(Exception):
-    """The load generator itself cannot work: a port in use, workers that do not come up."""
 
 
 class RobotUser(User):

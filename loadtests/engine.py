@@ -1,17 +1,13 @@
-"""The process that measures: `python -m loadtests.engine`, with the settings as JSON on its standard input.
-
-It is a process of its own because importing Locust makes gevent replace the sockets, locks and sleeps of
-everything in the process: front door, reports and tests keep the real ones.
-"""
+"""Carries a run out, from looking at the robot to the written result."""
 
 # Locust patches the standard library on import, which has to come before anything that uses it.
 import locust  # noqa: F401, I001
 
 import logging
 import os
-import resource
 import signal
 import sys
+import traceback
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -21,10 +17,10 @@ from typing import Any
 import gevent
 
 from loadtests.climb import climb
-from loadtests.crew import Crew, CrewError, LocalCrew
+from loadtests.crew import Crew, LocalCrew
 from loadtests.document import Gone, Outcome, compose
 from loadtests.exits import INCONCLUSIVE, UNREACHABLE, USAGE
-from loadtests.failures import CallError
+from loadtests.failures import CallError, CrewError
 from loadtests.leader import LedCrew
 from loadtests.metrics import Collector, serve
 from loadtests.plan import Plan
@@ -149,7 +145,7 @@ class Run:
         clients = tuple(
             client for client in settings.clients if all(offers[f"{interface}/{client}"] for interface in interfaces)
         )
-        self.outcome.notes = sorted(missing)
+        self.outcome.notes += [note for note in sorted(missing) if note not in self.outcome.notes]
         workers = max(1, settings.expect)
         return Plan(
             operations=settings.operations,
@@ -264,16 +260,8 @@ class Run:
         )
 
 
-def _raise_file_limit() -> None:
-    """A connection is a descriptor: take as many as the system lets us have."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft < hard:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-
-
 def carry_out(settings: Settings) -> int:
     """Do a run and write its result; returns the exit code."""
-    _raise_file_limit()
     logging.getLogger("locust").setLevel(logging.ERROR)  # it warns of spawning fast, which is what we want
     run = Run(settings)
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -286,6 +274,9 @@ def carry_out(settings: Settings) -> int:
     except Gone as reason:
         gone = reason
         tell(f"roaas load: {gone}")
+    except Exception as trouble:  # noqa: BLE001 -- our own fault: what was measured is kept, and called invalid
+        traceback.print_exc()
+        gone = Gone(INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
     code, document = compose(run.outcome, run.outcome.plan or run.first_plan(), gone)
     if gone is None or gone.code != USAGE:
         path = write(Path(settings.out), document)
@@ -294,7 +285,3 @@ def carry_out(settings: Settings) -> int:
         sys.stdout.write(final_words(document))
         sys.stdout.flush()
     return code
-
-
-if __name__ == "__main__":
-    sys.exit(carry_out(Settings.from_json(sys.stdin.read())))

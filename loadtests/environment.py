@@ -5,6 +5,7 @@ from __future__ import annotations
 import ipaddress
 import os
 import platform
+import re
 import shlex
 import socket
 from importlib.metadata import PackageNotFoundError, version
@@ -18,6 +19,7 @@ from loadtests.endpoint import Endpoint
 if TYPE_CHECKING:
     from loadtests.robot import Robot
 
+_SECRET = re.compile(r"^-.*(token|password|secret|key)\b(?!-file)", re.IGNORECASE)
 _PACKAGES = (
     "roaas", "locust", "gevent", "httptools", "zeep", "requests", "urllib3", "lxml", "numpy", "hdrhistogram",
 )  # fmt: skip
@@ -87,12 +89,20 @@ def _listener(url: str) -> str | None:
             here = connection.laddr
             if connection.status == psutil.CONN_LISTEN and here and here.port == port and connection.pid:
                 words = psutil.Process(connection.pid).cmdline()
-                return shlex.join([Path(words[0]).name, *(_short(word) for word in words[1:])]) if words else None
+                return _shown(words) if words else None
     except (psutil.Error, OSError):
         return None
     return None
 
 
-def _short(word: str) -> str:
-    """A program's or a folder's path says where this machine keeps it, which is nobody's business."""
-    return Path(word).name if word.startswith("/") else word
+def _shown(words: list[str]) -> str:
+    """A command line without what is nobody's business: the folders of this machine, and secrets."""
+    found = []
+    for before, word in zip(["", *words], words, strict=False):
+        if _SECRET.search(before) and "=" not in before:
+            found.append("***")
+        elif _SECRET.search(word) and "=" in word:
+            found.append(word.split("=", 1)[0] + "=***")
+        else:
+            found.append(Path(word).name if word.startswith("/") else word)
+    return shlex.join(found)

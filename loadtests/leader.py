@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import gevent
 from locust.exception import RPCError
 
-from loadtests.crew import LEAD_S, CrewError, Member, boot_id, new_environment, now_ns
+from loadtests.crew import LEAD_S, Member, boot_id, new_environment, now_ns
+from loadtests.failures import CrewError
 from loadtests.recorder import Recorder
 
 if TYPE_CHECKING:

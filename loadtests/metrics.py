@@ -8,7 +8,7 @@ from gevent.pywsgi import WSGIServer
 from prometheus_client import CollectorRegistry, make_wsgi_app
 from prometheus_client.core import CounterMetricFamily, HistogramMetricFamily, Metric
 
-from loadtests.crew import CrewError
+from loadtests.failures import CrewError
 from loadtests.histogram import Histogram, Ints, edges_us
 from loadtests.plan import SERIES
 from loadtests.recorder import Cell, Recorder

@@ -101,6 +101,32 @@ def _interval(values: Floats) -> Interval | None:
     return float(low), float(high)
 
 
+def at_most(count: int, trials: int, share: float) -> float:
+    """The probability that a binomial variable is at most `count`."""
+    if count >= trials:
+        return 1.0
+    steps = np.arange(1, trials + 1)
+    logs = np.concatenate([[0.0], np.cumsum(np.log(trials + 1 - steps) - np.log(steps))])
+    successes = np.arange(trials + 1)
+    logs = logs + successes * math.log(share) + (trials - successes) * math.log1p(-share)
+    return float(np.exp(logs[: count + 1]).sum())
+
+
+def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
+    """The distribution-free 95 % interval of a quantile, from the order of the samples alone.
+
+    It takes them as independent, which requests are not quite: it serves where there are too few blocks to draw from.
+    """
+    samples = histogram.total
+    if samples < samples_for_interval(quantile):
+        return None
+    ranks = [at_most(rank, samples, quantile) for rank in range(samples + 1)]
+    low = max(0, sum(chance <= _TAIL for chance in ranks) - 1)
+    high = min(samples, sum(chance < 1 - _TAIL for chance in ranks) + 1)
+    bounds = [histogram.quantile_ms(rank / samples) for rank in (low, high)]
+    return (bounds[0] or 0.0), (bounds[1] or 0.0)
+
+
 def interval_ms(histograms: Sequence[Histogram], name: str, seed: int) -> Interval | None:
     """The 95 % interval of a statistic of one series, from its blocks; None with fewer than LEAST_BLOCKS."""
     filled = [histogram for histogram in histograms if histogram.total]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from loadtests.histogram import Histogram
 from loadtests.plan import SERIES, Plan
 from loadtests.recorder import Cell, Recorder, Spans
 from loadtests.resampling import (
@@ -13,12 +14,10 @@ from loadtests.resampling import (
     Interval,
     compare,
     interval_ms,
+    order_interval_ms,
     samples_for_interval,
     samples_for_point,
 )
-
-if TYPE_CHECKING:
-    from loadtests.histogram import Histogram
 
 _NS = 1_000_000_000
 COMPARED = ("mean", "p50", "p90", "p99")
@@ -149,6 +148,11 @@ def bounds(blocks: list[Cell], time: str, quantile: str, seed: int) -> tuple[Int
     if samples < needed:
         return None, f"{samples} samples; a 95 % interval of {quantile} needs {needed}"
     interval = interval_ms(histograms, quantile, seed)
+    if interval is None and quantile in SHARES:
+        whole = Histogram()
+        for histogram in histograms:
+            whole.merge(histogram)
+        interval = order_interval_ms(whole, SHARES[quantile])
     return interval, None if interval else f"fewer than {LEAST_BLOCKS} blocks"
 
 

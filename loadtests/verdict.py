@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from loadtests.histogram import Histogram
+from loadtests.histogram import Histogram, edges_us
+from loadtests.resampling import SHARES, at_most
 from loadtests.summary import Measured, bounds, plain_quantiles, quantiles, rounded
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ MOST_CPU = 0.95
 MOST_LAG_MEDIAN_MS = 1.0
 MOST_LAG_P95_MS = 20.0
 MOST_LAG_P99_MS = 100.0
+_SMALL_CHANCE = 0.025
 NOTED_LAG_P99_MS = 1.0
 LEAST_ACHIEVED = 0.95
 MOST_ERRORS = 0.01
@@ -88,6 +90,16 @@ def invalid_because(figures: dict[str, Any], plan: Plan, pacing: str) -> tuple[l
     return reasons, notes
 
 
+def _surely_above(histogram: Histogram, threshold: Threshold) -> bool:
+    """Whether even few samples prove a quantile to lie above its threshold.
+
+    They do when, were it below, so few samples under the threshold would turn up in less than 2.5 % of all runs.
+    """
+    bins, counts = histogram.arrays()
+    below = int(counts[edges_us(bins)[0] < threshold.below_ms * 1e3].sum())
+    return histogram.total > 0 and at_most(below, histogram.total, SHARES[threshold.quantile]) < _SMALL_CHANCE
+
+
 def judge(measured: Measured, thresholds: list[Threshold]) -> list[dict[str, Any]]:
     """The `thresholds` of latency.json: each against the upper bound of its interval."""
     found = []
@@ -112,6 +124,9 @@ def judge(measured: Measured, thresholds: list[Threshold]) -> list[dict[str, Any
             interval, reason = bounds(blocks, threshold.time, threshold.quantile, measured.plan.seed)
             bound = rounded(interval[1]) if interval else None
         entry["bound_ms"], entry["reason"] = bound, reason
+        if bound is None and threshold.quantile in SHARES and _surely_above(whole, threshold):
+            entry["outcome"] = "missed"
+            entry["reason"] = f"too many of the {whole.total} samples are not below {threshold.below_ms:g} ms"
         if bound is not None:
             met = bound < threshold.below_ms
             entry["outcome"] = "met" if met else "missed"

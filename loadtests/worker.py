@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import platform
 import signal
 import sys
 import time
@@ -57,7 +58,7 @@ class Worker:
         except Exception as trouble:  # noqa: BLE001 -- whatever it is, the master has to hear of it
             error = f"{type(trouble).__name__}: {trouble}"
         pacing = self.session.pacer.pacing if self.session else ""
-        ready = {"error": error, "pacing": pacing, "pid": os.getpid(), "host": os.uname().nodename}
+        ready = {"error": error, "pacing": pacing, "pid": os.getpid(), "host": platform.node()}
         self.runner.send_message("roaas_ready", ready)
 
     def _on_begin(self, environment: Any, msg: Any) -> None:

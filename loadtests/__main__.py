@@ -1,0 +1,35 @@
+"""The process that measures: `python -m loadtests`, with the settings as JSON on its standard input.
+
+It is a process of its own because importing Locust makes gevent replace the sockets, locks and sleeps of
+everything in the process: front door, reports and tests keep the real ones.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+
+def main() -> int:
+    """Do the run; returns the exit code."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during the imports ends it without a traceback
+    from loadtests.engine import carry_out  # noqa: PLC0415 -- it takes a second, during which Ctrl-C has to work
+    from loadtests.settings import Settings  # noqa: PLC0415 -- as above
+
+    _raise_file_limit()
+    return carry_out(Settings.from_json(sys.stdin.read()))
+
+
+def _raise_file_limit() -> None:
+    """A connection is a descriptor: take as many as the system lets us have."""
+    if sys.platform == "win32":
+        return
+    import resource  # noqa: PLC0415 -- there is none on Windows
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft < hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

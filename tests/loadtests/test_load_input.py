@@ -1,0 +1,219 @@
+"""Options, statement, thresholds and WSDL: what is refused, and in which words."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from loadtests import settings, statement, thresholds, wsdl
+from loadtests.endpoint import Endpoint
+from loadtests.payloads import CATALOGUE, differences, rest_request, soap_request, variants
+from loadtests.robot import Robot
+from loadtests.settings import Settings, SettingsError, Wishes, settle
+from loadtests.statement import Statement, StatementError
+from loadtests.thresholds import Threshold, ThresholdsError
+from loadtests.wire import Request
+from loadtests.wsdl import WsdlError
+
+CONTRACT = Path(__file__).parents[2] / "conformance" / "contract"
+REST = {"rest": "http://robot:7003"}
+
+
+def said(text, path="statement.toml"):
+    return statement.parse(tomllib.loads(text), Path(path))
+
+
+def test_options_win_over_the_statement_and_defaults_fill_the_rest():
+    found = settle(
+        Wishes(rest="http://other:1", rate=50.0),
+        said('[endpoints]\nrest = "http://robot:7003"\npublishers_endpoint = "http://robot:5555/p"\ntimeout_s = 3'),
+    )
+    assert (found.rest, found.publishers, found.rate, found.timeout_s) == (
+        "http://other:1",
+        "http://robot:5555/p",
+        50.0,
+        3.0,
+    )
+    assert found.operations == ("pose",)
+    assert found.interfaces == ("rest", "soap")
+    assert found.clients == ("wire", "zeep")
+    assert Settings.from_json(found.to_json()) == found
+
+
+@pytest.mark.parametrize(
+    ("wishes", "message"),
+    [
+        (Wishes(), "no endpoint"),
+        (Wishes(rest="robot"), "'robot' does not begin with http"),
+        (Wishes(**REST, operations=("delivery",)), "--allow-motion"),
+        (Wishes(**REST, rate=10.0, users=2), "exclude each other"),
+        (Wishes(**REST, rate=0.0), "--rate 0 is out of range"),
+        (Wishes(**REST, rate=float("nan")), "--rate nan is out of range"),
+        (Wishes(**REST, users=0), "--users 0 is out of range"),
+        (Wishes(**REST, duration_s=-1.0), "--duration -1 is out of range"),
+        (Wishes(**REST, warmup_s=-1.0), "--warmup -1 is out of range"),
+        (Wishes(**REST, rate=501.0, allow_motion=True), "exceeds 500 requests/s (the default limit"),
+        (Wishes(**REST, duration_s=121.0, allow_motion=True), "exceeds 120 s (the default limit"),
+        (Wishes(**REST, step_rates=(100.0, 600.0), allow_motion=True), "--step-rates 600 exceeds 500"),
+        (Wishes(**REST, token_file="/nonexistent"), "token file '/nonexistent': No such file"),  # noqa: S106 - a path
+        (Wishes(**REST, ca_file="/nonexistent"), "ca_file '/nonexistent'"),
+        (Wishes(**REST, interfaces=("soap",)), "--interface soap needs"),
+    ],
+)
+def test_runs_that_must_not_be(wishes, message):
+    with pytest.raises(SettingsError, match=re.escape(message)):
+        settle(wishes, Statement())
+
+
+def test_the_statements_limits_hold_and_lift():
+    limits = said("[endpoints]\nrequest_rate = 80\n[load]\nmax_duration_s = 5")
+    assert settle(Wishes(**REST), limits).rate == 80
+    assert settle(Wishes(**REST), limits).duration_s == 5
+    with pytest.raises(
+        SettingsError, match=re.escape("exceeds 80 requests/s (the statement's [endpoints] request_rate)")
+    ):
+        settle(Wishes(**REST, rate=81.0), limits)
+    lifted = said("[load]\nmax_rate = 2000\nmax_duration_s = 900")
+    found = settle(Wishes(**REST, rate=1500.0, duration_s=600.0, allow_motion=True), lifted)
+    assert (found.rate, found.max_rate) == (1500.0, 2000.0)
+    assert settle(Wishes(**REST, rate=9000.0, duration_s=600.0), Statement()).rate == 9000.0, "reads are not bounded"
+    assert settle(Wishes(**REST, users=4, allow_motion=True), Statement()).max_rate == settings.MOTION_RATE
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[load]\nmax_rates = 3", "[load]: unknown key 'max_rates'"),
+        ("[endpoints]\nsoap = 'x'", "[endpoints]: unknown key 'soap'"),
+        ("[load]\nmax_rate = 'fast'", "max_rate = 'fast'"),
+        ("[load]\nmax_rate = true", "max_rate = True"),
+        ("[endpoints]\ntimeout_s = -1", "timeout_s = -1"),
+        ("[endpoints]\nrest = 7", "rest = 7"),
+        ("load = 3", "[load] is no table"),
+        ("[[load.thresholds]]\noperation = 'pose'", "'interface', 'quantile', 'below_ms' is missing"),
+    ],
+)
+def test_statements_that_cannot_be_used(text, message):
+    with pytest.raises(StatementError, match=re.escape(message)):
+        said(text)
+
+
+def test_the_conformance_part_of_a_statement_is_passed_over(tmp_path):
+    text = """
+        [robot]
+        name = "R"
+        [classes]
+        claimed = ["http"]
+        [limits]
+        linear_m_s = 0.7
+        [endpoints]
+        publishers_wsdl = "robot.wsdl"
+        token_file = "token"
+        [[load.thresholds]]
+        operation = "pose"
+        interface = "rest"
+        quantile = "p99"
+        below_ms = 5
+    """
+    found = said(text, tmp_path / "statement.toml")
+    assert found.robot == {"name": "R"}
+    assert found.endpoints["publishers_wsdl"] == str(tmp_path / "robot.wsdl"), "files lie beside the statement"
+    assert found.thresholds == (Threshold("pose", "rest", "p99", 5.0),)
+    with pytest.raises(StatementError, match="No such file"):
+        statement.read(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "[[threshold]]\noperation='pose'\ninterface='rest'\nquantile='p99'\nbelow_ms=1\nabove_ms=2",
+            "unknown key 'above_ms'",
+        ),
+        ("[[thresholds]]\noperation='pose'", "unknown key 'thresholds'"),
+        ("[[threshold]]\noperation='pose'\ninterface='rest'\nquantile='p42'\nbelow_ms=1", "quantile = 'p42'"),
+        ("[[threshold]]\noperation='pose'\ninterface='rest'\nquantile='p99'\nbelow_ms=0", "below_ms = 0"),
+        ("[[threshold]]\noperation='pose'\ninterface='rest'\nquantile='p99'\nbelow_ms=nan", "below_ms = nan"),
+        ("threshold = 3", "array of tables"),
+        ("", "holds no [[threshold]]"),
+        ("not toml", "is no TOML"),
+    ],
+)
+def test_thresholds_files_that_cannot_be_used(tmp_path, text, message):
+    path = tmp_path / "limits.toml"
+    path.write_text(text)
+    with pytest.raises(ThresholdsError, match=re.escape(message)):
+        thresholds.read_file(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"a b", "schl\u00fcssel".encode(), b"\xff\xfe"])
+def test_tokens_that_no_header_may_hold(tmp_path, content):
+    path = tmp_path / "token"
+    path.write_bytes(content)
+    with pytest.raises(SettingsError, match="token"):
+        settle(Wishes(**REST, token_file=str(path)), Statement())
+
+
+def test_the_address_is_read_from_the_wsdl():
+    content = (CONTRACT / "publishers.wsdl").read_bytes()
+    found = wsdl.address_in(content, "publishers.wsdl", "ExecuteDeliveryRequest")
+    assert found == "http://127.0.0.1:5555/turtlesim_publisher_ws"
+    elsewhere = wsdl.address_in(
+        content, "http://robot.example:5555/turtlesim_publisher_ws?wsdl", "ExecuteDeliveryRequest"
+    )
+    assert elsewhere == "http://robot.example:5555/turtlesim_publisher_ws", "its own loopback is not ours"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"<html><body>Welcome</body></html>", "is no WSDL 1.1: its root element is 'html'"),
+        (b"no xml", "is no XML"),
+        ((CONTRACT / "subscribers.wsdl").read_bytes(), "has no operation 'ExecuteDeliveryRequest'"),
+        (
+            (CONTRACT / "publishers.wsdl").read_bytes().replace(b"soap:address", b"soap:nothing"),
+            "holds no soap:address",
+        ),
+        (
+            (CONTRACT / "publishers.wsdl").read_bytes().replace(b"http://127.0.0.1:5555", b"REPLACE_ME"),
+            "cannot be used",
+        ),
+        (
+            (CONTRACT / "publishers.wsdl").read_bytes().replace(b"http://soap.turtlebot.mybot.org/", b"urn:else"),
+            "target namespace is 'urn:else'",
+        ),
+    ],
+)
+def test_wsdls_that_cannot_be_used(content, message):
+    with pytest.raises(WsdlError, match=re.escape(message)):
+        wsdl.address_in(content, "x.wsdl", "ExecuteDeliveryRequest")
+
+
+def test_a_wsdl_file_that_is_not_there():
+    with pytest.raises(WsdlError, match="No such file"):
+        wsdl.fetch("/nonexistent.wsdl", Robot(None, None, None))
+
+
+ROBOT_REST = Endpoint.parse("http://robot:7003")
+ROBOT = Robot("http://robot:7003/base", "http://robot:5555/p", "http://robot:5555/s", token="t0ken")  # noqa: S106 - made up
+
+
+@pytest.mark.parametrize("operation", sorted(CATALOGUE))
+def test_both_interfaces_carry_the_same_request(operation):
+    rest, soap = (ROBOT.requests(interface, operation, 1) for interface in ("rest", "soap"))
+    assert len(rest) == len(soap) == 64
+    assert [differences(operation, a, b) for a, b in zip(rest, soap, strict=True)] == [None] * 64
+    assert all(b"Authorization: Bearer t0ken\r\n" in request.octets for request in rest + soap)
+    assert all(b" /base/robot/" in request.octets for request in rest)
+
+
+def test_requests_that_differ_are_found():
+    values = variants("delivery", 1)[0]
+    rest = rest_request(ROBOT_REST, "delivery", values, None)
+    other = soap_request(ROBOT_REST, "delivery", values | {"source_y": values["source_y"] + 1e-13}, None)
+    assert "source_y" in differences("delivery", rest, other)
+    code = soap_request(ROBOT_REST, "delivery", values | {"message_code": 4}, None)
+    assert differences("delivery", rest, code) == "message_code is 3 over REST and 4.0 over SOAP"
+    empty = Request(other.octets.replace(b"arg0", b"arg1"))
+    assert differences("delivery", rest, empty) == "the SOAP request carries no arg0"

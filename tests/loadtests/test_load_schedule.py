@@ -1,0 +1,153 @@
+from collections import Counter
+from dataclasses import replace
+
+import gevent
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from loadtests.arrivals import Schedule
+from loadtests.pacer import Pacer
+from loadtests.plan import CLIENTS, INTERFACES, Plan
+from loadtests.wire import now_ns
+
+PLAN = Plan(
+    operations=("delivery", "pose"), interfaces=INTERFACES, clients=CLIENTS, rate=100.0, users=None, duration_s=20.0,
+    warmup_s=1.0, arrivals="constant", seed=1, timeout_s=10.0, workers=1, connections=32,
+)  # fmt: skip
+
+
+def everything(plan, worker=0, workers=1):
+    schedule = Schedule(plan, worker, workers)
+    return [(segment, *arrival) for segment in range(schedule.count()) for arrival in schedule.arrivals(segment)]
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.integers(1, 7), st.sampled_from(["constant", "poisson"]), st.integers(0, 2**31), st.floats(1.0, 3000.0),
+    st.floats(0.3, 4.0),
+)  # fmt: skip
+def test_the_workers_shares_make_up_the_schedule(workers, arrivals, seed, rate, duration):
+    plan = replace(PLAN, arrivals=arrivals, seed=seed, rate=rate, duration_s=duration)
+    shares = [everything(plan, worker, workers) for worker in range(workers)]
+    assert sorted(arrival for share in shares for arrival in share) == everything(plan)
+    for worker, share in enumerate(shares):
+        schedule = Schedule(plan, worker, workers)
+        assert sum(schedule.share(segment) for segment in range(schedule.count())) == len(share)
+    for segment, due, operation, _ in everything(plan):
+        assert plan.segments[segment].start_ns <= due <= plan.segments[segment].end_ns
+        assert operation in plan.offered(plan.segments[segment].interface, plan.segments[segment].client)
+
+
+def test_a_plan_survives_its_message_and_a_seed_fixes_it():
+    assert Plan.from_message(PLAN.as_message()) == PLAN
+    assert everything(PLAN) == everything(Plan.from_message(PLAN.as_message()))
+    assert everything(PLAN) != everything(replace(PLAN, seed=2))
+
+
+def test_the_rate_is_kept_exactly_by_constant_and_on_average_by_poisson_arrivals():
+    due = [arrival for arrival in everything(PLAN) if PLAN.segments[arrival[0]].phase != "warmup"]
+    assert len(due) == 2000
+    plan = replace(PLAN, arrivals="poisson", rate=1000.0)
+    wire = [arrival for arrival in everything(plan) if plan.segments[arrival[0]].client == "wire"]
+    seconds = sum((s.end_ns - s.start_ns) / 1e9 for s in plan.segments if s.client == "wire")
+    assert abs(len(wire) - 1000 * seconds) < 4 * (1000 * seconds) ** 0.5
+
+
+def test_rest_and_soap_take_turns_in_random_abba_quartets():
+    duel = [segment for segment in PLAN.segments if segment.phase != "warmup"]
+    orders = Counter()
+    for index in range(0, len(duel), 4):
+        quartet = duel[index : index + 4]
+        assert len({(segment.phase, segment.client) for segment in quartet}) == 1
+        sides = [(segment.interface, segment.label) for segment in quartet]
+        assert sides[0] == sides[3]
+        assert sides[1] == sides[2]
+        assert sides[0] != sides[1]
+        orders[sides[0]] += 1
+        assert [segment.pair for segment in quartet] == [index // 2] * 2 + [index // 2 + 1] * 2
+    assert min(orders["rest", ""], orders["soap", ""]) >= 5
+    phases = Counter((segment.phase, segment.client) for segment in duel)
+    assert phases["duel", "wire"] == 120
+    assert phases["duel", "zeep"] == phases["aa", "wire"] == 40
+
+
+def test_no_second_passes_without_the_wire_client():
+    gap = last = 0
+    for segment in PLAN.segments:
+        if (segment.phase, segment.client) == ("duel", "wire"):
+            gap, last = max(gap, segment.start_ns - last), segment.end_ns
+    assert gap <= PLAN.warmup_s * 1e9 or gap <= 0.5e9
+
+
+@given(st.floats(0.1, 3600.0), st.floats(0.01, 5000.0) | st.none())
+def test_the_number_of_blocks_is_bounded_whatever_the_run(duration, rate):
+    plan = replace(PLAN, duration_s=duration, rate=rate, users=None if rate else 3)
+    assert 2 <= plan.blocks <= 600
+    assert plan.length_s == pytest.approx(plan.warmup_s + duration, abs=1e-6)
+
+
+def test_the_ordinary_clients_rate_is_bounded():
+    plan = replace(PLAN, rate=4000.0, workers=2)
+    assert {segment.rate for segment in plan.segments if segment.client == "zeep"} == {200.0}
+    assert {segment.rate for segment in plan.segments if segment.client == "wire"} == {4000.0}
+
+
+class Users:
+    """Greenlets that take arrivals and note when."""
+
+    def __init__(self, pacer, count, work=0.0):
+        self.taken = []
+        self.greenlets = [gevent.spawn(self.run, pacer, work) for _ in range(count)]
+        while pacer.waiting < count:
+            gevent.sleep(0.001)
+
+    def run(self, pacer, work):
+        while True:
+            arrival = pacer.take()
+            self.taken.append((arrival, now_ns()))
+            gevent.sleep(work)
+
+
+def paced(plan, users, work=0.0, timeout_ns=10**10):
+    segments, dropped = [], []
+    pacer = Pacer(timeout_ns, segments.append, dropped.append)
+    crowd = Users(pacer, users, work)
+    origin = now_ns() + 20_000_000
+    pacer.start(Schedule(plan, 0, 1), origin, open_model=plan.open_model)
+    with gevent.Timeout(30):
+        pacer.done.wait()
+        gevent.sleep(work * 3)
+    gevent.killall(crowd.greenlets)
+    pacer.close()
+    assert segments == list(range(len(plan.segments)))
+    return crowd.taken, dropped, origin
+
+
+def test_arrivals_are_started_at_their_times_and_never_before():
+    plan = replace(PLAN, rate=500.0, duration_s=1.0, warmup_s=0.0, clients=("wire",))
+    taken, dropped, origin = paced(plan, 20)
+    wanted = everything(plan)
+    assert not dropped
+    assert sorted((a.segment, a.due_ns - origin, a.operation, a.payload) for a, _ in taken) == sorted(wanted)
+    lags = sorted(at - arrival.due_ns for arrival, at in taken)
+    assert lags[0] >= 0
+    assert lags[len(lags) // 2] < 1_000_000, "half of them within a millisecond, even on a busy machine"
+
+
+def test_arrivals_wait_for_a_user_when_all_are_busy_and_are_dropped_after_their_deadline():
+    plan = replace(PLAN, rate=100.0, duration_s=0.6, warmup_s=0.0, clients=("wire",))
+    taken, dropped, _ = paced(plan, 1, work=0.05, timeout_ns=100_000_000)
+    assert len(taken) < len(everything(plan))
+    assert dropped
+    assert any(arrival.queued for arrival, _ in taken)
+    assert not taken[0][0].queued
+
+
+def test_users_of_the_closed_model_go_on_as_soon_as_they_are_done():
+    plan = replace(PLAN, rate=None, users=3, duration_s=0.5, warmup_s=0.0, clients=("wire",))
+    taken, _, origin = paced(plan, 3, work=0.005)
+    assert 30 < len(taken) < 330
+    for arrival, _ in taken:
+        segment = plan.segments[arrival.segment]
+        assert segment.start_ns <= arrival.due_ns - origin <= segment.end_ns + 1_000_000

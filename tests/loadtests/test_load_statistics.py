@@ -1,0 +1,132 @@
+"""Statistics on made-up data, where the truth is known."""
+
+import numpy as np
+import pytest
+
+from loadtests.arrivals import Schedule
+from loadtests.histogram import Histogram
+from loadtests.plan import Plan
+from loadtests.recorder import Recorder
+from loadtests.resampling import compare, interval_ms, order_interval_ms, samples_for_interval, samples_for_point
+from loadtests.summary import Measured, quantiles, series, time_series
+from loadtests.thresholds import Threshold
+from loadtests.verdict import judge
+
+
+def block(values_ms):
+    histogram = Histogram()
+    histogram.record((np.asarray(values_ms) * 1e6).astype(np.int64))
+    return histogram
+
+
+def test_how_many_samples_a_quantile_needs():
+    assert [samples_for_point(q) for q in (0.5, 0.9, 0.99, 0.999)] == [4, 20, 200, 2000]
+    assert [samples_for_interval(q) for q in (0.5, 0.9, 0.95, 0.99, 0.999)] == [6, 36, 72, 368, 3688]
+
+
+def test_too_few_samples_say_so_instead_of_a_number():
+    figures, reasons = quantiles(block([1.0] * 150))
+    assert figures["p50"] == pytest.approx(1.0, rel=2e-3)
+    assert figures["p99"] is None
+    assert reasons["p99"] == "150 samples; p99 needs 200"
+    assert quantiles(Histogram())[0]["mean"] is None
+
+
+def test_intervals_cover_the_truth_as_often_as_they_promise():
+    lot = np.random.default_rng(3)
+    medians = ratios = 0
+    trials = 80
+    for trial in range(trials):
+        drift = lot.normal(0, 0.05, size=(30, 1))
+        rest = np.exp(lot.normal(0, 0.2, size=(30, 20)) + drift)
+        soap = 1.5 * np.exp(lot.normal(0, 0.2, size=(30, 20)) + drift)
+        low, high = interval_ms([block(row) for row in rest], "p50", trial)
+        medians += low <= 1.0 <= high
+        found = compare([(block(a), block(b)) for a, b in zip(rest, soap, strict=True)], "p50", trial)
+        ratios += found.ci95[0] <= 1.5 <= found.ci95[1]
+        assert found.ci95[0] <= found.ratio <= found.ci95[1]
+    assert medians >= 0.87 * trials
+    assert ratios >= 0.87 * trials
+
+
+def test_a_drift_that_meets_both_sides_does_not_widen_the_ratio():
+    lot = np.random.default_rng(4)
+    drift = np.linspace(1, 3, 40)[:, None]
+    rest = drift * np.exp(lot.normal(0, 0.02, size=(40, 20)))
+    soap = 2 * drift * np.exp(lot.normal(0, 0.02, size=(40, 20)))
+    low, high = compare([(block(a), block(b)) for a, b in zip(rest, soap, strict=True)], "mean", 1).ci95
+    assert 1.97 < low < 2.0 < high < 2.03
+
+
+def test_few_blocks_give_a_ratio_without_an_interval():
+    found = compare([(block([1.0]), block([2.0]))] * 3, "p50", 1)
+    assert found.ratio == pytest.approx(2.0, rel=2e-3)
+    assert found.ci95 is None
+    assert compare([], "p50", 1) is None
+
+
+def test_the_order_of_independent_samples_gives_an_interval_too():
+    lot = np.random.default_rng(5)
+    covered = sum(
+        low <= 1.0 <= high
+        for low, high in (order_interval_ms(block(np.exp(lot.normal(0, 0.3, 40))), 0.5) for _ in range(200))
+    )
+    assert 184 <= covered <= 200
+    assert order_interval_ms(block([1.0] * 367), 0.99) is None
+    assert order_interval_ms(block([1.0] * 368), 0.99) is not None
+
+
+@pytest.mark.parametrize(
+    ("values", "below", "outcome"),
+    [
+        ([1.0] * 40, 0.5, "missed"),
+        ([1.0] * 40, 2.0, "inconclusive"),
+        ([1.0] * 400, 2.0, "met"),
+        ([1.0] * 400, 0.9, "missed"),
+    ],
+)
+def test_a_threshold_is_judged_by_what_is_certain(values, below, outcome):
+    recorder = Recorder(STALL.series_of())
+    blocks = [n for n, s in enumerate(STALL.segments) if (s.phase, s.client, s.interface) == ("duel", "wire", "rest")]
+    for number, value in enumerate(values):
+        recorder.record(blocks[number % len(blocks)], 0, 0, 0, 0, 0, int(value * 1e6), -1)
+    recorder.flush()
+    (found,) = judge(Measured(STALL, recorder), [Threshold("pose", "rest", "p99", below)])
+    assert found["outcome"] == outcome, found
+    assert found["reason"] if outcome != "met" else not found["reason"]
+
+
+STALL = Plan(
+    operations=("pose",), interfaces=("rest", "soap"), clients=("wire", "zeep"), rate=100.0, users=None,
+    duration_s=20.0, warmup_s=0.0, arrivals="constant", seed=1, timeout_s=10.0, workers=1, connections=300,
+)  # fmt: skip
+
+
+def simulated(plan, stall_from, stall_s, service_ms=1.0, *, open_model=True):
+    """A robot that answers in `service_ms`, except that it stands still once; the generator is perfect."""
+    recorder, schedule = Recorder(plan.series_of()), Schedule(plan, 0, 1)
+    free = 0
+    for segment in range(schedule.count()):
+        for due, operation, _ in schedule.arrivals(segment):
+            start = due if open_model else max(due, free)
+            done = start + int(service_ms * 1e6)
+            if stall_from <= start / 1e9 < stall_from + stall_s:
+                done += int((stall_from + stall_s) * 1e9) - start
+            free = done
+            recorder.record(segment, operation, due if open_model else start, start, start, done, done, -1)
+    recorder.flush()
+    return Measured(plan, recorder)
+
+
+@pytest.mark.parametrize("stall_from", [2.0, 7.3, 11.05, 16.6])
+def test_a_stall_of_two_seconds_in_twenty_shows_in_the_p99(stall_from):
+    measured = simulated(STALL, stall_from, 2.0)
+    worst = max(entry["response_ms"]["p99"] for entry in series(measured, {}) if entry["response_ms"]["p99"])
+    assert worst > 1500
+    points = [point for entry in time_series(measured)["series"] for point in entry["points"]]
+    assert max(point["max_ms"] for point in points) > 1800
+
+
+def test_a_generator_that_waits_for_answers_would_not_have_seen_it():
+    measured = simulated(STALL, 7.3, 2.0, open_model=False)
+    assert max(entry["response_ms"]["p99"] or 0 for entry in series(measured, {})) < 10
