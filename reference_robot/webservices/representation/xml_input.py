@@ -17,6 +17,7 @@ from reference_robot.webservices.problems import Problem
 
 # The XML declaration; and a DOCTYPE that nothing but white space, comments and instructions precedes. Both match
 # possessively, so that no document makes them backtrack.
+_DECLARED: Final = re.compile(rb"<\?xml\s")
 _DECLARATION: Final = re.compile(rb"""\A<\?xml\s[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]++)["']""")
 _DOCTYPE: Final = re.compile(rb"\A(?:\s++|<\?(?s:.*?)\?>|<!--(?s:.*?)-->)*+<!DOCTYPE")
 
@@ -58,7 +59,7 @@ def parsed(body: bytes, charset: str | None = None) -> etree._Element:
         raise Problem(400, f"the body is not well-formed XML: {ascii(str(error))[1:-1]}") from error
     if root.getroottree().docinfo.internalDTD is not None:
         raise Problem(400, "the document has a DOCTYPE, which is refused (WS-I BP R1008)")
-    if text.find(b"<?", 2) >= 0:
+    if text.find(b"<?", len(b"<?") if _DECLARED.match(text) else 0) >= 0:
         _refuse_instructions(root)
     return root
 

@@ -1,9 +1,9 @@
 """A robot that is not ours: a node in a process of its own, which tells what reaches it over ROS.
 
-Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent]``. It prints one JSON object a line: ``{"ready": true}``, then
-``{"delivery": …}``, ``{"velocity": …}``, ``{"goal": …}``, ``{"cancel": …}`` as they come. Each line on its stdin is a
-command: ``{"odometry": {"x": …, "covariance": …}}`` publishes that odometry (over and over), ``{"finish": true}`` ends
-the goal.
+Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent]``. It prints one JSON object a line: ``ready``, then
+``delivery``, ``velocity``, ``goal`` and ``cancel`` as they come. Each line on its stdin is a command:
+``{"odometry": {"x": …, "covariance": …, "stopped_clock": …}}`` publishes that odometry over and over,
+``{"finish": true}`` ends the goal.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import threading
 import time
 from typing import Any
 
+import rclpy
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist, TwistStamped
 from mybot_delivery_app.msg import DeliveryRequestMsg
@@ -27,13 +28,12 @@ from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-import rclpy
-
 _UNREACHABLE_X = 1000.0
 
 
 def tell(**event: Any) -> None:
-    print(json.dumps(event), flush=True)
+    sys.stdout.write(json.dumps(event) + "\n")
+    sys.stdout.flush()
 
 
 def bits(value: float) -> str:
@@ -44,6 +44,7 @@ class ForeignRobot(Node):
     def __init__(self, context: Context, velocity: type, *, silent: bool) -> None:
         super().__init__("foreign_robot", context=context)
         self.odometry = None if silent else Odometry()
+        self.stopped_clock = False
         self.finished = threading.Event()
         self._latest_goal: Any = None
         group = ReentrantCallbackGroup()
@@ -66,7 +67,8 @@ class ForeignRobot(Node):
     def _publish(self) -> None:
         odometry = self.odometry
         if odometry is not None:
-            odometry.header.stamp = self.get_clock().now().to_msg()
+            if not self.stopped_clock:
+                odometry.header.stamp = self.get_clock().now().to_msg()
             self._publisher.publish(odometry)
 
     def _delivery(self, message: DeliveryRequestMsg) -> None:
@@ -83,6 +85,7 @@ class ForeignRobot(Node):
 
     def _goal(self, goal: NavigateToPose.Goal) -> GoalResponse:
         pose = goal.pose
+        self.finished.clear()
         tell(goal={"frame_id": pose.header.frame_id, "x": pose.pose.position.x, "w": pose.pose.orientation.w})
         return GoalResponse.REJECT if pose.pose.position.x == _UNREACHABLE_X else GoalResponse.ACCEPT
 
@@ -92,7 +95,6 @@ class ForeignRobot(Node):
 
     def _drive(self, handle: Any) -> NavigateToPose.Result:
         self._latest_goal = handle
-        self.finished.clear()
         while handle.status != GoalStatus.STATUS_CANCELING:
             if self._latest_goal is not handle:
                 handle.abort()  # another goal has preempted this one
@@ -110,6 +112,7 @@ class ForeignRobot(Node):
             odometry.pose.pose.position.x = command["odometry"]["x"]
             odometry.pose.covariance[35] = command["odometry"]["covariance"]
             odometry.twist.twist.linear.x = command["odometry"]["x"] / 10
+            self.stopped_clock = command["odometry"].get("stopped_clock", False)
             self.odometry = odometry
         if "finish" in command:
             self.finished.set()

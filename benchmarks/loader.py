@@ -1,0 +1,153 @@
+"""Load on one HTTP request: by wrk where it is installed, else by sockets in a process of its own.
+
+Both send the next request of a connection when the answer to the last one is complete (a closed model). As a program,
+this module is the second kind: ``python loader.py HOST PORT CONNECTIONS SECONDS < request``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import select
+import shutil
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
+_SUMMARY = """
+done = function(summary, latency, requests)
+  local errors = summary.errors
+  io.write(string.format('{"requests": %d, "seconds": %f, "median_us": %f, "errors": %d}\\n', summary.requests,
+    summary.duration / 1e6, latency:percentile(50),
+    errors.connect + errors.read + errors.write + errors.status + errors.timeout))
+end
+"""
+
+
+@dataclass(frozen=True)
+class Call:
+    """An HTTP request to be repeated."""
+
+    host: str
+    port: int
+    method: str
+    target: str
+    body: str = ""
+    content_type: str = ""
+
+    def octets(self) -> bytes:
+        """Return the request as it goes over the wire."""
+        fields = f"Host: {self.host}:{self.port}\r\n"
+        if self.body:
+            fields += f"Content-Type: {self.content_type}\r\nContent-Length: {len(self.body.encode())}\r\n"
+        return f"{self.method} {self.target} HTTP/1.1\r\n{fields}\r\n{self.body}".encode()
+
+
+@dataclass(frozen=True)
+class Load:
+    """What a load measured: requests answered, failures among them, and the median response time in µs."""
+
+    requests: int
+    seconds: float
+    median_us: float
+    errors: int
+
+    @property
+    def rate(self) -> float:
+        """Requests a second."""
+        return self.requests / self.seconds
+
+
+def load(call: Call, connections: int, seconds: float, cpus: set[int] | None = None) -> Load:
+    """Repeat a request on so many connections for so many seconds, from a second process.
+
+    Args:
+        call: The request.
+        connections: How many connections, each with one request under way.
+        seconds: How long.
+        cpus: Those that the loader may use; None for all.
+    """
+
+    def pin() -> None:
+        if cpus:
+            os.sched_setaffinity(0, cpus)
+
+    if shutil.which("wrk"):
+        return _by_wrk(call, connections, seconds, pin)
+    command = [sys.executable, __file__, call.host, str(call.port), str(connections), str(seconds)]
+    done = subprocess.run(command, input=call.octets(), check=True, capture_output=True, preexec_fn=pin)
+    return Load(**json.loads(done.stdout))
+
+
+def _by_wrk(call: Call, connections: int, seconds: float, pin: Callable[[], None]) -> Load:
+    script = f"wrk.method = {json.dumps(call.method)}\n"
+    if call.body:
+        script += f"wrk.body = {json.dumps(call.body)}\nwrk.headers['Content-Type'] = {json.dumps(call.content_type)}\n"
+    with tempfile.NamedTemporaryFile("w", suffix=".lua") as lua:
+        lua.write(script + _SUMMARY)
+        lua.flush()
+        url = f"http://{call.host}:{call.port}{call.target}"
+        command = ["wrk", "-t1", f"-c{connections}", f"-d{max(1, round(seconds))}s", "-s", lua.name, url]
+        done = subprocess.run(command, check=True, capture_output=True, text=True, preexec_fn=pin)
+    return Load(**json.loads(done.stdout.splitlines()[-1]))
+
+
+class _Connection:
+    def __init__(self, host: str, port: int, request: bytes) -> None:
+        self.socket = socket.create_connection((host, port))
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._request = request
+        self._answer = b""
+        self._sent = 0.0
+
+    def send(self) -> None:
+        self._answer, self._sent = b"", time.perf_counter()
+        self.socket.sendall(self._request)
+
+    def received(self) -> tuple[float, bool] | None:
+        """Return seconds and success once the answer is complete, None before."""
+        octets = self.socket.recv(65536)
+        if not octets:
+            raise ConnectionError("the server closed the connection")
+        self._answer += octets
+        head, end, rest = self._answer.partition(b"\r\n\r\n")
+        length = _LENGTH.search(head)
+        if not end or len(rest) < (int(length[1]) if length else 0):
+            return None
+        return time.perf_counter() - self._sent, head[9:10] == b"2"
+
+
+def _main(host: str, port: str, connections: str, seconds: str) -> None:
+    request = sys.stdin.buffer.read()
+    poll = select.epoll()
+    by_number = {}
+    started = time.perf_counter()
+    for _ in range(int(connections)):
+        connection = _Connection(host, int(port), request)
+        by_number[connection.socket.fileno()] = connection
+        poll.register(connection.socket, select.EPOLLIN)
+        connection.send()
+    times, errors = [], 0
+    while time.perf_counter() - started < float(seconds):
+        for number, _ in poll.poll(1.0):
+            outcome = by_number[number].received()
+            if outcome is not None:
+                times.append(outcome[0])
+                errors += not outcome[1]
+                by_number[number].send()
+    measured = {"requests": len(times), "seconds": time.perf_counter() - started}
+    print(json.dumps(measured | {"median_us": statistics.median(times) * 1e6, "errors": errors}))
+
+
+if __name__ == "__main__":
+    _main(*sys.argv[1:])

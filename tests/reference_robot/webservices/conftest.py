@@ -1,0 +1,49 @@
+"""Fixtures: one server in front of a robot that is not ours, shared by the session."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from web_messages import delivery_path, twist
+from web_robot import ForeignRobot, Served, eventually, running_robot
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@pytest.fixture(scope="session")
+def foreign_session(session_domain_id: int) -> Iterator[ForeignRobot]:
+    robot = ForeignRobot(session_domain_id, "Twist")
+    yield robot
+    robot.close()
+
+
+@pytest.fixture(scope="session")
+def served_session(
+    session_domain_id: int, foreign_session: ForeignRobot, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Served]:
+    config = tmp_path_factory.mktemp("config") / "robot.toml"
+    config.write_text("[web]\nread_deadline = 1.0\n")
+    with running_robot(session_domain_id, "--attach", f"--config={config}") as served:
+        # A message published before the other side is connected would be lost.
+        eventually(lambda: served.call("GET", "/robot/pose/").status_code == 200)
+        eventually(lambda: served.call("PUT", delivery_path()).status_code == 204)
+        foreign_session.next("delivery")
+        eventually(lambda: served.call("PUT", "/robot/velocity/", json=twist()).status_code == 200)
+        foreign_session.next("velocity")
+        yield served
+
+
+@pytest.fixture
+def foreign(foreign_session: ForeignRobot, served_session: Served) -> Iterator[ForeignRobot]:
+    """The foreign robot, at rest before and after each test."""
+    yield foreign_session
+    if served_session.call("DELETE", "/robot/navigation/action/goal/").status_code == 204:
+        foreign_session.forget_until("cancel")
+    foreign_session.forget()
+
+
+@pytest.fixture
+def served(served_session: Served, foreign: ForeignRobot) -> Served:  # noqa: ARG001 - its clean-up is wanted
+    return served_session

@@ -1,0 +1,232 @@
+"""Bad input is refused with a 4xx that names it, reaches no robot, and the next good request is answered."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+from web_messages import delivery_path, goal, twist
+
+if TYPE_CHECKING:
+    from web_robot import ForeignRobot, Served
+
+VELOCITY = "/robot/velocity/"
+GOAL = "/robot/navigation/action/goal/"
+GOOD = json.dumps(twist())
+
+NO_JSON = {
+    "empty": b"",
+    "not closed": b'{"linear": {',
+    "text": b"forward",
+    "single quotes": GOOD.replace('"', "'").encode(),
+    "trailing comma": GOOD.replace("}}", "},}").encode(),
+    "two documents": (GOOD + GOOD).encode(),
+    "byte order mark": b"\xef\xbb\xbf" + GOOD.encode(),
+    "UTF-16": GOOD.encode("utf-16"),
+    "not UTF-8": b'{"linear": "\xff"}',
+    "NaN": GOOD.replace("0.1", "NaN").encode(),
+    "Infinity": GOOD.replace("0.1", "-Infinity").encode(),
+    "deep lists": b"[" * 100_000 + b"]" * 100_000,
+    "deep objects": b'{"a":' * 100_000 + b"1" + b"}" * 100_000,
+    "null byte": GOOD.encode() + b"\0",
+}
+WRONG_JSON = {
+    "null": "null",
+    "list": "[]",
+    "number": "7",
+    "missing part": json.dumps({"linear": twist()["linear"]}),
+    "missing component": GOOD.replace('"z": 0.0', '"y2": 0', 1),
+    "unknown field": json.dumps(twist() | {"stamp": 1}),
+    "string for number": json.dumps(twist(x="0.1")),
+    "true for number": json.dumps(twist(x=True)),
+    "null for number": json.dumps(twist(x=None)),
+    "list for number": json.dumps(twist(x=[0.1])),
+    "list for object": json.dumps(twist() | {"linear": [0.1, 0, 0]}),
+    "1e400": GOOD.replace("0.1", "1e400"),
+    "5,000 digits": GOOD.replace("0.1", "9" * 5000),
+    "400 digits": GOOD.replace("0.1", "9" * 400),
+    "duplicate": GOOD.replace('"x": 0.1', '"x": 0.1, "x": 0.1', 1),
+    "duplicate part": GOOD[:-1] + ', "linear": ' + json.dumps(twist()["linear"]) + "}",
+    "surrogate in a name": GOOD.replace('"x"', '"\\ud800"', 1),
+}
+XML = "<Twist><linear><x>{}</x><y>0</y><z>0</z></linear><angular><x>0</x><y>0</y><z>0</z></angular></Twist>"
+NO_XML = {
+    "empty": "",
+    "not closed": "<Twist>",
+    "two roots": "<Twist/><Twist/>",
+    "DOCTYPE": "<!DOCTYPE Twist>" + XML.format(0.1),
+    "entity": '<!DOCTYPE Twist [<!ENTITY x "0.1">]>' + XML.format("&x;"),
+    "external entity": '<!DOCTYPE Twist [<!ENTITY x SYSTEM "file:///etc/hostname">]>' + XML.format("&x;"),
+    "external DTD": '<!DOCTYPE Twist SYSTEM "http://127.0.0.1:1/x.dtd">' + XML.format(0.1),
+    "billion laughs": '<!DOCTYPE Twist [<!ENTITY a "0">'
+    + "".join(f'<!ENTITY {chr(98 + i)} "{("&" + chr(97 + i) + ";") * 10}">' for i in range(9))
+    + "]>"
+    + XML.format("&j;"),
+    "DOCTYPE after a comment": "<!-- x --><!DOCTYPE Twist>" + XML.format(0.1),
+    "processing instruction": "<?robot go?>" + XML.format(0.1),
+    "processing instruction inside": XML.format("<?robot go?>0.1"),
+    "undefined entity": XML.format("&robot;"),
+    "deep": "<a>" * 50_000 + "</a>" * 50_000,
+    "attributes": "<Twist " + " ".join(f'a{i}=""' for i in range(20_000)) + "/>",
+    "control character": XML.format("\x01"),
+}
+WRONG_XML = {
+    "other root": XML.format(0.1).replace("Twist", "Vector3"),
+    "namespace": XML.format(0.1).replace("<Twist>", '<Twist xmlns="urn:x">'),
+    "text": XML.format("fast"),
+    "NaN": XML.format("NaN"),
+    "INF": XML.format("INF"),
+    "1e400": XML.format("1e400"),
+    "empty number": XML.format(""),
+    "hexadecimal": XML.format("0x1"),
+    "underscore": XML.format("0_1"),
+    "Arabic digits": XML.format("\N{ARABIC-INDIC DIGIT ZERO}"),
+    "missing": XML.format(0.1).replace("<y>0</y>", "", 1),
+    "twice": XML.format(0.1).replace("<y>0</y>", "<y>0</y><y>0</y>", 1),
+    "unknown": XML.format(0.1).replace("<y>0</y>", "<y>0</y><w>0</w>", 1),
+    "attribute": XML.format(0.1).replace("<y>", '<y unit="m/s">', 1),
+    "stray text": XML.format(0.1).replace("<y>", "slow<y>", 1),
+    "nested": XML.format("<n>0.1</n>"),
+}
+
+
+def refused(served: Served, foreign: ForeignRobot, answer, status: int) -> None:
+    assert answer.status_code == status, answer.text
+    assert answer.headers["Content-Type"] == "application/problem+json"
+    assert answer.json()["status"] == status
+    assert answer.json()["detail"]
+    assert "Traceback" not in answer.text
+    assert len(answer.content) < 2000
+    # What comes next over ROS is the next good request: the bad one reached nobody.
+    assert served.call("PUT", VELOCITY, json=twist(x=0.123)).status_code == 200
+    assert foreign.next("velocity")["x"] == 0.123
+
+
+@pytest.mark.parametrize("body", NO_JSON.values(), ids=NO_JSON)
+def test_what_is_no_json_is_400(served: Served, foreign: ForeignRobot, body: bytes):
+    answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": "application/json"})
+    refused(served, foreign, answer, 400)
+
+
+@pytest.mark.parametrize("body", WRONG_JSON.values(), ids=WRONG_JSON)
+def test_json_of_the_wrong_shape_or_value_is_422(served: Served, foreign: ForeignRobot, body: str):
+    answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": "application/json"})
+    refused(served, foreign, answer, 422)
+
+
+@pytest.mark.parametrize("body", NO_XML.values(), ids=NO_XML)
+def test_what_is_no_xml_or_an_attack_is_400(served: Served, foreign: ForeignRobot, body: str):
+    answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": "application/xml"})
+    refused(served, foreign, answer, 400)
+
+
+@pytest.mark.parametrize("body", WRONG_XML.values(), ids=WRONG_XML)
+def test_xml_of_the_wrong_shape_or_value_is_422(served: Served, foreign: ForeignRobot, body: str):
+    answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": "application/xml"})
+    refused(served, foreign, answer, 422)
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {},
+        {"Content-Type": "text/plain"},
+        {"Content-Type": "application/x-yaml"},
+        {"Content-Type": "text/json"},
+        {"Content-Type": "application/json; charset=utf-16"},
+        {"Content-Type": "application/xml; charset=iso-8859-1"},
+        {"Content-Type": "application/xml; charset=robot"},
+        {"Content-Type": "application/json", "Content-Encoding": "gzip"},
+        {"Content-Type": "multipart/form-data; boundary=x"},
+    ],
+)
+def test_other_media_types_and_codings_are_415(served: Served, foreign: ForeignRobot, headers: dict[str, str]):
+    refused(served, foreign, served.call("PUT", VELOCITY, content=GOOD, headers=headers), 415)
+
+
+@pytest.mark.parametrize("charset", ["", "; charset=utf-8", '; charset="UTF-8"', ";charset=us-ascii", "; x=y"])
+def test_json_is_read_with_or_without_a_charset(served: Served, foreign: ForeignRobot, charset: str):
+    headers = {"Content-Type": "application/json" + charset}
+    assert served.call("PUT", VELOCITY, content=GOOD, headers=headers).status_code == 200
+    foreign.next("velocity")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
+def test_xml_is_read_in_both_encodings(served: Served, foreign: ForeignRobot, encoding: str):
+    answer = served.call(
+        "PUT", VELOCITY, content=XML.format(0.1).encode(encoding), headers={"Content-Type": "application/xml"}
+    )
+    assert answer.status_code == 200
+    foreign.next("velocity")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        delivery_path(code="coffee"),
+        delivery_path(code="4.0"),
+        delivery_path(code=""),
+        delivery_path(code="5"),
+        delivery_path(code="0"),
+        delivery_path(code="-4"),
+        delivery_path(code="4294967300"),
+        delivery_path(code="9" * 5000),
+        delivery_path(depot_x="abc"),
+        delivery_path(depot_x=""),
+        delivery_path(depot_y="NaN"),
+        delivery_path(dest_x="Infinity"),
+        delivery_path(dest_x="-inf"),
+        delivery_path(dest_y="1e400"),
+        delivery_path(source_x="1_0"),
+        delivery_path(source_x="0x10"),
+        delivery_path(source_x="1,5"),
+        delivery_path(source_y="1."),
+        delivery_path(source_y="%D9%A1"),
+        delivery_path(source_y="1%20"),
+        delivery_path(source_y="%00"),
+    ],
+)
+def test_deliveries_with_bad_values_are_422(served: Served, foreign: ForeignRobot, path: str):
+    refused(served, foreign, served.call("PUT", path), 422)
+    assert served.call("PUT", delivery_path(source_x=0.5)).status_code == 204
+    assert foreign.next("delivery")["source_x"] == "3fe0000000000000"
+
+
+def test_two_large_doubles_are_no_infinity(served: Served, foreign: ForeignRobot):
+    assert served.call("PUT", delivery_path(source_x="1.7e308", source_y="1.7e308")).status_code == 204
+    foreign.next("delivery")
+
+
+@pytest.mark.parametrize(
+    ("query", "named"),
+    [
+        ("", "x"),
+        ("x=1", "y"),
+        ("x=&y=1", "x"),
+        ("x=one&y=1", "one"),
+        ("x=NaN&y=1", "NaN"),
+        ("x=1&y=Infinity", "Infinity"),
+        ("x=1&y=1e400", "1e400"),
+        ("x=1&y=1&tolerance=-1", "-1"),
+        ("x=1&y=1&yaw=north", "yaw"),
+        ("x=1&y=1&frame_id=mars", "mars"),
+        ("x=1&y=1&frame_id=", "frame_id"),
+        ("x=1&y=1&start_x=here", "start_x"),
+        ("x=1&y=1&tolerance=1e39", "tolerance"),
+    ],
+)
+def test_plans_with_bad_parameters_are_422(served: Served, query: str, named: str):
+    answer = served.call("GET", f"/robot/navigation/service/plan?{query}")
+    assert answer.status_code == 422
+    assert named in answer.json()["detail"]
+
+
+def test_a_parameter_given_twice_is_400(served: Served):
+    assert served.call("GET", "/robot/navigation/service/plan?x=1&x=2&y=1").status_code == 400
+
+
+def test_a_goal_id_with_half_a_character_is_422(served: Served, foreign: ForeignRobot):
+    body = json.dumps(goal("HALF")).replace("HALF", "\\ud83d")
+    answer = served.call("PUT", GOAL, content=body, headers={"Content-Type": "application/json"})
+    refused(served, foreign, answer, 422)

@@ -1,0 +1,177 @@
+"""The command: its one line, its signals, its errors; tokens; the simulation as its child."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from web_messages import delivery_envelope, delivery_path, goal, twist
+from web_robot import eventually, ros_environment, running_robot
+
+COMMAND = [sys.executable, "-m", "reference_robot", "--rest-port=0", "--soap-port=0"]
+READY = re.compile(
+    r"ready rest=http://127\.0\.0\.1:\d+ soap=http://127\.0\.0\.1:\d+/turtlesim_publisher_ws\?wsdl domain=(\d+)\n"
+)
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def failed(*options: str) -> str:
+    """Run the command, which must end with a usage error; return what it says."""
+    command = [*COMMAND, *options]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, env=ros_environment(), timeout=60)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_one_line_and_a_clean_end(domain_id: int, number: signal.Signals):
+    with subprocess.Popen(
+        [*COMMAND, f"--domain-id={domain_id}"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ros_environment(),
+    ) as process:
+        assert READY.fullmatch(process.stdout.readline())[1] == str(domain_id)
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        assert len(children) == 1
+        process.send_signal(number)
+        stdout, stderr = process.communicate(timeout=30)
+        assert process.returncode == 0, stderr
+        assert stdout == ""
+        assert "Traceback" not in stderr
+    eventually(lambda: not any(alive(int(child)) for child in children))
+
+
+def test_a_signal_while_starting_ends_it_cleanly(domain_id: int):
+    with subprocess.Popen([*COMMAND, f"--domain-id={domain_id}"], env=ros_environment()) as process:
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        child = int(eventually(children.read_text).split()[0])
+        process.terminate()
+        assert process.wait(30) == 0
+    eventually(lambda: not alive(child))
+
+
+def test_the_simulation_does_not_outlive_a_killed_robot(domain_id: int):
+    with running_robot(domain_id) as served:
+        child = int(Path(f"/proc/{served.process.pid}/task/{served.process.pid}/children").read_text())
+        served.process.kill()
+        eventually(lambda: not alive(child))
+
+
+def test_the_robot_ends_with_its_simulation(domain_id: int):
+    with running_robot(domain_id) as served:
+        child = int(Path(f"/proc/{served.process.pid}/task/{served.process.pid}/children").read_text())
+        os.kill(child, signal.SIGKILL)
+        assert served.process.wait(30) == 1
+        assert "ended by itself" in served.process.stderr.read()
+
+
+def test_a_port_in_use_is_named():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert str(port) in failed(f"--soap-port={port}", "--attach")
+
+
+def test_an_address_that_is_not_ours_is_named():
+    assert "192.0.2.1" in failed("--host=192.0.2.1", "--attach")
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("[web]\nmax_speed = 1.0\n", "web.max_speed"),
+        ("[web]\nhold = 0\n", "web.hold"),
+        ('[web]\nhold = "1"\n', "web.hold"),
+        ("[web]\nhold = true\n", "web.hold"),
+        ("[web]\nhold = nan\n", "web.hold"),
+        ("web = 1\n", "web"),
+        ("[topics]\nodometry = 'odom'\n", "topics.odometry"),
+        ("[robot]\n", "robot"),
+        ("= 1\n", "TOML"),
+    ],
+)
+def test_a_configuration_that_cannot_be_used_is_named(tmp_path: Path, text: str, named: str):
+    config = tmp_path / "robot.toml"
+    config.write_text(text)
+    assert named in failed(f"--config={config}", "--attach")
+
+
+@pytest.mark.parametrize("text", ["", "  \n", "two words", "é"])
+def test_a_token_file_that_cannot_be_used_is_named(tmp_path: Path, text: str):
+    token = tmp_path / "token"
+    token.write_text(text)
+    assert str(token) in failed(f"--token-file={token}", "--attach")
+
+
+@pytest.mark.parametrize("option", ["--rest-port=70000", "--domain-id=102", "--time-scale=0", "--config=/nowhere"])
+def test_options_out_of_range_are_refused(option: str):
+    assert option.split("=", maxsplit=1)[0] in failed(option)
+
+
+def test_both_interfaces_ask_for_the_token(domain_id: int, tmp_path: Path):
+    file = tmp_path / "token"
+    file.write_text("s3cret\n")
+    right = {"Authorization": "Bearer s3cret"}
+    with running_robot(domain_id, f"--token-file={file}", "--attach") as served:
+        urls = [served.rest + "/robot/pose/", served.rest + "/openapi.json", served.publishers + "?wsdl"]
+        for url in urls:
+            for headers in ({}, {"Authorization": "Bearer wrong"}, {"Authorization": "Basic s3cret"}):
+                refused = served.client.get(url, headers=headers)
+                assert refused.status_code == 401
+                assert refused.headers["WWW-Authenticate"].startswith("Bearer ")
+        assert served.call("PUT", delivery_path()).status_code == 401
+        assert served.soap(delivery_envelope()).status_code == 401
+        assert served.call("GET", "/openapi.json", headers=right).status_code == 200
+        assert served.client.get(served.publishers + "?wsdl", headers=right).status_code == 200
+        assert served.call("GET", "/robot/app/delivery/", headers={"Authorization": "bearer s3cret"}).json() == []
+
+
+def test_the_simulated_robot_behind_the_web(domain_id: int):
+    """From the web to the simulation and back: sensors, plan, goal, mission, and the states of deliveries."""
+    with running_robot(domain_id, "--time-scale=20") as served:
+        sensors = {(entry["name"], entry["type"]) for entry in served.call("GET", "/robot/sensors/").json()}
+        assert ("scan", "sensor_msgs/msg/LaserScan") in sensors
+        services = served.call("GET", "/robot/navigation/services/").json()
+        assert services == [{"name": "/get_plan", "type": "nav_msgs/srv/GetPlan"}]
+        plan = served.call("GET", "/robot/navigation/service/plan?x=76.02&y=41.35&yaw=1").json()["plan"]
+        assert plan["header"]["frame_id"] == "map"
+        assert plan["poses"][-1]["pose"]["position"]["x"] == pytest.approx(76.02, abs=0.1)
+        assert served.call("GET", "/robot/navigation/service/plan?x=0&y=0").status_code == 422
+
+        outside = served.call("PUT", "/robot/navigation/action/goal/", json=goal(x=-500.0))
+        assert outside.status_code == 422
+        assert "outside the map" in outside.json()["detail"]
+
+        assert served.call("PUT", "/robot/velocity/", json=twist(x=0.4)).status_code == 200
+        eventually(lambda: abs(served.call("GET", "/robot/velocity/").json()["linear"]["x"] - 0.4) < 0.02)
+        eventually(lambda: served.call("GET", "/robot/velocity/").json()["linear"]["x"] == 0.0)
+
+        assert served.call("PUT", delivery_path()).status_code == 204
+        assert served.soap(delivery_envelope(message_code=3)).status_code == 200
+        mission = eventually(
+            lambda: (a := served.call("GET", "/robot/navigation/action/goal/")).is_success and a.json()
+        )
+        assert mission["goal"]["target_pose"]["pose"]["position"]["x"] == 76.02
+        assert served.call("PUT", "/robot/velocity/", json=twist()).status_code == 409
+        states = eventually(lambda: [entry["state"] for entry in served.call("GET", "/robot/app/delivery/").json()])
+        assert states in (["queued", "active"], ["queued", "queued"])
+        eventually(lambda: served.call("GET", "/robot/app/delivery/").json()[1]["state"] == "done")
+        eventually(lambda: served.call("GET", "/robot/navigation/action/goal/").is_success)
+        assert served.call("DELETE", "/robot/navigation/action/goal/").status_code == 204
+        assert served.call("GET", "/robot/navigation/action/goal/").status_code == 404
+        eventually(lambda: served.call("GET", "/robot/app/delivery/").json()[0]["state"] == "failed")

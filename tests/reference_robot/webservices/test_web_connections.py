@@ -1,0 +1,107 @@
+"""Clients that send half a request, vanish, or come in hundreds."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import threading
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+from web_messages import delivery_envelope, delivery_path, twist
+
+if TYPE_CHECKING:
+    from web_robot import ForeignRobot, Served
+
+BODY = b'{"linear": {"x": 0.1, "y": 0, "z": 0},'
+HALVES = {
+    "nothing": b"",
+    "half a method": b"PU",
+    "half a target": b"GET /robot/po",
+    "half a field": b"GET /robot/pose/ HTTP/1.1\r\nHost: ro",
+    "no end of the head": b"GET /robot/pose/ HTTP/1.1\r\nHost: robot\r\n",
+    "half a body": b"PUT /robot/velocity/ HTTP/1.1\r\nHost: robot\r\nContent-Type: application/json\r\n"
+    b"Content-Length: 200\r\n\r\n" + BODY,
+    "half a chunk": b"PUT /robot/velocity/ HTTP/1.1\r\nHost: robot\r\nContent-Type: application/json\r\n"
+    b"Transfer-Encoding: chunked\r\n\r\n40\r\n" + BODY,
+}
+
+
+@pytest.mark.parametrize("soap", [False, True], ids=["rest", "soap"])
+@pytest.mark.parametrize("half", HALVES.values(), ids=HALVES)
+def test_half_a_request_is_given_up(served: Served, half: bytes, soap: bool):  # noqa: FBT001
+    with served.connection(soap=soap) as connection:
+        connection.settimeout(10)
+        connection.sendall(half)
+        started = time.monotonic()
+        answer = b""
+        with contextlib.suppress(ConnectionResetError):
+            while received := connection.recv(65536):
+                answer += received
+        assert 0.5 < time.monotonic() - started < 5  # the fixture's deadline is 1 s
+    assert answer == b"" or answer.startswith((b"HTTP/1.1 408 ", b"HTTP/1.1 404 "))
+    assert served.call("GET", "/robot/pose/").status_code == 200
+
+
+def test_a_broken_chunk_is_400(served: Served):
+    head = b"PUT /robot/velocity/ HTTP/1.1\r\nHost: robot\r\nContent-Type: application/json\r\n"
+    assert served.raw(head + b"Transfer-Encoding: chunked\r\n\r\nxyz\r\n{}\r\n").startswith(b"HTTP/1.1 400 ")
+
+
+def test_clients_that_vanish_leave_nothing_behind(served: Served, foreign: ForeignRobot):
+    for half in HALVES.values():
+        for _ in range(5):
+            with served.connection() as connection:
+                connection.sendall(half)
+    for _ in range(20):
+        with served.connection() as connection:  # and does not wait for the answer
+            connection.sendall(f"PUT {delivery_path()} HTTP/1.1\r\nHost: robot\r\n\r\n".encode())
+    for _ in range(20):
+        foreign.next("delivery")
+    assert served.call("PUT", "/robot/velocity/", json=twist()).status_code == 200
+    foreign.next("velocity")
+
+
+def test_pipelined_requests_are_answered_in_order(served: Served):
+    two = (
+        b"GET /robot/pose HTTP/1.1\r\nHost: a\r\n\r\nGET /robot/pose/ HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
+    )
+    answer = served.raw(two)
+    assert re.findall(rb"HTTP/1\.1 (\d+)", answer) == [b"404", b"200"]
+
+
+def test_a_client_that_expects_100_is_told_to_continue(served: Served, foreign: ForeignRobot):
+    body = delivery_envelope().encode()
+    head = b"POST /turtlesim_publisher_ws HTTP/1.1\r\nHost: a\r\nContent-Type: text/xml\r\nConnection: close\r\n"
+    with served.connection(soap=True) as connection:
+        connection.sendall(head + b"Expect: 100-continue\r\nContent-Length: %d\r\n\r\n" % len(body))
+        assert connection.recv(100).startswith(b"HTTP/1.1 100 ")
+        connection.sendall(body)
+        assert connection.recv(1000).startswith(b"HTTP/1.1 200 ")
+    foreign.next("delivery")
+
+
+def test_500_connections_at_once(served: Served):
+    request = b"GET /robot/pose/ HTTP/1.1\r\nHost: robot\r\nConnection: close\r\n\r\n"
+    with contextlib.ExitStack() as stack:
+        connections = [stack.enter_context(served.connection()) for _ in range(500)]
+        for connection in connections:
+            connection.settimeout(20)
+            connection.sendall(request)
+        assert all(connection.recv(100).startswith(b"HTTP/1.1 200 ") for connection in connections)
+
+
+def test_many_clients_at_once_lose_nothing(served: Served, foreign: ForeignRobot):
+    def deliver() -> None:
+        for _ in range(10):
+            assert served.client.put(served.rest + delivery_path()).status_code == 204
+
+    clients = [threading.Thread(target=deliver) for _ in range(10)]
+    for client in clients:
+        client.start()
+    for client in clients:
+        client.join()
+    for _ in range(100):
+        foreign.next("delivery")
+    assert foreign.heard_nothing()

@@ -1,0 +1,81 @@
+"""What ROS publishes is what both interfaces show, in every format."""
+
+from __future__ import annotations
+
+import yaml
+from lxml import etree
+from web_messages import query_envelope
+from web_robot import ForeignRobot, Served, eventually, running_robot
+
+PATH = "/robot/pose/"
+
+
+def plain(element: etree._Element) -> object:
+    """Read XML as JSON would be: numbers where they are, a list where a name repeats."""
+    if not len(element):
+        text = element.text or ""
+        return int(text) if text.lstrip("-").isdigit() else float(text) if text and text[-1].isdigit() else text
+    result: dict[str, object] = {}
+    for child in element:
+        value = plain(child)
+        if child.tag in result:
+            known = result[child.tag]
+            result[child.tag] = [*known, value] if isinstance(known, list) else [known, value]
+        else:
+            result[child.tag] = value
+    return result
+
+
+def published(served: Served, foreign: ForeignRobot, x: float) -> None:
+    foreign.do(odometry={"x": x, "covariance": 1e-05})
+    eventually(lambda: served.call("GET", PATH).json()["pose"]["pose"]["position"]["x"] == x)
+
+
+def test_odometry_of_a_foreign_node_is_the_pose(served: Served, foreign: ForeignRobot):
+    published(served, foreign, 0.1)
+    pose = served.call("GET", PATH).json()
+    assert list(pose) == ["header", "child_frame_id", "pose", "twist"]
+    assert (pose["header"]["frame_id"], pose["child_frame_id"]) == ("odom", "base_link")
+    assert pose["pose"]["covariance"] == [0.0] * 35 + [1e-05]
+    assert len(pose["twist"]["covariance"]) == 36
+    later = eventually(lambda: (new := served.call("GET", PATH).json())["header"] != pose["header"] and new)
+    assert later["header"]["stamp"] != pose["header"]["stamp"]
+
+
+def test_all_formats_and_interfaces_tell_the_same(served: Served, foreign: ForeignRobot):
+    foreign.do(odometry={"x": 1 / 3, "covariance": 1e-05, "stopped_clock": True})
+    as_json = eventually(lambda: (p := served.call("GET", PATH).json())["pose"]["pose"]["position"]["x"] == 1 / 3 and p)
+    xml = etree.fromstring(served.call("GET", PATH, headers={"Accept": "application/xml"}).content)
+    assert xml.tag == "Odometry"
+    assert plain(xml) == as_json
+    assert yaml.safe_load(served.call("GET", PATH, headers={"Accept": "text/plain"}).text) == as_json
+    soap = etree.fromstring(served.soap(query_envelope("GetPose"), url=served.subscribers).content)
+    assert plain(soap.find(".//return")) == as_json
+
+
+def test_velocity_is_the_odometry_s(served: Served, foreign: ForeignRobot):
+    published(served, foreign, 0.5)
+    velocity = served.call("GET", "/robot/velocity/").json()
+    assert velocity == {"linear": {"x": 0.05, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
+    assert served.call("GET", "/robot/velocity/linear/").json() == velocity["linear"]
+
+
+def test_before_the_first_odometry_there_is_503(domain_id: int):
+    silent = ForeignRobot(domain_id, "Twist", "silent")
+    with running_robot(domain_id, "--attach") as served:
+        for path in (PATH, "/robot/velocity/", "/robot/velocity/linear/"):
+            answer = served.call("GET", path)
+            assert answer.status_code == 503
+            assert int(answer.headers["Retry-After"]) > 0
+            assert answer.headers["Content-Type"] == "application/problem+json"
+        fault = served.soap(query_envelope("GetPose"), url=served.subscribers)
+        assert fault.status_code == 500
+        assert "soap:Server" in fault.text
+        silent.do(odometry={"x": 2.0, "covariance": 0.0})
+        eventually(lambda: served.call("GET", PATH).status_code == 200)
+        # A value that is not finite never leaves.
+        silent.do(odometry={"x": 2.0, "covariance": float("nan")})
+        refused = eventually(lambda: (a := served.call("GET", PATH)).status_code == 503 and a)
+        assert "covariance[35] is nan" in refused.json()["detail"]
+        assert served.soap(query_envelope("GetPose"), url=served.subscribers).status_code == 500
+    silent.close()

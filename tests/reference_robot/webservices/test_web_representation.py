@@ -1,0 +1,79 @@
+"""Messages to the wire and back, without a server: nothing is lost on any way."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+import yaml
+from geometry_msgs.msg import Twist
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import BatteryState, LaserScan
+
+from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.messages import NonFiniteValueError, message_from, reader_of
+from reference_robot.webservices.representation.reading import read
+from reference_robot.webservices.representation.shapes import Record, Series, shape_of
+from reference_robot.webservices.representation.writing import write_json, write_text, write_xml
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(st.lists(finite, min_size=6, max_size=6))
+@settings(max_examples=50, deadline=None)
+def test_a_twist_survives_every_format_bit_for_bit(numbers: list[float]):
+    plain = {
+        "linear": dict(zip("xyz", numbers[:3], strict=True)),
+        "angular": dict(zip("xyz", numbers[3:], strict=True)),
+    }
+    shape = shape_of(Twist)
+    assert repr(read(write_json(plain), b"application/json", shape)) == repr(plain)
+    assert repr(read(write_xml(plain, "Twist"), b"application/xml", shape)) == repr(plain)
+    assert repr(yaml.safe_load(write_text(plain))) == repr(plain)
+    assert repr(reader_of(Twist)(message_from(shape, plain))) == repr(plain)
+
+
+@given(st.text(max_size=30))
+@settings(max_examples=100, deadline=None)
+def test_text_survives_json_and_yaml(text: str):
+    assert json.loads(write_json({"id": text})) == {"id": text}
+    assert yaml.safe_load(write_text({"id": text})) == {"id": text}
+    write_xml({"id": text}, "GoalID")  # what XML cannot hold is replaced
+
+
+@pytest.mark.parametrize("kind", [Odometry, Path, LaserScan, BatteryState])
+def test_messages_of_all_kinds_come_back_equal(kind: type):
+    message = kind()
+    if kind is BatteryState:  # unknown figures are NaN there by definition
+        shape = shape_of(kind)
+        for name, _ in shape.fields:
+            if isinstance(getattr(message, name), float):
+                setattr(message, name, 0.5)
+    if kind is LaserScan:
+        message.ranges = [0.5, 1.25]
+    plain = reader_of(kind)(message)
+    assert message_from(shape_of(kind), json.loads(write_json(plain))) == message
+
+
+def test_shapes_come_from_the_definitions():
+    shape = shape_of(Odometry)
+    pose = shape.field("pose")
+    assert isinstance(pose, Record)
+    assert pose.field("covariance") == Series(shape_of(Twist).field("linear").field("x"), 36)
+    assert shape.field("twists") is None
+
+
+def test_what_is_not_finite_is_named():
+    message = Odometry()
+    message.twist.covariance[7] = math.inf
+    with pytest.raises(NonFiniteValueError, match=r"twist\.covariance\[7\] is inf"):
+        reader_of(Odometry)(message)
+
+
+@pytest.mark.parametrize(("kind", "value"), [(Path, '{"header": {"frame_id": "map"}, "poses": 1}')])
+def test_a_value_for_a_list_is_refused(kind: type, value: str):
+    with pytest.raises(Problem, match="poses must be a list, not 1"):
+        read(value.encode(), b"application/json", shape_of(kind))

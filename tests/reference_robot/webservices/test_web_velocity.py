@@ -1,0 +1,95 @@
+"""PUT velocity: what reaches cmd_vel, and what is refused and does not."""
+
+from __future__ import annotations
+
+import pytest
+from web_messages import goal, twist
+from web_robot import ForeignRobot, Served, eventually, running_robot
+
+VELOCITY = "/robot/velocity/"
+LINEAR = "/robot/velocity/linear/"
+GOAL = "/robot/navigation/action/goal/"
+
+
+def test_put_is_published_once_and_answered_with_what_was_accepted(served: Served, foreign: ForeignRobot):
+    answer = served.call("PUT", VELOCITY, json=twist(x=0.5, z=-1))
+    assert answer.status_code == 200
+    assert answer.json() == twist(x=0.5, z=-1.0)
+    assert foreign.next("velocity") == {"type": "Twist", "x": 0.5, "z": -1.0}
+    assert foreign.heard_nothing()
+
+
+def test_put_takes_xml_as_it_is_sent(served: Served, foreign: ForeignRobot):
+    xml = (
+        b"<Twist><linear><x> 1e-1 </x><y>0</y><z>0</z></linear><!-- turn -->"
+        b"<angular><x>0</x><y>0</y><z>0.<!-- -->5</z></angular></Twist>"
+    )
+    fields = {"Content-Type": "application/xml", "Accept": "application/xml"}
+    answer = served.call("PUT", VELOCITY, content=xml, headers=fields)
+    assert answer.status_code == 200
+    assert foreign.next("velocity") == {"type": "Twist", "x": 0.1, "z": 0.5}
+    assert served.call("PUT", VELOCITY, content=answer.content, headers=fields).status_code == 200
+    assert foreign.next("velocity") == {"type": "Twist", "x": 0.1, "z": 0.5}
+
+
+def test_put_linear_leaves_the_angular_part_that_is_in_force(served: Served, foreign: ForeignRobot):
+    served.call("PUT", VELOCITY, json=twist(x=0.5, z=1.0))
+    foreign.next("velocity")
+    answer = served.call("PUT", LINEAR, json={"x": 0.25, "y": 0.0, "z": 0.0})
+    assert answer.json() == {"x": 0.25, "y": 0.0, "z": 0.0}
+    assert foreign.next("velocity") == {"type": "Twist", "x": 0.25, "z": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "names"),
+    [
+        (VELOCITY, twist(x=0.71), ("linear.x", "0.71")),
+        (VELOCITY, twist(x=-0.8), ("linear.x", "-0.8")),
+        (VELOCITY, twist(z=2.6), ("angular.z", "2.6")),
+        (VELOCITY, twist() | {"linear": {"x": 0.1, "y": 0.01, "z": 0.0}}, ("linear.y", "0.01")),
+        (VELOCITY, twist() | {"angular": {"x": 1e-9, "y": 0.0, "z": 0.0}}, ("angular.x", "1e-09")),
+        (LINEAR, {"x": 5.0, "y": 0.0, "z": 0.0}, ("linear.x", "5.0")),
+        (LINEAR, {"x": 0.0, "y": 0.0, "z": 1.0}, ("linear.z", "1.0")),
+    ],
+)
+def test_beyond_the_limits_is_refused_not_clamped(
+    served: Served, foreign: ForeignRobot, path: str, value: object, names: tuple[str, ...]
+):
+    answer = served.call("PUT", path, json=value)
+    assert answer.status_code == 422
+    assert all(name in answer.json()["detail"] for name in names)
+    assert foreign.heard_nothing()
+
+
+def test_while_a_goal_is_active_velocity_is_refused(served: Served, foreign: ForeignRobot):
+    assert served.call("PUT", GOAL, json=goal()).status_code == 201
+    foreign.next("goal")
+    assert served.call("PUT", VELOCITY, json=twist()).status_code == 409
+    assert foreign.heard_nothing()
+    assert served.call("DELETE", GOAL).status_code == 204
+    foreign.next("cancel")
+    assert served.call("PUT", VELOCITY, json=twist()).status_code == 200
+    foreign.next("velocity")
+
+
+def test_a_robot_that_takes_stamped_twists_gets_them(domain_id: int):
+    stamped = ForeignRobot(domain_id, "TwistStamped")
+    with running_robot(domain_id, "--attach") as served:
+        eventually(lambda: served.call("PUT", VELOCITY, json=twist(x=0.3, z=0.2)).status_code == 200)
+        assert stamped.next("velocity") == {"type": "TwistStamped", "x": 0.3, "z": 0.2}
+    stamped.close()
+
+
+def test_without_a_robot_commands_are_not_accepted(domain_id: int):
+    with running_robot(domain_id, "--attach") as served:
+        for answer in (
+            served.call("PUT", VELOCITY, json=twist()),
+            served.call("PUT", GOAL, json=goal()),
+            served.call("PUT", "/robot/app/delivery/4/depot_x/1/depot_y/1/dest_x/1/dest_y/1/source_x/1/source_y/1"),
+            served.call("GET", "/robot/navigation/service/plan?x=1&y=1"),
+        ):
+            assert answer.status_code == 503
+            assert "Retry-After" in answer.headers
+        assert served.call("GET", "/robot/app/delivery/").json() == []
+        assert served.call("GET", "/robot/sensors/").json() == []
+        assert served.call("GET", "/robot/navigation/services/").json() == []

@@ -1,0 +1,145 @@
+"""The real server in front of real ROS, and a robot that is not ours behind it."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import httpx
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+_PATIENCE = 20.0  # seconds
+
+
+@dataclass
+class Served:
+    """A running robot."""
+
+    rest: str
+    publishers: str
+    process: subprocess.Popen
+    client: httpx.Client
+
+    @property
+    def subscribers(self) -> str:
+        return self.publishers.replace("publisher", "subscriber")
+
+    def call(self, method: str, path: str, **named: Any) -> httpx.Response:
+        return self.client.request(method, self.rest + path, **named)
+
+    def soap(self, body: str | bytes, *, url: str | None = None, **headers: str) -> httpx.Response:
+        fields = {"Content-Type": "text/xml; charset=utf-8"} | {
+            name.replace("_", "-"): value for name, value in headers.items()
+        }
+        return self.client.post(url or self.publishers, content=body, headers=fields)
+
+    def raw(self, octets: bytes, *, soap: bool = False) -> bytes:
+        """Send octets on a connection of their own; return all that comes back until it closes or falls silent."""
+        with self.connection(soap=soap) as connection:
+            connection.sendall(octets)
+            answer = b""
+            try:
+                while received := connection.recv(65536):
+                    answer += received
+            except (TimeoutError, ConnectionResetError):
+                pass
+            return answer
+
+    def connection(self, *, soap: bool = False) -> socket.socket:
+        where = urlsplit(self.publishers if soap else self.rest)
+        return socket.create_connection((where.hostname, where.port), timeout=2)
+
+
+class ForeignRobot:
+    """The other process: what it has seen over ROS, and what it is to do."""
+
+    def __init__(self, domain_id: int, *arguments: str) -> None:
+        command = [sys.executable, str(Path(__file__).with_name("foreign_robot.py")), str(domain_id), *arguments]
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=ros_environment()
+        )
+        self._events: queue.Queue[dict[str, Any]] = queue.Queue()
+        threading.Thread(target=self._read, daemon=True).start()
+        self.next("ready")
+
+    def _read(self) -> None:
+        for line in self.process.stdout:
+            self._events.put(json.loads(line))
+
+    def next(self, kind: str) -> Any:
+        """Return what comes next, which must be of this kind."""
+        event = self._events.get(timeout=_PATIENCE)
+        assert kind in event, event
+        return event[kind]
+
+    def forget(self) -> None:
+        """Drop what has come so far."""
+        while not self._events.empty():
+            self._events.get_nowait()
+
+    def forget_until(self, kind: str) -> None:
+        """Drop what comes, up to the next event of this kind."""
+        while kind not in self._events.get(timeout=_PATIENCE):
+            pass
+
+    def heard_nothing(self) -> bool:
+        """Tell whether all is quiet: nothing is waiting, and nothing comes within a moment."""
+        try:
+            self._events.get(timeout=0.2)
+        except queue.Empty:
+            return True
+        return False
+
+    def do(self, **command: Any) -> None:
+        self.process.stdin.write(json.dumps(command) + "\n")
+        self.process.stdin.flush()
+
+    def close(self) -> None:
+        self.process.stdin.close()
+        self.process.wait(_PATIENCE)
+
+
+def ros_environment() -> dict[str, str]:
+    return os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+@contextmanager
+def running_robot(domain_id: int, *options: str) -> Iterator[Served]:
+    command = [sys.executable, "-m", "reference_robot", f"--domain-id={domain_id}", "--rest-port=0", "--soap-port=0"]
+    with subprocess.Popen(
+        [*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment()
+    ) as process:
+        try:
+            words = process.stdout.readline().split()
+            assert words, process.stderr.read()
+            assert words[0] == "ready"
+            told = dict(word.split("=", 1) for word in words[1:])
+            with httpx.Client(timeout=_PATIENCE) as client:
+                yield Served(told["rest"], told["soap"].removesuffix("?wsdl"), process, client)
+        finally:
+            process.terminate()
+            process.communicate(timeout=_PATIENCE)
+
+
+def eventually(condition: Callable[[], Any]) -> Any:
+    """Return the first true value of a condition; fail if it does not come."""
+    give_up = time.monotonic() + _PATIENCE
+    while time.monotonic() < give_up:
+        if value := condition():
+            return value
+        time.sleep(0.02)
+    return pytest.fail("waited in vain")
