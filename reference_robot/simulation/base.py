@@ -17,7 +17,7 @@ from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE, Office
 HOLD_S: Final = 1.0  # a setpoint is good for this long, by the wall clock whatever the time scale
 _PERIOD_S: Final = 0.02  # 50 Hz of simulated time
 _SHORTEST_PERIOD_S: Final = 0.004  # of real time: a time scale beyond 5 makes the steps longer instead
-_LONGEST_STEP_S: Final = 0.1  # of real time: a process that was held up does not jump ahead
+_LONGEST_STEP_S: Final = 0.1  # of simulated time: a robot whose process was held up does not jump ahead
 
 # Variances (m², rad²) of x, y and yaw as a wheeled base with encoders has them; the rest cannot move.
 _POSE_COVARIANCE: Final = [0.0] * 36
@@ -33,7 +33,7 @@ class Base:
     Args:
         node: The node to work through.
         names: Topics and frames; ``velocity.message`` says which type cmd_vel has.
-        time_scale: How many times faster than real time the body moves.
+        time_scale: How many times faster than real time the body moves; at most 25 times.
         limits: Velocity and acceleration limits.
         office: What the body cannot pass.
         start: Where it stands at first.
@@ -87,13 +87,11 @@ class Base:
 
     def _step(self) -> None:
         now = time.monotonic()
-        elapsed = min(now - self._moved_at, _LONGEST_STEP_S)
+        seconds = min((now - self._moved_at) * self._time_scale, _LONGEST_STEP_S)
         self._moved_at = now
         if now - self._commanded_at > HOLD_S:
             self._setpoint = (0.0, 0.0)
-        self.motion = advance(
-            self.motion, self._setpoint, elapsed * self._time_scale, self._limits, self._solid.is_free
-        )
+        self.motion = advance(self.motion, self._setpoint, seconds, self._limits, self._solid.is_free)
         self._report()
 
     def _report(self) -> None:

@@ -86,7 +86,8 @@ class Planner:
         if not all(map(math.isfinite, goal)) or not self._walls.contains(goal[0], goal[1]):
             raise PlanError(PlanFailure.GOAL_OUTSIDE_MAP, f"the goal ({goal[0]:g}, {goal[1]:g}) is outside the map")
         end = self._escape(goal[0], goal[1])
-        if end is None or math.dist(end, goal[:2]) > tolerance:
+        moved = math.inf if end is None else math.dist(end, goal[:2])
+        if end is None or (moved and not moved <= tolerance):  # so written, a tolerance of NaN permits nothing
             raise PlanError(
                 PlanFailure.GOAL_OCCUPIED, f"the goal ({goal[0]:g}, {goal[1]:g}) is in or too near to a wall"
             )
