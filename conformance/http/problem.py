@@ -108,5 +108,10 @@ def detail_of(answer: Response) -> str:
 
 
 def names(detail: str, word: str) -> bool:
-    """Whether a detail names a field: as a word of its own, not as a part of another one."""
-    return re.search(rf"(?<![A-Za-z0-9_]){re.escape(word)}(?![A-Za-z0-9_])", detail) is not None
+    """Whether a detail names a field: as a word of its own, not as a part of another one.
+
+    Of a name in several parts, longer forms count as well: ``destination_x`` for ``dest_x``, as in the ROS message.
+    """
+    first, *parts = word.split("_")
+    pattern = "".join([re.escape(first), *(rf"[A-Za-z0-9]*_{re.escape(part)}" for part in parts)])
+    return re.search(rf"(?<![A-Za-z0-9_]){pattern}(?![A-Za-z0-9_])", detail) is not None

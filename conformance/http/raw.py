@@ -247,3 +247,8 @@ def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) ->
     except FramingError as error:
         return Exchange(request, None, str(error)), b""
     return Exchange(request, response), rest
+
+
+def rest_of(came: RawAnswer, octets: bytes) -> RawAnswer:
+    """What came, from later octets on."""
+    return RawAnswer(octets, came.closed, came.sent_all, came.elapsed_ms)

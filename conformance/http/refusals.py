@@ -60,7 +60,16 @@ def judge_refusal(
     except NoAnswerError as none:
         if closing and none.kind == "closed":
             return judge.that(requirement, holds=True, exchange=none.exchange, expected="4xx, or a closed connection")
-        raise
+        if none.kind not in {"closed", "garbage"} or not session.alive():
+            raise
+        return judge.that(
+            requirement,
+            holds=False,
+            exchange=none.exchange,
+            expected=f"4xx for {what}",
+            found=str(none),
+            cause=f"{what.split(' at ', 1)[0]} {none.kind}",
+        )
     answer = exchange.response
     status = answer.status if answer else 0
     refused = judge.that(

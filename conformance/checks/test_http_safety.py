@@ -1,0 +1,163 @@
+"""Safe methods change nothing (RFC 9110 9.2.1); PUT and DELETE are idempotent (9.2.2)."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.http.calls import JSON, Call, example_call
+from conformance.http.effects import settles_at
+from conformance.http.stability import changed, leaves, snapshot
+from conformance.http.targets import need, reads
+from conformance.target.stillness import bring_to_rest
+
+if TYPE_CHECKING:
+    from conformance.session import Session
+    from conformance.target.exchange import Exchange
+    from conformance.verdict.judge import Judge
+
+pytestmark = pytest.mark.needs("rest")
+_TURNS = 3
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("http/safe")
+def test_reading_changes_nothing(roaas: Session, judge: Judge) -> None:
+    """What was steady before GET, HEAD and OPTIONS of everything is the same after them."""
+    _judge_safe(roaas, judge)
+
+
+@pytest.mark.phase("input")
+@pytest.mark.motion
+@pytest.mark.requirement("http/safe")
+def test_reading_changes_nothing_after_input(roaas: Session, judge: Judge) -> None:
+    """The same when the robot has something to lose: a list that is not empty, a value that was set."""
+    bring_to_rest(roaas)
+    _judge_safe(roaas, judge)
+
+
+def _judge_safe(session: Session, judge: Judge) -> None:
+    """Compare what is steady before and after; what changes with nothing asked as well is no effect of asking.
+
+    A robot that changes by itself changes in some turns; one whose safe methods have effects changes in every turn.
+    """
+    calls = reads(session)
+    suspects: dict[str, tuple[Exchange, str]] = {}
+    for turn in range(_TURNS):
+        before = snapshot(session, calls)
+        for call in calls:
+            for method in ("HEAD", "OPTIONS", "GET"):
+                call.send(session, method=method)
+        found: dict[str, tuple[Exchange, str]] = {}
+        for call in calls:
+            id_ = call.operation.id
+            exchange = call.send(session, ("Accept", JSON))
+            for place, (old, new) in changed(before[id_][0], leaves(exchange)).items():
+                found.setdefault(f"{id_} {place}", (exchange, f"{place} of {id_} was {old!r} before, and is {new!r}"))
+        suspects = found if turn == 0 else {key: item for key, item in found.items() if key in suspects}
+        if not suspects:
+            break
+    for exchange, told in list(suspects.values())[:3]:
+        judge.that("http/safe", False, exchange, "the same after GET, HEAD and OPTIONS of everything", found=told)
+    if not suspects:
+        judge.that("http/safe", True, None, "the same after GET, HEAD and OPTIONS of everything")
+
+
+@pytest.mark.phase("input")
+@pytest.mark.motion
+@pytest.mark.requirement("http/put-idempotent")
+def test_put_twice(roaas: Session, judge: Judge) -> None:
+    """The same PUT twice succeeds twice, and leaves the resource as PUT once does."""
+    wanted = need(roaas, ["http/put-idempotent"], lambda item: item.method == "PUT", "is a PUT")
+    for operation in wanted:
+        bring_to_rest(roaas)
+        call = example_call(roaas, operation)
+        first = call.send(roaas)
+        once = settles_at(roaas, call)
+        second = call.send(roaas)
+        statuses = [item.response.status if item.response else 0 for item in (first, second)]
+        fine = all(200 <= status < 300 or status == 409 for status in statuses)
+        if not _accepted(judge, "http/put-idempotent", operation.id, first):
+            continue
+        judge.that(
+            "http/put-idempotent",
+            fine,
+            second,
+            "a second PUT that succeeds as the first did",
+            found=f"{statuses[0]} and then {statuses[1]} for {operation.id}",
+            cause=f"{operation.id} {statuses[1]}",
+        )
+        if fine and once == "":
+            _renew(roaas, call)
+            twice = settles_at(roaas, call)
+            judge.that(
+                "http/put-idempotent",
+                not twice,
+                second,
+                "the same as after one PUT",
+                found=f"after the second {operation.id}, {twice}",
+                cause=f"{operation.id} effect",
+            )
+    bring_to_rest(roaas)
+
+
+def _accepted(judge: Judge, requirement: str, id_: str, exchange: Exchange) -> bool:
+    """Whether the contract's example was taken; a robot with reasons of its own to refuse it is not blamed here."""
+    answer = exchange.response
+    if answer is not None and (answer.ok or answer.status == 409):
+        return True
+    judge.note(requirement, f"{id_} with a valid request is answered {exchange.came}, so it was not tried")
+    return False
+
+
+def _renew(session: Session, call: Call) -> None:
+    """Send it once more where what was set holds for a while only."""
+    if session.contract.own:
+        call.send(session)
+
+
+@pytest.mark.phase("input")
+@pytest.mark.motion
+@pytest.mark.requirement("http/delete-idempotent")
+def test_delete_twice(roaas: Session, judge: Judge) -> None:
+    """After one DELETE another one is answered 2xx or 404, and the resource stays as it is."""
+    wanted = need(roaas, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "is a DELETE")
+    by_path = {call.operation.template: call for call in reads(roaas)}
+    for operation in wanted:
+        call = example_call(roaas, operation)
+        call.send(roaas)
+        read = by_path.get(operation.template)
+        before = _after_a_while(roaas, read)
+        exchange = call.send(roaas)
+        status = exchange.response.status if exchange.response else 0
+        judge.that(
+            "http/delete-idempotent",
+            200 <= status < 300 or status == 404,
+            exchange,
+            "2xx or 404 for a second DELETE",
+            found=f"status {status}",
+            cause=f"{status}",
+        )
+        after = _after_a_while(roaas, read)
+        judge.that(
+            "http/delete-idempotent",
+            before == after,
+            exchange,
+            "the same after the second DELETE as after the first",
+            found=f"GET is answered {after} after the second DELETE, and {before} after the first",
+        )
+
+
+def _after_a_while(session: Session, read: Call | None) -> int:
+    """The status of GET, once it is the same three times: a cancelled goal may take a moment to end."""
+    if read is None:
+        return 0
+    statuses: list[int] = []
+    until = time.monotonic() + session.statement.limits.settle_s
+    while True:
+        answer = read.send(session).response
+        statuses.append(answer.status if answer else 0)
+        if (len(statuses) > 2 and len(set(statuses[-3:])) == 1) or time.monotonic() > until:
+            return statuses[-1]

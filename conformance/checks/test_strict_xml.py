@@ -1,0 +1,47 @@
+"""XML bodies that break the contract are refused, by robots that take XML."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.http.calls import XML, example_call, root_name
+from conformance.http.refusals import judge_refusal
+from conformance.http.targets import need, sampled
+from conformance.http.xml_mutations import xml_mutations
+from conformance.target.stillness import bring_to_rest
+
+if TYPE_CHECKING:
+    from conformance.session import Session
+    from conformance.verdict.judge import Judge
+
+pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
+_ID = "strict-input/xml-body"
+_EACH = 80
+
+
+@pytest.mark.requirement(_ID, "http/no-server-error")
+def test_xml_mutations_are_refused(roaas: Session, judge: Judge) -> None:
+    """Each named mutation of a valid XML body is refused with 4xx."""
+    taken = 0
+    operations = need(roaas, [_ID], lambda item: XML in item.bodies, "takes XML")
+    for operation in operations:
+        bring_to_rest(roaas)
+        call = example_call(roaas, operation, XML)
+        exchange = call.send(roaas)
+        answer = exchange.response
+        if answer is None or not (answer.ok or answer.status == 409):
+            judge.note(_ID, f"a valid {operation.id} as XML is answered {exchange.came}, so nothing was made of it")
+            continue
+        taken += 1
+        schema = operation.bodies[XML].schema
+        made = xml_mutations(call.value, schema, root_name(schema) or "value")
+        for name, body in sampled(roaas, made, _EACH, operation.id):
+            wrong = call.carrying(body)
+            if not judge_refusal(roaas, partial(wrong.send, roaas), _ID, name, json=False):
+                bring_to_rest(roaas)
+    bring_to_rest(roaas)
+    if not taken and "rest-formats" not in roaas.claims:
+        judge.unclaimed(_ID, "the robot takes no XML")

@@ -1,0 +1,58 @@
+"""What a robot shows that does not change by itself: what two readings may be compared by."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from conformance.http.jsontext import read_json
+from conformance.http.operations import is_json
+from conformance.http.representation import flattened
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from conformance.http.calls import Call
+    from conformance.session import Session
+    from conformance.target.exchange import Exchange
+
+Picture = dict[str, Any]
+
+
+def leaves(exchange: Exchange) -> Picture:
+    """Status and every single value of a JSON answer, by place."""
+    answer = exchange.response
+    if answer is None:
+        return {"status": 0}
+    picture: Picture = {"status": answer.status}
+    if answer.ok and is_json(answer.media_type):
+        text = read_json(answer.body)
+        if not text.problem:
+            picture.update(flattened(text.value))
+    return picture
+
+
+def steady(pictures: Iterable[Picture]) -> Picture:
+    """What is the same in all pictures."""
+    first, *others = pictures
+    return {
+        place: value
+        for place, value in first.items()
+        if all(place in other and other[place] == value for other in others)
+    }
+
+
+def snapshot(session: Session, calls: Iterable[Call], times: int = 3) -> dict[str, tuple[Picture, Exchange]]:
+    """What is steady over some readings of each operation, by its id, with the last reading."""
+    taken: dict[str, list[Exchange]] = {}
+    for _ in range(times):
+        for call in calls:
+            exchange = call.send(session, ("Accept", "application/json"))
+            taken.setdefault(call.operation.id, []).append(exchange)
+    return {id_: (steady(leaves(one) for one in exchanges), exchanges[-1]) for id_, exchanges in taken.items()}
+
+
+def changed(before: Picture, after: Picture) -> dict[str, tuple[Any, Any]]:
+    """What was steady before and is another after; places that are gone count only where the status is the same."""
+    if before.get("status") != after.get("status"):
+        return {"status": (before.get("status"), after.get("status"))} if "status" in before else {}
+    return {place: (value, after.get(place, "nothing")) for place, value in before.items() if after.get(place) != value}
