@@ -38,8 +38,8 @@ ENVELOPE = (
     "<source_y>41.35</source_y></arg0></tns:ExecuteDeliveryRequest></soap:Body></soap:Envelope>"
 )
 ROUNDS = 5
-# On one connection, server and loader take turns; whether they share a processor then decides the time more than what
-# they do, and the scheduler changes its mind. So both servers' event loops run on one and the loader on another.
+# On one connection, server and loader take turns; whether they share a processor decides the time more than what they
+# do, and the scheduler changes its mind. So both servers' event loops run on one and the loader on another.
 SERVER_CPUS, LOADER_CPUS = ({0}, {1}) if {0, 1} <= os.sched_getaffinity(0) else (None, None)
 MANY_CONNECTIONS = 32
 LEAST_RATE = 20_000  # PUT deliveries a second on 32 connections
@@ -78,8 +78,9 @@ def main() -> int:
             ),
         }
         port = stack.enter_context(running_bare([call for call, _ in calls.values()]))
-        for name, (call, most) in calls.items():
-            met.append(ratio(name, call, replace(call, port=port), most, chosen.seconds))
+        with pinned(robot.pids[0]):
+            for name, (call, most) in calls.items():
+                met.append(ratio(name, call, replace(call, port=port), most, chosen.seconds))
         met += many_connections(robot, chosen.seconds)
         met.append(growth(robot, before))
     print("all targets met" if all(met) else "targets missed")
@@ -93,7 +94,9 @@ def ratio(name: str, call: Call, bare: Call, most: float, seconds: float) -> boo
     rounds = [(load(call, 1, seconds, LOADER_CPUS), load(bare, 1, seconds, LOADER_CPUS)) for _ in range(ROUNDS)]
     found = statistics.median(robot.median_us / yardstick.median_us for robot, yardstick in rounds)
     errors = sum(robot.errors for robot, _ in rounds)
-    robot_ms, bare_ms = (statistics.median(side.median_us for side in sides) / 1000 for sides in zip(*rounds))
+    robot_ms, bare_ms = (
+        statistics.median(side.median_us for side in sides) / 1000 for sides in zip(*rounds, strict=True)
+    )
     return report(
         f"{name}: median {robot_ms:.3f} ms, bare {bare_ms:.3f} ms, ratio {found:.2f} (at most {most}), {errors} errors",
         found <= most and not errors,
@@ -173,9 +176,22 @@ def running_bare(calls: list[Call]) -> Iterator[int]:
         command = [sys.executable, str(Path(__file__).with_name("bare.py")), file.name]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             try:
-                yield int(process.stdout.readline())
+                port = int(process.stdout.readline())
+                with pinned(process.pid):
+                    yield port
             finally:
                 process.terminate()
+
+
+@contextmanager
+def pinned(pid: int) -> Iterator[None]:
+    """Keep a process's main thread, which is its event loop's, on the servers' processor."""
+    before = os.sched_getaffinity(pid)
+    os.sched_setaffinity(pid, SERVER_CPUS or before)
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(pid, before)
 
 
 def cpu_seconds(robot: Robot) -> float:
