@@ -118,10 +118,13 @@ class ProbeObserver:
 
     def __init__(self, probe: Probe) -> None:
         self._probe = probe
+        self._marked = False
 
     def mark(self) -> None:
         """See DeliveryObserver."""
-        time.sleep(_QUIET_S)
+        if not self._marked:
+            time.sleep(_QUIET_S)  # what others sent may still be on its way; later collect() has waited
+            self._marked = True
         self._probe.deliveries()
 
     def collect(self, count: int) -> list[Seen]:
