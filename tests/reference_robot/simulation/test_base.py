@@ -57,8 +57,9 @@ def test_a_command_that_is_no_number_changes_nothing(robot):
     assert max(message.twist.twist.linear.x for _, message in robot.odometry) == 0.2
 
 
+@pytest.mark.parametrize("robot", [{"time_scale": 20.0}], indirect=True)
 def test_a_base_against_a_wall_stays_inside(robot):
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 30
     while robot.pose[0] < 82.7 and time.monotonic() < deadline:
         robot.command(0.7)
         time.sleep(0.05)

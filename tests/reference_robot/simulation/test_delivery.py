@@ -7,7 +7,7 @@ from observer import pose, until
 
 from reference_robot.simulation.office import DEPOT, DESTINATION, SOURCE
 
-FAST = pytest.mark.parametrize("robot", [{"time_scale": 10.0}], indirect=True)
+FAST = pytest.mark.parametrize("robot", [{"time_scale": 20.0}], indirect=True)
 NEAR = ((69.0, 38.7), (69.0, 39.2), (68.3, 38.7))  # a mission of a few seconds
 
 
