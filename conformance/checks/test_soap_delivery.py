@@ -164,6 +164,9 @@ def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> No
 @pytest.mark.requirement("soap-delivery/refuses-code", "strict-input/soap-code", "strict-input/soap-fault")
 def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
     """Codes other than 3 and 4 are refused."""
+    if publishers.contract.target_namespace != paper.NAMESPACE:
+        # The requirement on faults is one of every contract; these codes are not.
+        return
     codes = ("5", "0", "2", "-4", "1", "7", "44", "2147483647", "-2147483648", "34", "-3", "100")
     for code in codes[: effort.cases(len(codes))]:
         answer = call(publishers, paper.delivery(code=code))

@@ -1,0 +1,145 @@
+"""Attacks on the SOAP services by XML: refused, nothing leaked, nobody called, and the robot still well."""
+
+from __future__ import annotations
+
+import statistics
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.soap.attacks import ASIDE, VALUE, Attack, Carrier, attacks
+from conformance.soap.baseline import example
+from conformance.soap.envelope import envelope
+from conformance.soap.messages import simple_leaves, with_text
+from conformance.soap.names import ADDRESSING, clark
+from conformance.soap.node import Node
+from conformance.soap.services import askable
+from conformance.soap.siege import Siege, outcome
+from conformance.soap.trap import Trap
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conformance.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.target.exchange import Exchange
+    from conformance.verdict.judge import Judge
+
+pytestmark = pytest.mark.phase("attack")
+_NAMES = (
+    "doctype",
+    "internal-entity",
+    "external-entity",
+    "no-callback",
+    "parameter-entity",
+    "expansion",
+    "quadratic",
+    "depth",
+    "attributes",
+    "long-name",
+    "size",
+    "compressed",
+    "processing-instruction",
+    "xinclude",
+    "responsive",
+)
+_IDS = tuple(f"xml-security/{name}" for name in _NAMES)
+_DEADLINE_S = 10.0
+
+
+def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
+    """A message that the robot takes: as it is, with VALUE for one of its values, and that value."""
+    found: tuple[Node, Node, str] | None = None
+    for operation in service.contract.operations:
+        message = example(service, operation)
+        declared = service.contract.shape(operation.request) if operation.request else None
+        if message is None or declared is None:
+            continue
+        leaves = simple_leaves(declared, message)
+        if leaves:
+            path = leaves[0][0]
+            return message, with_text(message, path, VALUE), message.at(path).text
+        found = found or (message, replace(message, text=VALUE), "")
+    return found
+
+
+def _siege(judge: Judge, service: SoapService, trap: Trap, message: Node) -> Siege:
+    document = envelope([message]).written()
+
+    def send(attack: Attack) -> Exchange:
+        apart = service.apart()
+        try:
+            deadline = min(_DEADLINE_S, service.client.connection.timeout_s)
+            return outcome(lambda: apart.post(attack.body, headers=attack.headers, fresh=True, timeout_s=deadline))
+        finally:
+            apart.client.close()
+
+    def ask() -> Exchange:
+        return service.post(document)
+
+    times = [answer.elapsed_ms for answer in (ask().response for _ in range(5)) if answer is not None]
+    return Siege(judge, trap, send, ask, statistics.median(times))
+
+
+@pytest.mark.requirement(*_IDS)
+def test_attacks(roaas: Session, judge: Judge) -> None:
+    """Each attack in a message that the robot would take without it, in the Body and in a Header block."""
+    if roaas.publishers is None and roaas.subscribers is None:
+        # Then the class is judged over REST alone.
+        return
+    for service in askable(roaas, *_IDS):
+        harmless = _harmless(service)
+        if harmless is None:
+            for id_ in _IDS:
+                judge.skip(id_, f"the {service.name} service took none of the messages tried")
+            continue
+        message, marked, value = harmless
+        aside = Node(clark("urn:example:strange", "Note"), ASIDE)
+        document = envelope([marked], (aside,)).written().decode()
+        carrier = Carrier(document, document[1:].split(" ", 1)[0], value)
+        with Trap(service.client.host, service.client.port) as trap:
+            siege = _siege(judge, service, trap, message)
+            for attack in attacks(carrier, trap.url):
+                siege.attack(attack)
+            siege.finish()
+
+
+@pytest.mark.requirement("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
+def test_addressing(roaas: Session, judge: Judge) -> None:
+    """Addresses in WS-Addressing headers are not called, whichever header names them."""
+    ids = ("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
+    if roaas.publishers is None and roaas.subscribers is None:
+        for id_ in (ids[0], "xml-security/soapaction-spoofing"):
+            judge.unclaimed(id_, "the robot has no SOAP service")
+        return
+    for service in askable(roaas, *ids):
+        harmless = _harmless(service)
+        if harmless is None:
+            continue
+        with Trap(service.client.host, service.client.port) as trap:
+            siege = _siege(judge, service, trap, harmless[0])
+            for attack in _spoofed(service, harmless[0], trap):
+                siege.attack(attack)
+            siege.finish()
+
+
+def _spoofed(service: SoapService, message: Node, trap: Trap) -> Iterator[Attack]:
+    action = next((item.input_action for item in service.contract.operations if item.request == message.tag), None)
+    broken = Node(clark("urn:example:strange", "no_such_operation"))
+    for name in ("ReplyTo", "FaultTo", "From"):
+        for what, payload in (("a valid message", message), ("an invalid one", broken)):
+            lure = f"{name.lower()}-{payload.name}"
+            headers = (
+                Node(clark(ADDRESSING, "Action"), action or "urn:example:action"),
+                Node(clark(ADDRESSING, "MessageID"), "urn:uuid:0b7d3c1e-6f43-4a2e-8f57-3c1d2f6f9a01"),
+                Node(clark(ADDRESSING, "To"), service.endpoint),
+                Node(clark(ADDRESSING, name), "", (Node(clark(ADDRESSING, "Address"), trap.url(lure)),)),
+            )
+            yield Attack(
+                "addressing-spoofing",
+                f"{name} of {what}",
+                envelope([payload], headers).written(),
+                must_refuse=False,
+                lure=lure,
+            )

@@ -1,0 +1,90 @@
+"""A listener of our own that a robot must never call: whatever an attack names as address is one of its URLs."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+import time
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+_WAIT_S = 0.25
+_REPLY = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nContent-Length: 4\r\nConnection: close\r\n\r\n<a/>"
+
+
+class Trap:
+    """Listens where the robot would reach it, and remembers what was asked for.
+
+    Use as a context manager: it listens as long as the block lasts.
+
+    Args:
+        host: the robot's host name.
+        port: a port of it.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        self._socket = _listening(_facing(host, port))
+        self.address = self._socket.getsockname()
+        self._seen: list[str] = []
+        self._closing = False
+        self._thread = threading.Thread(target=self._listen, name="trap", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, _t: type[BaseException] | None, _e: BaseException | None, _b: TracebackType | None) -> None:
+        self._closing = True
+        self._socket.close()
+        self._thread.join(1.0)
+
+    def url(self, lure: str) -> str:
+        """The URL that stands for ``lure``."""
+        host = f"[{self.address[0]}]" if ":" in self.address[0] else self.address[0]
+        return f"http://{host}:{self.address[1]}/{lure}"
+
+    def calls(self, lure: str) -> int:
+        """How often the URL of ``lure`` has been asked for, or the address alone."""
+        return sum(1 for line in list(self._seen) if f"/{lure}" in line or line == "")
+
+    def settle(self) -> None:
+        """Give a robot that calls back in its own time a moment to do so."""
+        time.sleep(_WAIT_S)
+
+    def _listen(self) -> None:
+        while not self._closing:
+            try:
+                connection, _ = self._socket.accept()
+            except TimeoutError:
+                continue
+            except OSError:
+                return
+            with connection, contextlib.suppress(OSError):
+                connection.settimeout(1.0)
+                first = connection.recv(4096)
+                self._seen.append(first.split(b"\r\n", 1)[0].decode("latin-1"))
+                connection.sendall(_REPLY)
+
+
+def _facing(host: str, port: int) -> str:
+    """The address of this machine on the way to the robot. Connecting a datagram socket sends nothing."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.connect(address)
+            return str(probe.getsockname()[0])
+    except OSError:
+        return "127.0.0.1"
+
+
+def _listening(host: str) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.bind((host, 0))
+    listener.listen(16)
+    # So that closing it ends the thread on every system.
+    listener.settimeout(0.2)
+    return listener
