@@ -89,13 +89,14 @@ def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[fl
 @click.option("--warmup", type=float, help=f"Seconds of load before, not counted (default {DEFAULT_WARMUP_S:g}).")
 @click.option("--timeout", type=float, help="Deadline of a request in seconds.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Fixes schedule, payloads and intervals.")
-@click.option("--processes", type=click.IntRange(1, 256), default=1, show_default=True, help="Workers on this machine.")
+@click.option("--processes", type=click.IntRange(0, 256), default=1, show_default=True, help="Workers on this machine.")
 @click.option(
     "--expect-workers", type=click.IntRange(0, 1000), default=0, help="Workers in all, on other machines too."
 )
 @click.option("--master-host", default="127.0.0.1", show_default=True, help="Where the master listens for workers.")
 @click.option("--master-port", type=click.IntRange(0, 65535), default=0, help="Its port; 0 picks a free one.")
 @click.option("--web-port", type=click.IntRange(1, 65535), help="Show Locust's web UI on this port.")
+@click.option("--web-host", default="127.0.0.1", show_default=True, help="Where the web UI and the metrics listen.")
 @click.option("--metrics-port", type=click.IntRange(1, 65535), help="Serve the histograms to Prometheus on this port.")
 @click.option("--steps", is_flag=True, help="Then step the load up to find where the robot gives way.")
 @click.option("--step-rates", callback=_rates, metavar="R,R,…", help="The rates to step through.")

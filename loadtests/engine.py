@@ -187,9 +187,9 @@ class Run:
                 stack.callback(crew.close)
                 if settings.metrics_port is not None:
                     self.collector = Collector(lambda: crew.recorder, settings.operations)
-                    stack.callback(serve(self.collector, "127.0.0.1", settings.metrics_port).stop)
+                    stack.callback(serve(self.collector, settings.web_host, settings.metrics_port).stop)
                 if settings.web_port is not None:
-                    self._web(crew, settings.web_port)
+                    self._web(crew, settings.web_host, settings.web_port)
                 crew.prepare(
                     self.robot, settings.operations, settings.seed, zeep="zeep" in plan.clients, users=plan.connections
                 )
@@ -208,13 +208,13 @@ class Run:
         return LocalCrew()
 
     @staticmethod
-    def _web(crew: Crew, port: int) -> None:
+    def _web(crew: Crew, host: str, port: int) -> None:
         """Locust's web UI, watching; it starts and stops nothing here."""
-        web = crew.environment.create_web_ui("127.0.0.1", port)
+        web = crew.environment.create_web_ui(host, port)
         gevent.sleep(0.2)
         if web.greenlet.ready():
             raise CrewError(f"the web UI's port {port} is in use: choose another with --web-port")
-        tell(f"Locust's web UI: http://127.0.0.1:{port}")
+        tell(f"Locust's web UI: http://{host}:{port}")
 
     def _carry_out(self, plan: Plan, crew: Crew) -> None:
         """Run a plan, watching for its end, Ctrl-C and the robot's death."""

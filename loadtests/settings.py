@@ -65,6 +65,7 @@ class Settings:
     expect: int
     master_host: str
     master_port: int
+    web_host: str
     web_port: int | None
     metrics_port: int | None
     step_rates: tuple[float, ...]
@@ -110,6 +111,7 @@ class Wishes:
     expect: int = 0
     master_host: str = "127.0.0.1"
     master_port: int = 0
+    web_host: str = "127.0.0.1"
     web_port: int | None = None
     metrics_port: int | None = None
     steps: bool = False
@@ -184,6 +186,7 @@ def settle(wishes: Wishes, statement: Statement) -> Settings:
         expect=max(wishes.expect, wishes.processes if wishes.processes > 1 else 0),
         master_host=wishes.master_host,
         master_port=wishes.master_port,
+        web_host=wishes.web_host,
         web_port=wishes.web_port,
         metrics_port=wishes.metrics_port,
         step_rates=_step_rates(wishes, ceiling),
@@ -210,6 +213,8 @@ def _operations(wishes: Wishes) -> tuple[str, ...]:
 def _check_numbers(wishes: Wishes) -> None:
     if wishes.rate is not None and wishes.users is not None:
         raise SettingsError("--rate (open model) and --users (closed model) exclude each other")
+    if wishes.processes + wishes.expect < 1:
+        raise SettingsError("--processes 0 leaves the work to others: say how many with --expect-workers")
     ranges: list[tuple[str, Any, float, float]] = [
         ("--rate", wishes.rate, 0.0, _MOST_RATE),
         ("--users", wishes.users, 0, _MOST_USERS),

@@ -98,22 +98,25 @@ class Worker:
             self._reported = time.monotonic()
 
 
-def main() -> None:
+def serve(host: str, port: int, token: str | None) -> None:
     """Work until the master says quit, or is gone."""
-    host, port = sys.argv[1], int(sys.argv[2])
-    told = json.loads(sys.stdin.readline() or "{}")
     logging.getLogger("locust").setLevel(logging.ERROR)
+    Worker(new_environment(), host, port, token).runner.greenlet.join()
+
+
+def _follow(parent: int) -> None:
+    """End with the process that started us, however it ended."""
+    while os.getppid() == parent:
+        gevent.sleep(0.5)
+    os._exit(1)
+
+
+def main() -> None:
+    """A worker of a master on this machine."""
+    told = json.loads(sys.stdin.readline() or "{}")
     gevent.signal_handler(signal.SIGINT, lambda: None)  # the master says when to stop
-    parent = os.getppid()
-    worker = Worker(new_environment(), host, port, told.get("token"))
-
-    def orphaned() -> None:
-        while os.getppid() == parent:
-            gevent.sleep(0.5)
-        os._exit(1)
-
-    gevent.spawn(orphaned)
-    worker.runner.greenlet.join()
+    gevent.spawn(_follow, os.getppid())
+    serve(sys.argv[1], int(sys.argv[2]), told.get("token"))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,208 @@
+"""Users for plain Locust, with its web UI: `locust -f loadtests/locustfile.py --rest URL`.
+
+Closed users of both interfaces, wire and ordinary clients, as many of each as the UI is told. Locust's buckets of
+whole milliseconds are replaced by microseconds, so that its percentiles say something at a robot's speed. For
+figures to rely on (open model, alternating blocks, intervals) there is `roaas load`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import locust.stats
+from locust import User, constant_throughput, events, tag, task
+from locust.exception import StopTest
+
+from loadtests.callers import Caller, Workload
+from loadtests.endpoint import EndpointError
+from loadtests.failures import CallError
+from loadtests.ordinary import read_document
+from loadtests.payloads import CATALOGUE, VARIANTS
+from loadtests.robot import Robot
+from loadtests.settings import Settings, SettingsError, Wishes, settle
+from loadtests.statement import Statement
+from loadtests.wire import now_ns
+from loadtests.wsdl import WsdlError, address_in, fetch
+
+OPERATIONS = tuple(CATALOGUE)
+_TEXTS = ("rest", "publishers-wsdl", "subscribers-wsdl", "publishers-endpoint", "subscribers-endpoint")
+
+
+def microseconds(response_time_ms: float) -> float:
+    """Locust's bucket of a response time: whole microseconds, in ms."""
+    return round(response_time_ms, 3)
+
+
+locust.stats.bucket_response_time = microseconds  # type: ignore[assignment]  # floats are keys as good as ints
+
+
+@events.init_command_line_parser.add_listener  # type: ignore[untyped-decorator]  # Locust is typed in part
+def add_options(parser: Any) -> None:
+    """Our options beside Locust's own; they appear in the web UI too, but for the token's file."""
+    for name in _TEXTS:
+        parser.add_argument(f"--{name}", env_var=f"ROAAS_{name.upper().replace('-', '_')}", default="")
+    for name in ("token-file", "ca-file"):
+        parser.add_argument(
+            f"--{name}", env_var=f"ROAAS_{name.upper().replace('-', '_')}", default="", include_in_web_ui=False
+        )
+    parser.add_argument("--robot-timeout", type=float, default=10.0)
+    parser.add_argument("--allow-motion", action="store_true", help="The robot may drive: deliveries too.")
+
+
+class _Events:
+    """Records into Locust's request event: what callers expect of a recorder."""
+
+    def __init__(self, environment: Any, workload: Workload) -> None:
+        self._environment = environment
+        self._workload = workload
+        self.label = ("", "")
+
+    def record(self, _: int, operation: int, due: int, start: int, *moments: int, queued: bool) -> None:
+        """A success; moments are built, received, done and the server's time."""
+        del due, queued
+        self._fire(operation, (moments[2] - start) / 1e6, None)
+
+    def failed(self, _: int, operation: int, error: CallError, due_ns: int) -> None:
+        """A failure."""
+        self._fire(operation, (now_ns() - due_ns) / 1e6, error)
+
+    def count(self, name: str) -> None:
+        """Connections opened: Locust has no place for them."""
+
+    def _fire(self, operation: int, time_ms: float, error: CallError | None) -> None:
+        interface, client = self.label
+        name = self._workload.operations[operation]
+        self._environment.events.request.fire(
+            request_type=CATALOGUE[name].method if interface == "rest" else "SOAP",
+            name=f"{name} {interface} {client}",
+            response_time=time_ms,
+            response_length=0,
+            exception=error,
+            context={},
+        )
+
+
+def settings_of(options: Any) -> Settings:
+    """Locust's options, checked as `roaas load` checks its own.
+
+    Raises:
+        SettingsError: see there.
+    """
+    texts: dict[str, Any] = {
+        name.replace("-", "_"): getattr(options, name.replace("-", "_")) or None for name in _TEXTS
+    }
+    wishes = Wishes(
+        **texts,
+        token_file=options.token_file or None,
+        ca_file=options.ca_file or None,
+        timeout_s=options.robot_timeout,
+        allow_motion=options.allow_motion,
+    )
+    return settle(wishes, Statement())
+
+
+def workload_of(options: Any) -> Workload:
+    """What all users share: requests built beforehand, WSDLs parsed.
+
+    Raises:
+        StopTest: the options do not lead to a robot; the message says why.
+    """
+    try:
+        settings = settings_of(options)
+        found = Robot(
+            settings.rest, settings.publishers, settings.subscribers,
+            settings.publishers_wsdl, settings.subscribers_wsdl, settings.ca_file, settings.token, settings.timeout_s,
+        )  # fmt: skip
+        addresses = {}
+        documents = {}
+        for name, operation in CATALOGUE.items():
+            location = found.wsdl(name)
+            if location is None:
+                continue
+            known = found.address("soap", name)
+            addresses[operation.service] = known or address_in(fetch(location, found), location, operation.element)
+            documents[name] = read_document(location, found)
+        robot = Robot(
+            found.rest,
+            addresses.get("publishers", found.publishers),
+            addresses.get("subscribers", found.subscribers),
+            found.publishers_wsdl, found.subscribers_wsdl, found.ca_file, found.token, found.timeout_s,
+        )  # fmt: skip
+    except (SettingsError, WsdlError, CallError, EndpointError) as error:
+        raise StopTest(f"cannot begin: {error}") from None
+    return Workload(robot, OPERATIONS, 1, documents)
+
+
+class RobotUser(User):
+    """A user of one interface through one client; once a second it calls something."""
+
+    abstract = True
+    wait_time = constant_throughput(1)
+    interface = "rest"
+    client = "wire"
+
+    def on_start(self) -> None:
+        """Share what the process has built, or build it."""
+        environment = self.environment
+        if not hasattr(environment, "roaas_workload"):
+            environment.roaas_workload = workload_of(environment.parsed_options)
+        self._sink = _Events(environment, environment.roaas_workload)
+        self._sink.label = (self.interface, self.client)
+        self._caller = Caller(environment.roaas_workload, self._sink)
+        self._turn = 0
+
+    def on_stop(self) -> None:
+        """Close the connections."""
+        self._caller.close()
+
+    def call(self, operation: str) -> None:
+        """Make one request, unless it would move a robot that must not, or goes where nothing is."""
+        options, workload = self.environment.parsed_options, self.environment.roaas_workload
+        moves = CATALOGUE[operation].code is not None
+        if (moves and not options.allow_motion) or not workload.robot.offers(self.interface, self.client, operation):
+            return
+        self._turn += 1
+        self._caller.perform(
+            0, self.interface, self.client, OPERATIONS.index(operation), self._turn % VARIANTS, now_ns(), queued=False
+        )
+
+    @tag("pose")
+    @task(2)
+    def pose(self) -> None:
+        """Ask for the pose."""
+        self.call("pose")
+
+    @tag("delivery")
+    @task
+    def delivery(self) -> None:
+        """Ask for a courier delivery."""
+        self.call("delivery")
+
+    @tag("coffee")
+    @task
+    def coffee(self) -> None:
+        """Ask for a coffee."""
+        self.call("coffee")
+
+
+class RestWireUser(RobotUser):
+    """REST by the lean client."""
+
+
+class SoapWireUser(RobotUser):
+    """SOAP by the lean client."""
+
+    interface = "soap"
+
+
+class RestOrdinaryUser(RobotUser):
+    """REST by the requests library."""
+
+    client = "zeep"
+
+
+class SoapZeepUser(RobotUser):
+    """SOAP by zeep."""
+
+    interface = "soap"
+    client = "zeep"
