@@ -40,13 +40,13 @@ def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str
 
 
 def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slack: Slack, where: str) -> str:
-    for name in before:
+    for name, first in before.items():
         if name == "stamp" or name not in after:
             continue
         path = f"{where}.{name}" if where else name
         if not isinstance(between, dict) or name not in between:
             return f"{path} is missing"
-        problem = disagreement(before[name], between[name], after[name], slack, path)
+        problem = disagreement(first, between[name], after[name], slack, path)
         if problem:
             return problem
     return ""

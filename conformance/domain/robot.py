@@ -95,7 +95,8 @@ class Robot:
         self.judge = session.judge
         self.statement = session.statement
         self.limits = session.statement.limits
-        self.usual_s = session.effort.usual_ms / 1000
+        # A ceiling on the rate of requests makes a robot as slow as one that answers slowly.
+        self.usual_s = max(session.effort.usual_ms / 1000, 1 / (session.connection.request_rate or 1e9))
         observe(session)
 
     @property
