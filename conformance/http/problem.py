@@ -93,7 +93,7 @@ def members_of(answer: Response) -> dict[str, Any] | None:
             local_name(child): (child.text or "") for child in root if isinstance(child.tag, str)
         }
         status = str(members.get("status", "")).strip()
-        if re.fullmatch(r"\d{3}", status, re.ASCII):
+        if re.fullmatch(r"[+-]?\d{1,9}", status, re.ASCII):
             members["status"] = int(status)
         return members
     value = read_json(answer.body).value

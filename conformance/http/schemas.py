@@ -131,6 +131,11 @@ class Shape:
             return "the value is nested too deeply"
         return _told(error) if error is not None else ""
 
+    def broken_rule(self, value: Any) -> tuple[str, bool]:
+        """The keyword that ``value`` breaks first, and whether it is the value itself that breaks it (or a part)."""
+        error = best_match(self._validator.iter_errors(value))
+        return ("", False) if error is None else (str(error.validator), not error.absolute_path)
+
     def _passes(self, value: Any) -> bool:
         try:
             return bool(self._quick.is_valid(value))

@@ -1,0 +1,87 @@
+"""Random requests made harmless: what a robot accepts of them stays slow, near and seldom."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from conformance.http.calls import JSON, example_call
+from conformance.http.jsontext import read_json
+from conformance.http.targets import allowed
+from conformance.http.validity import VALID, Validity, validity
+from conformance.http.writing import json_text
+
+if TYPE_CHECKING:
+    from conformance.http.operations import Operation
+    from conformance.http.thesis import Made
+    from conformance.session import Session
+
+# How many valid requests of one moving operation are sent: each may start a mission.
+_ACCEPTED = 3
+# The greatest number in an invalid body: a robot that takes it all the same must not run away.
+_SLOW = 0.1
+
+
+class Harmless:
+    """Looks at every random request before it is sent.
+
+    Args:
+        session: the run.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._valid: Counter[str] = Counter()
+
+    def made(self, item: Made) -> Made | None:
+        """The request as it may be sent; None where it may not."""
+        said = self._validity(item)
+        operation = said.operation
+        if operation is None:
+            return item if self._may_reach(item) else None
+        if not allowed(self._session, operation):
+            return None
+        if not operation.motion:
+            return item
+        if said.verdict == VALID:
+            return self._fitted(item, operation)
+        return self._slow(item) if self._session.contract.own else item
+
+    def sent(self, item: Made, *, accepted: bool) -> None:
+        """Count what was accepted."""
+        operation = self._validity(item).operation
+        if accepted and operation is not None and operation.motion:
+            self._valid[operation.id] += 1
+
+    def _validity(self, item: Made) -> Validity:
+        return validity(self._session.contract, item.method, item.target, item.media_type, item.body)
+
+    def _may_reach(self, item: Made) -> bool:
+        """Whether a request for no operation of the contract may be sent: a method that a resource has not."""
+        return self._session.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
+
+    def _fitted(self, item: Made, operation: Operation) -> Made | None:
+        """A valid request of a moving operation with the contract's values, fit for this robot; a few of them."""
+        if self._valid[operation.id] >= _ACCEPTED:
+            return None
+        if not self._session.contract.own:
+            return item
+        call = example_call(self._session, operation, item.media_type or JSON)
+        return replace(item, target=call.path, body=call.body if operation.bodies else item.body)
+
+    def _slow(self, item: Made) -> Made:
+        text = read_json(item.body)
+        if not item.body or text.problem or item.media_type != JSON:
+            return item
+        return replace(item, body=json_text(_slowed(text.value)).encode())
+
+
+def _slowed(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _slowed(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_slowed(item) for item in value]
+    if isinstance(value, float) and abs(value) > _SLOW:
+        return _SLOW
+    return value
