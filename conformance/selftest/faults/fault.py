@@ -1,0 +1,40 @@
+"""What a faulty robot is: one change between a client and a good robot, and what must notice it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.selftest.proxy import Change, Torn
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A faulty robot.
+
+    Attributes:
+        name: its name, unique.
+        says: one sentence on what is wrong with it.
+        catches: ids of the requirements each of which must say fail (MUST) or warn (SHOULD).
+        interface: "rest", "soap" or "both".
+        make: makes the change for one run.
+        torn: makes what is done with requests that are never completed, or None.
+        probe: whether only a ROS probe can see it.
+        observer: whether only a ROS probe or the robot's list of deliveries can see it.
+        token: bearer token that the robot wants, or empty.
+        serial: whether the robot takes the next request only when the one before is complete.
+    """
+
+    name: str
+    says: str
+    catches: tuple[str, ...]
+    interface: str
+    make: Callable[[], Change]
+    torn: Callable[[], Torn] | None = None
+    probe: bool = False
+    observer: bool = False
+    token: str = ""
+    serial: bool = False

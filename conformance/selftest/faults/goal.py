@@ -1,0 +1,413 @@
+"""Robots that mistreat a goal."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from typing import TYPE_CHECKING, Any
+
+from conformance.selftest.faults.changing import (
+    GOAL,
+    altered,
+    becomes,
+    inputs,
+    instead,
+    parsed,
+    plain,
+    problem,
+    remembering,
+    rest,
+    rewritten,
+    status,
+    success,
+    values,
+)
+from conformance.selftest.faults.fault import Fault
+from conformance.selftest.wire import Answer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.selftest.wire import Ask
+
+    Forward = Callable[[Ask], Answer]
+
+_GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
+
+
+def position(goal: Any) -> Any:
+    """The position in a MoveBaseActionGoal."""
+    return goal["goal"]["target_pose"]["pose"]["position"]
+
+
+def identity(ask: Ask) -> str | None:
+    """The id in a PUT goal."""
+    value = parsed(ask.body)
+    try:
+        return str(value["goal_id"]["id"])
+    except (TypeError, KeyError):
+        return None
+
+
+def active(forward: Forward, ask: Ask) -> Any:
+    """The robot's goal, or None."""
+    answer = forward(
+        ask.copy(method="GET", target=GOAL, body=b"", fields=[("Host", "robot"), ("Accept", "application/json")])
+    )
+    return parsed(answer.body) if answer.status == 200 else None
+
+
+def _swap(goal: Any) -> None:
+    at = position(goal)
+    at["x"], at["y"] = at["y"], at["x"]
+
+
+def _shift(by: float) -> Callable[[Any], None]:
+    def edit(goal: Any) -> None:
+        position(goal)["x"] += by
+
+    return edit
+
+
+def _without_id(ask: Ask) -> bool:
+    return _PUT(ask) and "goal" in (parsed(ask.body) or {}) and identity(ask) is None
+
+
+def _cut_id(size: int) -> Callable[[Any], None]:
+    def edit(goal: Any) -> None:
+        goal["goal_id"]["id"] = goal["goal_id"]["id"][:size]
+
+    return edit
+
+
+def _when_active(answer_: Callable[[Ask], Answer], *, same: bool, other_pose: bool | None = None) -> Callable[[], Any]:
+    """PUT during a goal, with the same id or another one, is answered otherwise."""
+
+    def change(ask: Ask, forward: Forward) -> Answer:
+        if _PUT(ask):
+            now, given = active(forward, ask), identity(ask)
+            if now is not None and (now["goal_id"]["id"] == given) is same:
+                moved = _pose(now) != _pose(parsed(ask.body))
+                if other_pose is None or moved is other_pose:
+                    return answer_(ask)
+        return forward(ask)
+
+    return lambda: change
+
+
+def _pose(goal: Any) -> Any:
+    try:
+        pose = goal["goal"]["target_pose"]["pose"]
+        return {part: {axis: float(pose[part][axis]) for axis in pose[part]} for part in ("position", "orientation")}
+    except (TypeError, KeyError, ValueError):
+        return None
+
+
+class _Lingering:
+    """GET goes on showing a goal that has ended by itself."""
+
+    def __init__(self) -> None:
+        self._last: Answer | None = None
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        answer = forward(ask)
+        if _DELETE(ask):
+            self._last = None
+        if _GET(ask):
+            if answer.status == 200:
+                self._last = answer.copy()
+            elif self._last is not None and answer.status == 404:
+                return self._last.copy()
+        return answer
+
+
+class _Previous:
+    """GET shows the goal before the active one."""
+
+    def __init__(self) -> None:
+        self._seen: list[Any] = []
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        answer = forward(ask)
+        value = parsed(answer.body)
+        if _GET(ask) and answer.status == 200 and isinstance(value, dict):
+            if not self._seen or self._seen[-1]["goal_id"] != value["goal_id"]:
+                self._seen.append(value)
+            if len(self._seen) > 1:
+                answer.body = json.dumps(self._seen[-2]).encode()
+        return answer
+
+
+class _OnlyOnce:
+    """An id that was used before is refused for ever."""
+
+    def __init__(self) -> None:
+        self._used: set[str] = set()
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        id_ = identity(ask) if _PUT(ask) else None
+        if id_ is not None and id_ in self._used and active(forward, ask) is None:
+            return problem(409, f"goal_id.id: {id_!r} was used before")(ask)
+        answer = forward(ask)
+        if id_ is not None and success(answer):
+            self._used.add(id_)
+        return answer
+
+
+class _Abandoned:
+    """The robot gives a goal up on its way."""
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        answer = forward(ask)
+        if _PUT(ask) and answer.status in {201, 202}:
+            later = ask.copy(method="DELETE", body=b"", fields=[("Host", "robot"), ("Connection", "close")])
+            threading.Timer(0.4, _quietly, (forward, later)).start()
+        return answer
+
+
+def _quietly(forward: Forward, ask: Ask) -> None:
+    try:
+        forward(ask)
+    except Exception:  # noqa: BLE001 - the run may be over
+        return
+
+
+class _Unreachable:
+    """A goal far away is accepted, and is active for ever."""
+
+    def __init__(self) -> None:
+        self._goal: Any = None
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        if ask.path != GOAL or ask.side != "rest":
+            return forward(ask)
+        if _PUT(ask):
+            value = parsed(ask.body)
+            pose = _pose(value)
+            far = pose is not None and max(abs(pose["position"][axis]) for axis in "xy") > 90
+            self._goal = None
+            if far and math.isfinite(sum(pose["position"].values())):
+                header = {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "map"}
+                status_ = {"code": 2, "text": "on my way"}
+                self._goal = {
+                    "header": header,
+                    "goal_id": {"stamp": header["stamp"], "id": identity(ask) or "far"},
+                    "goal": value["goal"],
+                    "status": status_,
+                }
+                value["goal"]["target_pose"]["header"].setdefault("stamp", header["stamp"])
+                return _said(202, self._goal, ask)
+        if _DELETE(ask) and self._goal is not None:
+            self._goal = None
+            return plain(204)(ask)
+        if _GET(ask) and self._goal is not None:
+            return _said(200, self._goal, ask)
+        return forward(ask)
+
+
+def _said(status_: int, value: Any, ask: Ask) -> Answer:
+    return Answer(
+        status_,
+        [("Content-Type", "application/json"), ("Vary", "Accept")],
+        json.dumps(value).encode(),
+        asked=ask.method,
+    )
+
+
+def _known_frame(goal: Any) -> None:
+    goal["goal"]["target_pose"]["header"]["frame_id"] = "map"
+
+
+def _unit(goal: Any) -> None:
+    q = goal["goal"]["target_pose"]["pose"]["orientation"]
+    length = math.sqrt(sum(q[axis] ** 2 for axis in "xyzw"))
+    if length:
+        q.update({axis: q[axis] / length for axis in "xyzw"})
+    else:
+        q.update(x=0.0, y=0.0, z=0.0, w=1.0)
+
+
+def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Leaves inputs of another shape as they are, to be refused."""
+
+    def apply(goal: Any) -> None:
+        if _pose(goal) is not None:
+            try:
+                edit(goal)
+            except (TypeError, KeyError, ValueError, OverflowError):
+                return
+
+    return apply
+
+
+def _fault(name: str, says: str, catches: str | tuple[str, ...], make: Any) -> Fault:
+    ids = (catches,) if isinstance(catches, str) else catches
+    return Fault(name, says, tuple(f"rest-resources/{id_}" for id_ in ids), "rest", make)
+
+
+def _nothing(answer: Answer, status_: int) -> None:
+    answer.status, answer.reason, answer.body = status_, "", b"null"
+    answer.put("Content-Type", "application/json")
+
+
+def _delete_conflict(ask: Ask, forward: Forward) -> Answer:
+    if _DELETE(ask) and active(forward, ask) is None:
+        return problem(409, "there is no goal")(ask)
+    return forward(ask)
+
+
+def _beside(ask: Ask, forward: Forward) -> Answer:
+    if ask.side != "rest" or ask.path != GOAL:
+        return forward(ask)
+    if _PUT(ask):
+        ask = ask.copy()
+        inputs(_guarded(_shift(0.4)))(ask)
+    answer = forward(ask)
+    if success(answer):
+        values(_guarded(_shift(-0.4)))(answer)
+    return answer
+
+
+FAULTS = (
+    _fault(
+        "goal-none-empty",
+        "Without a goal, GET is 200 with null.",
+        "goal-none",
+        altered(_GET, lambda answer: _nothing(answer, 200), status(404)),
+    ),
+    _fault(
+        "goal-none-no-content", "Without a goal, GET is 204.", "goal-none", altered(_GET, becomes(204), status(404))
+    ),
+    _fault("goal-put-ok", "PUT of a new goal is 200.", "goal-put", altered(_PUT, becomes(200), status(201, 202))),
+    _fault("goal-get-swapped", "GET gives a goal with x and y exchanged.", "goal-get", altered(_GET, values(_swap))),
+    _fault(
+        "goal-get-frame",
+        "GET gives a goal in another frame.",
+        "goal-get",
+        altered(_GET, values(lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2"))),
+    ),
+    _fault("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", remembering(_Previous)),
+    _fault(
+        "goal-get-other-id",
+        "GET gives the goal under another id.",
+        "goal-get",
+        altered(_GET, values(lambda goal: goal["goal_id"].update(id="goal-1"))),
+    ),
+    _fault(
+        "goal-without-status",
+        "The active goal has no status.",
+        "goal-status",
+        altered(_GET, values(lambda goal: goal.pop("status") and None)),
+    ),
+    _fault(
+        "goal-status-succeeded",
+        "The active goal has status 4, succeeded.",
+        "goal-status",
+        altered(_GET, values(lambda goal: goal["status"].update(code=4))),
+    ),
+    _fault(
+        "goal-wants-id",
+        "A goal without goal_id is refused.",
+        "goal-fills-in",
+        instead(_without_id, problem(422, "goal_id: missing")),
+    ),
+    _fault(
+        "goal-empty-id",
+        "A goal without goal_id gets an empty one.",
+        "goal-fills-in",
+        altered(
+            lambda ask: ask.side == "rest" and ask.path == GOAL,
+            values(lambda goal: goal["goal_id"].update(id="") if len(goal["goal_id"]["id"]) >= 32 else None),
+        ),
+    ),
+    _fault(
+        "goal-id-cut",
+        "Ids are cut after 32 characters.",
+        "goal-id",
+        altered(lambda ask: ask.side == "rest" and ask.path == GOAL, values(_cut_id(32))),
+    ),
+    _fault(
+        "goal-id-ascii",
+        "Ids come back in lower case.",
+        "goal-id",
+        altered(
+            lambda ask: ask.side == "rest" and ask.path == GOAL,
+            values(
+                lambda goal: goal["goal_id"].update(
+                    id=goal["goal_id"]["id"].lower().encode("ascii", "replace").decode()
+                )
+            ),
+        ),
+    ),
+    _fault(
+        "goal-repeat-refused",
+        "The same goal again is refused with 409.",
+        "goal-repeat",
+        _when_active(problem(409, "goal_id.id: there already"), same=True, other_pose=False),
+    ),
+    _fault(
+        "goal-repeat-created",
+        "The same goal again is 201.",
+        "goal-repeat",
+        _when_active(plain(201), same=True, other_pose=False),
+    ),
+    _fault(
+        "goal-conflict-ignored",
+        "The same id with another pose is answered 200.",
+        "goal-conflict",
+        _when_active(plain(204), same=True, other_pose=True),
+    ),
+    _fault(
+        "goal-first-wins",
+        "Another goal is refused with 409 while one is active.",
+        "goal-preempt",
+        _when_active(problem(409, "a goal is active"), same=False),
+    ),
+    _fault("goal-delete-ignored", "DELETE is 204 and cancels nothing.", "goal-delete", instead(_DELETE, plain(204))),
+    _fault(
+        "goal-delete-ok",
+        "DELETE of a goal is 200 with a text.",
+        "goal-delete",
+        altered(_DELETE, lambda answer: _nothing(answer, 200), status(204)),
+    ),
+    _fault(
+        "goal-delete-none-fine",
+        "DELETE without a goal is 204.",
+        "goal-delete-none",
+        altered(_DELETE, becomes(204), status(404)),
+    ),
+    _fault(
+        "goal-delete-none-conflict",
+        "DELETE without a goal is 409.",
+        "goal-delete-none-success",
+        lambda: _delete_conflict,
+    ),
+    _fault("goal-lingers", "A goal that has ended is still shown.", "goal-ended", remembering(_Lingering)),
+    _fault("goal-id-only-once", "The id of a goal that has ended is refused.", "goal-id-again", remembering(_OnlyOnce)),
+    _fault("goal-abandoned", "The robot gives up on its way.", "goal-drives", remembering(_Abandoned)),
+    _fault(
+        "goal-beside",
+        "The robot stops 40 cm beside the goal, and shows the goal that it was given.",
+        "goal-drives",
+        lambda: _beside,
+    ),
+    _fault(
+        "goal-unreachable-forever",
+        "A goal far outside the map is accepted and stays active.",
+        "goal-unreachable",
+        remembering(_Unreachable),
+    ),
+    _fault(
+        "goal-frame-ignored",
+        "A goal's frame is not looked at.",
+        "goal-frame",
+        rewritten(_PUT, inputs(_guarded(_known_frame))),
+    ),
+    _fault(
+        "goal-quaternion-normalised",
+        "A quaternion of another length is made a unit one.",
+        "goal-quaternion",
+        rewritten(_PUT, inputs(_guarded(_unit))),
+    ),
+)
