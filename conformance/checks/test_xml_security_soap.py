@@ -15,12 +15,13 @@ from conformance.soap.messages import simple_leaves, with_text
 from conformance.soap.names import ADDRESSING, clark
 from conformance.soap.node import Node
 from conformance.soap.services import askable
-from conformance.soap.siege import Siege, outcome
+from conformance.soap.siege import Siege, judge_calls, outcome
 from conformance.soap.trap import Trap
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from conformance.effort import Effort
     from conformance.session import Session
     from conformance.soap.service import SoapService
     from conformance.target.exchange import Exchange
@@ -46,6 +47,8 @@ _NAMES = (
 )
 _IDS = tuple(f"xml-security/{name}" for name in _NAMES)
 _DEADLINE_S = 10.0
+# More than there are for any requirement.
+_EACH = 99
 
 
 def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
@@ -64,7 +67,7 @@ def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
     return found
 
 
-def _siege(judge: Judge, service: SoapService, trap: Trap, message: Node) -> Siege:
+def _siege(judge: Judge, service: SoapService, message: Node) -> Siege:
     document = envelope([message]).written()
 
     def send(attack: Attack) -> Exchange:
@@ -79,49 +82,59 @@ def _siege(judge: Judge, service: SoapService, trap: Trap, message: Node) -> Sie
         return service.post(document)
 
     times = [answer.elapsed_ms for answer in (ask().response for _ in range(5)) if answer is not None]
-    return Siege(judge, trap, send, ask, statistics.median(times))
+    return Siege(judge, send, ask, statistics.median(times))
+
+
+def _no_soap(roaas: Session) -> bool:
+    """Whether the robot has no SOAP service at all: then the class is judged over REST alone."""
+    return roaas.publishers is None and roaas.subscribers is None
 
 
 @pytest.mark.requirement(*_IDS)
-def test_attacks(roaas: Session, judge: Judge) -> None:
+def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
     """Each attack in a message that the robot would take without it, in the Body and in a Header block."""
-    if roaas.publishers is None and roaas.subscribers is None:
-        # Then the class is judged over REST alone.
+    if _no_soap(roaas):
         return
-    for service in askable(roaas, *_IDS):
-        harmless = _harmless(service)
-        if harmless is None:
-            for id_ in _IDS:
-                judge.skip(id_, f"the {service.name} service took none of the messages tried")
-            continue
-        message, marked, value = harmless
-        aside = Node(clark("urn:example:strange", "Note"), ASIDE)
-        document = envelope([marked], (aside,)).written().decode()
-        carrier = Carrier(document, document[1:].split(" ", 1)[0], value)
-        with Trap(service.client.host, service.client.port) as trap:
-            siege = _siege(judge, service, trap, message)
-            for attack in attacks(carrier, trap.url):
+    services = askable(roaas, *_IDS)
+    with Trap(services[0].client.host, services[0].client.port) as trap:
+        sieges = []
+        for service in services:
+            harmless = _harmless(service)
+            if harmless is None:
+                for id_ in _IDS:
+                    judge.skip(id_, f"the {service.name} service took none of the messages tried")
+                continue
+            message, marked, value = harmless
+            aside = Node(clark("urn:example:strange", "Note"), ASIDE)
+            document = envelope([marked], (aside,)).written().decode()
+            carrier = Carrier(document, document[1:].split(" ", 1)[0], value)
+            siege = _siege(judge, service, message)
+            sieges.append(siege)
+            for attack in attacks(carrier, trap.url, 1 if effort.name == "quick" else _EACH, service.name):
                 siege.attack(attack)
-            siege.finish()
+        judge_calls(judge, trap, sieges)
 
 
 @pytest.mark.requirement("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
 def test_addressing(roaas: Session, judge: Judge) -> None:
     """Addresses in WS-Addressing headers are not called, whichever header names them."""
     ids = ("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
-    if roaas.publishers is None and roaas.subscribers is None:
+    if _no_soap(roaas):
         for id_ in (ids[0], "xml-security/soapaction-spoofing"):
             judge.unclaimed(id_, "the robot has no SOAP service")
         return
-    for service in askable(roaas, *ids):
-        harmless = _harmless(service)
-        if harmless is None:
-            continue
-        with Trap(service.client.host, service.client.port) as trap:
-            siege = _siege(judge, service, trap, harmless[0])
+    services = askable(roaas, *ids)
+    with Trap(services[0].client.host, services[0].client.port) as trap:
+        sieges = []
+        for service in services:
+            harmless = _harmless(service)
+            if harmless is None:
+                continue
+            siege = _siege(judge, service, harmless[0])
+            sieges.append(siege)
             for attack in _spoofed(service, harmless[0], trap):
                 siege.attack(attack)
-            siege.finish()
+        judge_calls(judge, trap, sieges)
 
 
 def _spoofed(service: SoapService, message: Node, trap: Trap) -> Iterator[Attack]:
@@ -129,7 +142,7 @@ def _spoofed(service: SoapService, message: Node, trap: Trap) -> Iterator[Attack
     broken = Node(clark("urn:example:strange", "no_such_operation"))
     for name in ("ReplyTo", "FaultTo", "From"):
         for what, payload in (("a valid message", message), ("an invalid one", broken)):
-            lure = f"{name.lower()}-{payload.name}"
+            lure = f"{service.name}-{name.lower()}-{payload.name}"
             headers = (
                 Node(clark(ADDRESSING, "Action"), action or "urn:example:action"),
                 Node(clark(ADDRESSING, "MessageID"), "urn:uuid:0b7d3c1e-6f43-4a2e-8f57-3c1d2f6f9a01"),

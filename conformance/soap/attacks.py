@@ -8,7 +8,8 @@ from __future__ import annotations
 import codecs
 import gzip
 import zlib
-from dataclasses import dataclass, field
+from collections import Counter
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -77,15 +78,21 @@ class Carrier:
         return self.written(value, aside, prolog).encode()
 
 
-def attacks(carrier: Carrier, url: Callable[[str], str]) -> Iterator[Attack]:
-    """All attacks on one document.
+def attacks(carrier: Carrier, url: Callable[[str], str], each: int, place: str = "") -> Iterator[Attack]:
+    """The attacks on one document.
 
     Args:
         carrier: the document.
         url: gives the trap's URL for a lure.
+        each: how many for one requirement at most.
+        place: tells the lures of this document from those of another.
     """
     for make in (_doctypes, _internal, _external, _expansions, _inclusions, _sizes, _instructions):
-        yield from make(carrier, url)
+        made: Counter[str] = Counter()
+        for attack in make(carrier, lambda lure: url(f"{place}{lure}")):
+            made[attack.name] += 1
+            if made[attack.name] <= each:
+                yield replace(attack, lure=f"{place}{attack.lure}") if attack.lure else attack
 
 
 def _doctypes(carrier: Carrier, _url: Callable[[str], str]) -> Iterator[Attack]:

@@ -6,7 +6,7 @@ description by wsdl:import, as JAX-WS RI writes it when interface and service ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -16,10 +16,12 @@ from lxml import etree
 from conformance.soap.documents import Collected, Fetch, collect
 from conformance.soap.names import WSAM, WSAW, WSDL, WSDL_SOAP, clark
 from conformance.soap.schema import SchemaDocument, SchemaError, Types
-from conformance.soap.shapes import Element, shape
+from conformance.soap.shapes import shape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from conformance.soap.shapes import Element
 
 _ACTIONS: Final = tuple(clark(space, "Action") for space in (WSAM, WSAW, "http://www.w3.org/2005/08/addressing"))
 
@@ -63,7 +65,6 @@ class Description:
     definitions: tuple[etree._Element, ...]
     schemas: tuple[SchemaDocument, ...]
     missing: tuple[tuple[str, str], ...] = ()
-    _shapes: dict[str, Element | None] = field(default_factory=dict, compare=False, repr=False)
 
     def all(self, path: str) -> list[etree._Element]:
         """Elements by an XPath in which ``w`` is WSDL and ``s`` its SOAP binding, from any of the definitions."""
@@ -133,7 +134,7 @@ class Description:
         Raises:
             SchemaError: they do not compile.
         """
-        return Types(self.schemas)
+        return Types.compiled(self.schemas)
 
     def shape(self, tag: str) -> Element | None:
         """The global element of that name; None where no schema has it.
@@ -141,9 +142,7 @@ class Description:
         Raises:
             SchemaError: the schemas do not compile.
         """
-        if tag not in self._shapes:
-            self._shapes[tag] = shape(self.types, tag)
-        return self._shapes[tag]
+        return shape(self.types, tag)
 
     def message(self, reference: str | None) -> etree._Element | None:
         """The wsdl:message that a QName refers to; prefixes are not looked at, names are unique in practice."""

@@ -103,8 +103,10 @@ def _flat(group: Group) -> tuple[Element, ...]:
 
 def shape(types: Types, tag: str) -> Element | None:
     """The global element of that name, or None where the schema has none."""
-    declared = types.python.maps.elements.get(tag)
-    return None if declared is None else _element(declared, 0)
+    if tag not in types.shapes:
+        declared = types.python.maps.elements.get(tag)
+        types.shapes[tag] = None if declared is None else _element(declared, 0)
+    return types.shapes[tag]
 
 
 def _element(declared: Any, depth: int) -> Element:

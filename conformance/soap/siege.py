@@ -11,7 +11,7 @@ from conformance.soap.attacks import LEAKS, MARK
 from conformance.target.http import NoAnswerError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from conformance.soap.attacks import Attack
     from conformance.soap.trap import Trap
@@ -32,20 +32,19 @@ class Siege:
 
     Attributes:
         judge: takes what is seen.
-        trap: listens for calls.
         send: sends an attack and returns the exchange, whether the robot answered or not.
         ask: sends the harmless request.
         usual_ms: how long the robot takes for that.
         ids: the requirements that an attack is a case of.
+        lured: the attacks so far that name an address of the trap.
     """
 
     judge: Judge
-    trap: Trap
     send: Callable[[Attack], Exchange]
     ask: Callable[[], Exchange]
     usual_ms: float
     ids: Callable[[Attack], tuple[str, ...]] = lambda attack: (f"xml-security/{attack.name}",)
-    _lured: list[tuple[Attack, Exchange]] = field(default_factory=list)
+    lured: list[tuple[Attack, Exchange]] = field(default_factory=list)
 
     def attack(self, attack: Attack) -> None:
         """Send one attack and judge what became of it.
@@ -59,25 +58,9 @@ class Siege:
         for id_ in ids:
             self._judge(id_, attack, exchange)
         if attack.lure:
-            self._lured.append((attack, exchange))
+            self.lured.append((attack, exchange))
         self._well(attack, exchange)
         self.judge.at_risk = ()
-
-    def finish(self) -> None:
-        """Judge whether anybody was called, after a moment for a robot that calls in its own time."""
-        if self._lured:
-            self.trap.settle()
-        for attack, exchange in self._lured:
-            named = {"addressing-spoofing"} & {attack.name}
-            for name in ("no-callback", *named):
-                self.judge.that(
-                    f"xml-security/{name}",
-                    not self.trap.calls(attack.lure),
-                    exchange,
-                    f"no connection for {attack.what}",
-                    found=f"the robot asked for {self.trap.url(attack.lure)}",
-                    cause=f"called for {attack.name}",
-                )
 
     def _judge(self, id_: str, attack: Attack, exchange: Exchange) -> None:
         answer = read_exchange(exchange)
@@ -118,6 +101,24 @@ class Siege:
             found=f"{fastest:.0f} ms" if fastest < float("inf") else "no answer",
             cause=f"slow after {attack.name}",
         )
+
+
+def judge_calls(judge: Judge, trap: Trap, sieges: Iterable[Siege]) -> None:
+    """Judge whether any attack made a robot call, after a moment for a robot that calls in its own time."""
+    lured = [one for siege in sieges for one in siege.lured]
+    if lured:
+        trap.settle()
+    for attack, exchange in lured:
+        named = {"addressing-spoofing"} & {attack.name}
+        for name in ("no-callback", *named):
+            judge.that(
+                f"xml-security/{name}",
+                not trap.calls(attack.lure),
+                exchange,
+                f"no connection for {attack.what}",
+                found=f"the robot asked for {trap.url(attack.lure)}",
+                cause=f"called for {attack.name}",
+            )
 
 
 def outcome(send: Callable[[], Exchange]) -> Exchange:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Self
 if TYPE_CHECKING:
     from types import TracebackType
 
-_WAIT_S = 0.25
+_WAIT_S = 0.2
 _REPLY = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nContent-Length: 4\r\nConnection: close\r\n\r\n<a/>"
 
 
@@ -38,8 +38,11 @@ class Trap:
 
     def __exit__(self, _t: type[BaseException] | None, _e: BaseException | None, _b: TracebackType | None) -> None:
         self._closing = True
-        self._socket.close()
+        # Closing alone does not wake an accept; on some systems shutting down does not either, but the timeout does.
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
         self._thread.join(1.0)
+        self._socket.close()
 
     def url(self, lure: str) -> str:
         """The URL that stands for ``lure``."""
