@@ -19,6 +19,10 @@ _SHOWN_CURL = 1000
 def print_summary(outcome: Certification) -> None:
     """Print a certification to stdout; that the robot was not reached, to stderr."""
     document = outcome.document
+    if outcome.exit_code == UNREACHABLE:
+        click.echo(f"error: {document['requirements'][0]['reason']}", err=True)
+        click.echo(f"result: {outcome.path}")
+        return
     click.echo()
     for name, value in document["classes"].items():
         reason = document["class_reasons"].get(name, "")
@@ -33,8 +37,6 @@ def print_summary(outcome: Certification) -> None:
         f"{document['requests']} requests in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
     click.echo(f"result: {outcome.path}")
-    if outcome.exit_code == UNREACHABLE:
-        click.echo(f"error: {document['requirements'][0]['reason']}", err=True)
 
 
 def _print_finding(requirement: dict[str, Any]) -> None:
