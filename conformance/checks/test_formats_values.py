@@ -41,7 +41,7 @@ def test_each_format_is_sent(roaas: Session, judge: Judge, effort: Effort) -> No
     if not any(len(operation.formats) > 1 for operation in operations_of(roaas.contract)):
         judge.unclaimed("rest-formats/vary", "the contract has no answers in more than one format")
     calls = answered(roaas)
-    for turn in range(effort.cases(12)):
+    for turn in range(effort.cases(12) if effort.name != "quick" else 1):
         for call in calls[turn % len(calls) :] + calls[: turn % len(calls)]:
             for media_type, id_ in _IDS.items():
                 if media_type not in call.operation.formats:

@@ -92,9 +92,8 @@ def _judge_allow(judge: Judge, requirement: str, resource: Resource, exchange: E
 def test_head_is_get_without_its_body(roaas: Session, judge: Judge) -> None:
     """HEAD has the status and the media type of GET; asked again where the resource may have changed between."""
     for call in reads(roaas):
-        for accept in ("application/json", "application/xml", "text/plain"):
-            if accept not in call.operation.formats and accept != "application/json":
-                continue
+        others = [name for name in call.operation.formats if name != "application/json"]
+        for accept in ("application/json", *(others if roaas.effort.name != "quick" else ())):
             for attempt in (1, 2, 3):
                 got = call.send(roaas, ("Accept", accept))
                 exchange = call.send(roaas, ("Accept", accept), method="HEAD")

@@ -64,9 +64,8 @@ def test_what_is_described_is_there(roaas: Session, rest: HttpClient, judge: Jud
             _judge_there(roaas, judge, example_call(roaas, operation))
     document, _, _ = _document(rest)
     found = [] if document is None else described_by_openapi(document, rest.base_url)
-    known = {
-        (item.method, item.shape) for item in map(Described.of, operations_of(roaas.contract)) if not item.optional
-    }
+    # A robot may serve the contract's own description, with an extension in it that it does not have.
+    known = {(item.method, item.shape) for item in map(Described.of, operations_of(roaas.contract))}
     for item in found:
         if (item.method, item.shape) not in known and item.operation is not None:
             _judge_there(roaas, judge, example_call(roaas, item.operation))

@@ -10,7 +10,7 @@ import pytest
 from conformance.http.calls import Call, example_call
 from conformance.http.parameters import Wrong, wrong_texts
 from conformance.http.refusals import judge_refusal
-from conformance.http.targets import need, sampled
+from conformance.http.targets import need, readable, sampled
 from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def _has(where: str, operation: Operation) -> bool:
 def test_query_parameters(roaas: Session, judge: Judge) -> None:
     """Text, nothing, NaN, Infinity and 1e400 are refused where a number belongs."""
     for operation in need(roaas, [_QUERY], partial(_has, "query"), "takes numbers in its query"):
-        call = example_call(roaas, operation)
+        call = _valid_call(roaas, operation)
         if not _valid(roaas, judge, call, _QUERY):
             continue
         wrong = [item for parameter in operation.parameter("query") for item in wrong_texts(parameter)]
@@ -50,7 +50,7 @@ def test_missing_query_parameters(roaas: Session, judge: Judge) -> None:
         return any(item.required for item in operation.parameter("query"))
 
     for operation in need(roaas, [_MISSING], required, "requires a query parameter"):
-        call = example_call(roaas, operation)
+        call = _valid_call(roaas, operation)
         if not _valid(roaas, judge, call, _MISSING):
             continue
         bare = Call(operation, {item.name: call.values[item.name] for item in operation.parameter("path")})
@@ -83,6 +83,10 @@ def test_path_parameters(roaas: Session, judge: Judge) -> None:
             _try(roaas, call, item, _PATH)
         if operation.motion:
             bring_to_rest(roaas)
+
+
+def _valid_call(session: Session, operation: Operation) -> Call:
+    return readable(session, operation) if operation.method == "GET" else example_call(session, operation)
 
 
 def _valid(session: Session, judge: Judge, call: Call, requirement: str) -> bool:

@@ -78,6 +78,11 @@ class Target:
     operation: Any
     schema: Any
 
+    @property
+    def has_input(self) -> bool:
+        """Whether there is anything in its requests to vary."""
+        return any(True for _ in self.operation.iter_parameters()) or bool(list(self.operation.body))
+
     def examples(self) -> Iterator[Made]:
         """From the contract's examples."""
         maker = ExamplesGenerator(
