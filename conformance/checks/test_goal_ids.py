@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import pytest
 from hypothesis import strategies as st
 
-from conformance.domain.goal import NEW, await_goal, await_none, difference, goal_body, put_goal
+from conformance.domain.goal import NEW, arrived, await_goal, await_none, difference, goal_body, put_goal
 from conformance.domain.goals import choose_goals
 from conformance.domain.robot import Robot
 from conformance.domain.shapes import shown
@@ -50,7 +50,8 @@ def test_goal_ids(roaas: Session, judge: Judge, explore: Explorer) -> None:
     def try_id(id_: str) -> None:
         if id_ in used[-1:]:
             return  # the same id with another pose is a conflict
-        body = goal_body(next(goals), frame, id_)
+        pose = next(goals)
+        body = goal_body(pose, frame, id_)
         exchange = put_goal(robot, body)
         status = exchange.response.status if exchange.response else 0
         used.append(id_)
@@ -62,7 +63,9 @@ def test_goal_ids(roaas: Session, judge: Judge, explore: Explorer) -> None:
             found=exchange.came,
             cause=exchange.came,
         )
-        _, problem, read = await_goal(robot, body)
+        goal, problem, read = await_goal(robot, body)
+        if goal is None and arrived(robot, pose):
+            return
         for name in ("goal-id", "goal-preempt", "goal-get"):
             judge.that(
                 f"rest-resources/{name}",
@@ -97,6 +100,8 @@ def test_the_goal_shown_is_the_goal_put(roaas: Session, judge: Judge, explore: E
             return  # what stands there need not be known to a planner of another tolerance
         goal, problem, read = await_goal(robot, body)
         for _ in range(3):
+            if goal is None and arrived(robot, pose):
+                return
             judge.that("rest-resources/goal-get", not problem, read, "the goal that was put", found=problem)
             goal, read = robot.goal()
             problem = read.came if goal is None else difference(goal, body)

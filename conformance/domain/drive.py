@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from conformance.domain.path import judge_path
-from conformance.domain.robot import VELOCITY, Velocity
+from conformance.domain.robot import STILL, VELOCITY, Velocity
 from conformance.domain.shapes import TWIST, VECTOR3, fault_in, read_json
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from conformance.domain.robot import Odometry, Robot
     from conformance.target.exchange import Exchange
 
@@ -19,6 +21,8 @@ _PACE_S: Final = 0.02
 # What was measured for so long alike is steady: readings of two resources may be compared, s.
 _STEADY_S: Final = 0.3
 _ECHO: Final = 1e-9
+# How long a velocity is counted on to hold where the statement does not say, s.
+_COUNTED_ON_S: Final = 0.5
 _BUSY: Final = 409
 
 
@@ -43,13 +47,16 @@ class Drive:
     Attributes:
         trace: the odometry along the way.
         sent, answered: of the command given last, s of the monotonic clock.
+        full_sent: of the last command of all components: the linear part alone need not renew the angular one.
     """
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.trace: list[Odometry] = []
-        self.sent = self.answered = time.monotonic()
+        self.sent = self.answered = self.full_sent = time.monotonic()
         self._fastest: Velocity | None = None
+        self._renew: Callable[[], object] = lambda: None
+        self._full = STILL
         self._pending: _Reading | None = None
         self._turn_at = 0.0
 
@@ -63,7 +70,9 @@ class Drive:
         Raises:
             BusyError: a goal of the robot's own is active.
         """
-        self.sent = time.monotonic()
+        self.sent = self.full_sent = time.monotonic()
+        self._full = velocity
+        self._renew = lambda: self.robot.put_velocity(velocity)
         if integers:
             whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
             exchange = self.robot.put(VELOCITY, whole)
@@ -74,6 +83,8 @@ class Drive:
     def command_linear(self, velocity: Velocity) -> bool:
         """PUT the linear part of a velocity, and judge how it is answered."""
         self.sent = time.monotonic()
+        full = self._full._replace(linear_x=velocity.linear_x)
+        self._renew = lambda: self.robot.put_velocity(full)
         return self._judge_put(self.robot.put_linear(velocity), velocity, "linear-put")
 
     def _judge_put(self, exchange: Exchange, velocity: Velocity, name: str) -> bool:
@@ -99,6 +110,17 @@ class Drive:
                 wrong = [axis for axis, number in asked.items() if abs(float(given[axis]) - number) > _ECHO]
                 problem = f"{wrong[0]} {given[wrong[0]]} for {asked[wrong[0]]}" if wrong else ""
         return self.robot.judge.that(f"rest-resources/{name}", not problem, exchange, expected, found=problem)
+
+    @property
+    def holds_until(self) -> float:
+        """Until when the last command of all components certainly holds, s of the monotonic clock."""
+        hold_s = self.robot.limits.hold_s
+        return self.full_sent + (_COUNTED_ON_S if hold_s is None else 0.9 * hold_s - 0.02)
+
+    def refresh(self, velocity: Velocity) -> None:
+        """Command a velocity again, and let it be reached where it had ended meanwhile."""
+        self.command(velocity)
+        self.reach(velocity)
 
     def look(self) -> tuple[Velocity | None, Exchange]:
         """Read odometry, velocity and its linear part, and judge whether they agree; give the velocity."""
@@ -170,8 +192,15 @@ class Drive:
             part: the components that count.
         """
         judge, patience = self.robot.judge, self.robot.settle_s
+        # A velocity may end before it is reached, where it does not hold for as long as the robot takes to settle.
+        hold_s = self.robot.limits.hold_s
+        every = _COUNTED_ON_S if hold_s is None else 0.6 * hold_s
+        renewed = self.sent
         while True:
             asked = time.monotonic()
+            if asked > renewed + every and (hold_s is None or hold_s < patience):
+                self._renew()
+                renewed = self.sent = self.full_sent = asked
             velocity, exchange = self.look()
             there = velocity is not None and self.robot.near(_part(velocity, part), _part(wanted, part))
             if there or asked > self.answered + patience:

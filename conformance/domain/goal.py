@@ -22,6 +22,7 @@ CANCELLED: Final = frozenset({200, 202, 204})
 ACTIVE: Final = frozenset({1, 2, 3})
 _STEP_S: Final = 0.02
 _CLOSE: Final = 1e-6
+_ARRIVED_M: Final = 0.35
 
 
 def goal_body(pose: Pose, frame: str, id_: str | None = None, *, length: float = 1.0) -> dict[str, Any]:
@@ -103,6 +104,12 @@ def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
         if (exchange.response and exchange.response.status == 404) or time.monotonic() > until:  # noqa: PLR2004 - none
             return exchange
         time.sleep(_STEP_S)
+
+
+def arrived(robot: Robot, pose: Pose) -> bool:
+    """Whether the robot is so near to a goal that it may have ended already."""
+    here = robot.map_pose()
+    return here is None or here.distance(pose) < _ARRIVED_M
 
 
 def put_goal(robot: Robot, body: dict[str, Any]) -> Exchange:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from conformance.domain.geometry import Pose, pose_of
 from conformance.domain.observer import observe
-from conformance.domain.shapes import GOAL, ODOMETRY, TWIST, VECTOR3, Shape, body_of, read_as
+from conformance.domain.shapes import GOAL, ODOMETRY, TWIST, VECTOR3, Shape, body_of, pruned, read_as
 from conformance.statement import Limits
 
 if TYPE_CHECKING:
@@ -118,9 +118,10 @@ class Robot:
         return self.rest.send("GET", path, headers=ACCEPT_JSON)
 
     def read(self, path: str, shape: Shape) -> tuple[Any, Exchange]:
-        """GET a message; None where the answer is something else."""
+        """GET a message, without what a robot adds to it; None where the answer is something else."""
         exchange = self.get(path)
-        return read_as(exchange.response, shape)[0], exchange
+        value, problem = read_as(exchange.response, shape)
+        return (None if problem else pruned(value, shape)), exchange
 
     def put(self, path: str, value: Mapping[str, Any]) -> Exchange:
         """PUT as JSON."""
@@ -162,7 +163,8 @@ class Robot:
 
     def goal(self) -> tuple[Any, Exchange]:
         """The active goal as JSON, or None."""
-        return self.read(GOAL_PATH, GOAL)
+        exchange = self.get(GOAL_PATH)
+        return read_as(exchange.response, GOAL)[0], exchange
 
     def delete_goal(self) -> Exchange:
         """Cancel the goal."""

@@ -183,3 +183,12 @@ def read_as(response: Response | None, shape: Shape, status: int = 200) -> tuple
 def body_of(value: Mapping[str, Any]) -> bytes:
     """A JSON body."""
     return json.dumps(value).encode()
+
+
+def pruned(value: Any, shape: Shape) -> Any:
+    """A value that has a shape, without the further fields that a robot may add."""
+    if isinstance(shape, Items):
+        return [pruned(item, shape.shape) for item in value]
+    if isinstance(shape, dict):
+        return {name: pruned(value[name], part) for name, part in shape.items() if name in value}
+    return value

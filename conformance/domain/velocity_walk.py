@@ -20,8 +20,6 @@ _LINEAR_SHARE = 0.35
 _ANGULAR_SHARE = 0.6
 # Farther than this from where the walk began, the next way leads back, m.
 _LEASH_M = 0.25
-# Where no hold time is declared, a velocity is counted on for so long, s.
-_COUNTED_ON_S = 0.3
 _SHARES = st.floats(0.15, 1.0)
 
 
@@ -121,10 +119,7 @@ class VelocityMachine(RuleBasedStateMachine):
         return self._drive.command(wanted) and self._drive.reach(wanted, "rest-resources/velocity-converges")
 
     def _linear(self, ahead: float) -> bool:
-        hold = self._robot.limits.hold_s
-        kept = _COUNTED_ON_S if hold is None else 0.5 * hold
-        if time.monotonic() > self._drive.sent + kept:
-            self._drive.command(self._wanted)
+        self._drive.refresh(self._wanted)
         wanted = self._wanted._replace(linear_x=ahead)
         if not self._drive.command_linear(wanted):
             return False
@@ -132,9 +127,9 @@ class VelocityMachine(RuleBasedStateMachine):
         linear = slice(0, 3)
         if not self._drive.reach(wanted, "rest-resources/linear-put", part=linear):
             return False
-        # The angular part was not asked for again: whether it lasts longer than it was asked for is the robot's affair.
+        # Whether the angular part lasts longer than it was asked for is the robot's affair.
         turning, exchange = self._drive.look()
-        if hold is None or time.monotonic() > self._drive.sent + 0.5 * hold - 0.02 or turning is None:
+        if time.monotonic() > self._drive.holds_until or turning is None:
             return True
         return self._robot.judge.that(
             "rest-resources/linear-keeps-angular",
@@ -146,12 +141,13 @@ class VelocityMachine(RuleBasedStateMachine):
         )
 
     def _refuse(self, component: int, times: float) -> bool:
-        if self._drive.command(self._wanted):
-            self._drive.reach(self._wanted)
+        self._drive.refresh(self._wanted)
         bad = [0.0] * 6
         bad[component] = times * 1e3
         self._robot.put_velocity(Velocity(*bad))
         velocity, exchange = self._drive.look()
+        if time.monotonic() > self._drive.holds_until:
+            return True
         return self._robot.judge.that(
             "safety/refused-keeps",
             velocity is not None and self._robot.near(velocity, self._wanted, 2),
