@@ -6,10 +6,14 @@ import time
 
 import gevent
 import pytest
+import requests
+from urllib3 import Retry
 
 from loadtests.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.failures import CallError
+from loadtests.ordinary import Sent, new_session
 from loadtests.payloads import rest_request
+from loadtests.robot import Robot
 from loadtests.wire import Connection, Request
 
 
@@ -156,3 +160,17 @@ def test_urls_that_are_none(url):
     with pytest.raises(EndpointError) as caught:
         Endpoint.parse(url)
     assert "secret" not in str(caught.value)
+
+
+def test_a_library_that_sends_again_by_itself_is_found_out(toy):
+    robot = toy()
+    session = new_session(Robot(robot.url, None, None))
+    Sent.requests = Sent.calls = 0
+    with pytest.raises(requests.ConnectionError):
+        session.get(f"{robot.url}/hang-up", timeout=5)
+    assert Sent.requests == 1, "requests as it comes sends once"
+    session.get_adapter(robot.url).max_retries = Retry(total=2, backoff_factor=0)
+    with pytest.raises(requests.ConnectionError):
+        session.get(f"{robot.url}/hang-up", timeout=5)
+    assert Sent.requests == 4, "and what retries below the call is counted all the same"
+    assert session.get(f"{robot.url}/count", timeout=5).text == "5"
