@@ -14,6 +14,10 @@ from reference_robot.simulation.planner import Pose
 
 _UNIT_TOLERANCE: Final = 1e-3  # of a quaternion's length, as the contract has it
 
+# For how long an action's result can be asked for, as Nav2 has it; rclpy's 900 s make every change of a
+# goal's state slower, because each one reports all goals that are remembered.
+RESULT_TIMEOUT_S: Final = 10
+
 # State that late subscribers get at once: the last message, kept by the publisher.
 LATCHED: Final = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL

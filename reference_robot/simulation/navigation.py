@@ -21,7 +21,7 @@ from std_msgs.msg import Header, String
 
 from reference_robot.names import RosNames
 from reference_robot.simulation.localisation import Localisation
-from reference_robot.simulation.messages import LATCHED, PoseError, plain, pose_of, stamped_pose
+from reference_robot.simulation.messages import LATCHED, RESULT_TIMEOUT_S, PoseError, plain, pose_of, stamped_pose
 from reference_robot.simulation.planner import PlanError, Planner, Pose
 from reference_robot.simulation.pursuit import CRUISE, Command, Pursuit
 
@@ -99,6 +99,7 @@ class Navigation:
             goal_callback=self._judge,
             handle_accepted_callback=self._begin,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
+            result_timeout=RESULT_TIMEOUT_S,
         )
 
     def _judge(self, goal: NavigateToPose.Goal) -> GoalResponse:

@@ -14,7 +14,7 @@ from std_msgs.msg import Header
 
 from reference_robot.names import RosNames
 from reference_robot.simulation.localisation import Localisation
-from reference_robot.simulation.messages import PoseError, path_message, pose_of
+from reference_robot.simulation.messages import RESULT_TIMEOUT_S, PoseError, path_message, pose_of
 from reference_robot.simulation.planner import PlanError, Planner, Pose
 
 
@@ -40,6 +40,7 @@ class Planning:
             names.actions.compute_path_to_pose,
             self._compute_path,
             cancel_callback=lambda _: CancelResponse.REJECT,  # a plan takes a millisecond
+            result_timeout=RESULT_TIMEOUT_S,
         )
 
     def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:

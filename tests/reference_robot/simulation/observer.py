@@ -106,24 +106,30 @@ class Observer:
         until(future.done)
         return future.result()
 
+    def ask(self, call, *arguments):
+        """Make an asynchronous call in the executor's thread and return what it brings.
+
+        Made in another thread, rclpy's action client loses an answer that comes before the call returns.
+        """
+        return self.await_future(self.await_future(self.node.executor.create_task(call, *arguments)))
+
     def send(self, goal):
         """Send a NavigateToPose goal and return its handle."""
-        message = NavigateToPose.Goal(pose=goal)
-        return self.await_future(self.navigate.send_goal_async(message, self.feedback.append))
+        return self.ask(self.navigate.send_goal_async, NavigateToPose.Goal(pose=goal), self.feedback.append)
 
     def cancel_all(self):
         """Cancel every goal, whoever sent it: an id and a stamp of zeros (action_msgs/CancelGoal)."""
-        return self.await_future(self.cancels.call_async(CancelGoal.Request()))
+        return self.ask(self.cancels.call_async, CancelGoal.Request())
 
     def end_of(self, handle):
         """Wait for a goal's end and return its status."""
-        return self.await_future(handle.get_result_async()).status
+        return self.ask(handle.get_result_async).status
 
     def plan(self, goal, start=None, tolerance=0.0):
         request = GetPlan.Request(goal=goal, tolerance=tolerance)
         if start is not None:
             request.start = start
-        return self.await_future(self.plans.call_async(request)).plan
+        return self.ask(self.plans.call_async, request).plan
 
     def request(self, source, destination, depot, code=4):
         self.requests.publish(

@@ -36,7 +36,7 @@ def test_a_cancelled_goal_leaves_the_robot_at_rest_within_the_settle_time(robot,
     handle = robot.send(pose(81.0, 39.0))
     until(lambda: robot.velocity[0] > 0.5)
     cancelled_at = time.monotonic()
-    response = robot.await_future(handle.cancel_goal_async())
+    response = robot.ask(handle.cancel_goal_async)
     assert len(response.goals_canceling) == 1
     assert robot.end_of(handle) == statuses.STATUS_CANCELED
     until(lambda: robot.rests)
@@ -119,8 +119,7 @@ def test_compute_path_to_pose_plans_or_says_why_not(robot, statuses):
         message = ComputePathToPose.Goal(goal=goal, use_start=start is not None)
         if start is not None:
             message.start = start
-        handle = robot.await_future(robot.compute.send_goal_async(message))
-        return robot.await_future(handle.get_result_async())
+        return robot.ask(robot.ask(robot.compute.send_goal_async, message).get_result_async)
 
     goal = pose(*SOURCE, 0.3)
     found = compute(goal)

@@ -1,0 +1,73 @@
+"""The ROS runtime: it spins, survives a failing callback, and leaves nothing behind."""
+
+import threading
+
+import pytest
+from observer import until
+from std_msgs.msg import String
+
+from reference_robot.names import RosNames
+from reference_robot.ros import RosRuntime
+from reference_robot.simulation.runner import Simulation
+
+
+def test_a_failing_callback_stops_no_other(domain_id):
+    calls = []
+
+    def fail():
+        calls.append("failing")
+        raise ValueError("on purpose")
+
+    with RosRuntime(domain_id) as ros:
+        node = ros.create_node("twin")
+        node.create_timer(0.005, fail)
+        node.create_timer(0.005, lambda: calls.append("sound"))
+        ros.start()
+        until(lambda: calls.count("failing") > 3 and calls.count("sound") > 3)
+
+
+def test_a_closed_runtime_leaves_no_node_on_the_graph_and_no_thread(domain_id):
+    threads = set(threading.enumerate())
+    with RosRuntime(domain_id) as watching:
+        watcher = watching.create_node("watcher")
+        watching.start()
+        for _ in range(3):
+            with RosRuntime(domain_id) as ros:
+                simulation = Simulation(ros, RosNames())
+                ros.start()
+                until(lambda: {"base", "navigation", "delivery"} <= set(watcher.get_node_names()))
+            until(lambda: watcher.get_node_names() == ["watcher"])
+            assert simulation  # it is closing that ends the nodes, and not the garbage collector
+    assert set(threading.enumerate()) == threads
+
+
+def test_closing_twice_and_starting_twice_do_nothing_more(domain_id):
+    ros = RosRuntime(domain_id)
+    ros.create_node("idle")
+    ros.start()
+    ros.start()
+    ros.close()
+    ros.close()
+
+
+def test_without_a_number_the_domain_is_the_environments(domain_id):
+    got = []
+    with RosRuntime() as here, RosRuntime(domain_id) as there:
+        here.create_node("hears").create_subscription(String, "word", got.append, 10)
+        publisher = there.create_node("says").create_publisher(String, "word", 10)
+        here.start()
+        until(publisher.get_subscription_count)
+        publisher.publish(String(data="hello"))
+        until(lambda: got)
+    assert here.domain_id == domain_id
+
+
+@pytest.mark.parametrize("domain", [-1, 102])
+def test_a_domain_outside_the_range_is_named(domain):
+    with pytest.raises(ValueError, match=str(domain)):
+        RosRuntime(domain)
+
+
+def test_the_simulation_names_a_time_scale_that_it_cannot_use(domain_id):
+    with RosRuntime(domain_id) as ros, pytest.raises(ValueError, match="-2"):
+        Simulation(ros, RosNames(), -2.0)
