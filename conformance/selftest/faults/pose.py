@@ -100,10 +100,10 @@ def _earlier(odometry: Any) -> None:
 
 
 class _NotYet:
-    """The first three times there is no odometry."""
+    """The first ten times there is no odometry."""
 
     def __init__(self) -> None:
-        self._left = 3
+        self._left = 10
 
     def __call__(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
         if _AT(ask) and self._left:

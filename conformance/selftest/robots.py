@@ -1,0 +1,118 @@
+"""The good robots of a self-test: started as processes of their own, and stopped again."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import selectors
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_HERE = Path(__file__).parent
+_READY = re.compile(r"ready rest=(\S+) soap=(\S+)")
+_START_S, _STOP_S = 40.0, 10.0
+STRANGERS = ("plain", "baroque", "legacy")
+REFERENCE = "reference"
+
+
+class RobotError(Exception):
+    """A robot that does not start; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot that runs.
+
+    Attributes:
+        kind: "reference" or a stranger's name.
+        rest: REST's base URL.
+        soap: the publishers' WSDL.
+        domain_id: its ROS domain, or None.
+    """
+
+    kind: str
+    rest: str
+    soap: str
+    domain_id: int | None = None
+
+
+def statement_of(kind: str) -> Path:
+    """The implementation conformance statement of a robot."""
+    return _HERE / "reference.toml" if kind == REFERENCE else _HERE / "strangers" / kind / f"{kind}.toml"
+
+
+def check_available(kind: str) -> None:
+    """See whether a robot can be started here.
+
+    Raises:
+        RobotError: it cannot.
+    """
+    if kind == REFERENCE and find_spec("rclpy") is None:
+        raise RobotError(
+            "the reference robot needs ROS 2 (pip install 'roaas[robot,ros]', or source /opt/ros/jazzy/setup.bash); "
+            "without it, take a stranger in its place: roaas selftest --target baroque"
+        )
+
+
+@contextlib.contextmanager
+def running(kind: str, domain_id: int) -> Iterator[Robot]:
+    """Start a robot on free ports, and stop it in the end.
+
+    Args:
+        kind: "reference" or a stranger's name.
+        domain_id: ROS domain of the reference robot.
+
+    Raises:
+        RobotError: it does not start.
+    """
+    check_available(kind)
+    ports = ["--rest-port", "0", "--soap-port", "0"]
+    if kind == REFERENCE:
+        command = [sys.executable, "-m", "roaas", "robot", *ports, "--domain-id", str(domain_id)]
+    else:
+        command = [sys.executable, "-m", "conformance.selftest.strangers", kind, *ports]
+    environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    # The command is this interpreter with arguments made above.
+    process = subprocess.Popen(  # noqa: S603
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment
+    )
+    try:
+        rest, soap = _ready(process, kind)
+        yield Robot(kind, rest, soap, domain_id if kind == REFERENCE else None)
+    finally:
+        process.terminate()
+        try:
+            process.wait(_STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+
+
+def _ready(process: subprocess.Popen[str], kind: str) -> tuple[str, str]:
+    """The two addresses in the line that a robot prints when it is ready."""
+    until = time.monotonic() + _START_S
+    output: IO[str] | None = process.stdout
+    with selectors.DefaultSelector() as selector:
+        if output is not None:
+            selector.register(output, selectors.EVENT_READ)
+        while output is not None and process.poll() is None and (left := until - time.monotonic()) > 0:
+            if not selector.select(left):
+                break
+            found = _READY.search(output.readline())
+            if found:
+                return found[1], found[2]
+    why = (
+        f"it ended with exit code {process.poll()}" if process.poll() is not None else f"not ready after {_START_S:g} s"
+    )
+    raise RobotError(f"the robot {kind!r} does not start: {why}")
