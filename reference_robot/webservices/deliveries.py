@@ -49,6 +49,7 @@ class Deliveries:
     def __init__(self, publishers: RobotPublishersNode, subscribers: RobotSubscribersNode) -> None:
         self._publishers = publishers
         self._subscribers = subscribers
+        self._message = DeliveryRequestMsg()  # filled anew for each request: publishing copies it
         self._accepted: deque[_Accepted] = deque(maxlen=_REMEMBERED)
 
     def accept(self, request: DeliveryRequest, interface: Literal["rest", "soap"]) -> None:
@@ -59,7 +60,7 @@ class Deliveries:
         """
         if not self._publishers.delivery_is_served():
             raise not_yet("no delivery application listens on the robot")
-        message = DeliveryRequestMsg()
+        message = self._message
         (
             message.message_code,
             message.depot_x,

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Final
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.problems import Problem
-from reference_robot.webservices.resources.delivery import Delivery
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable
 
     from reference_robot.webservices.http.authorization import Authorization
+    from reference_robot.webservices.resources.delivery import Delivery
     from reference_robot.webservices.resources.resource import Resource
 
     Handlers = dict[str, Callable[[Request], Response | Awaitable[Response]]]
@@ -32,7 +32,7 @@ class RestInterface(Interface):
     def __init__(self, resources: Iterable[Resource], delivery: Delivery, authorization: Authorization) -> None:
         super().__init__(authorization)
         self._fixed: dict[bytes, Handlers] = {resource.path.encode(): resource.handlers() for resource in resources}
-        self._delivery = delivery.handlers()
+        self._delivery = delivery
 
     def answer(self, request: Request) -> Response | Awaitable[Response]:
         """Return the resource's answer.
@@ -43,6 +43,8 @@ class RestInterface(Interface):
         """
         handlers = self._fixed.get(request.path)
         if handlers is None:
+            if request.method == "PUT" and request.path.startswith(_DELIVERY_PATHS):
+                return self._delivery.put(request)  # the one that has to be fast; it refuses what is not its path
             handlers = self._with_values(request.path)
         handler = handlers.get(request.method)
         if handler is not None:
@@ -53,7 +55,7 @@ class RestInterface(Interface):
         raise Problem(405, f"the method is not one of {allow[1].decode()}", (allow,))
 
     def _with_values(self, path: bytes) -> Handlers:
-        if path.startswith(_DELIVERY_PATHS) and Delivery.owns(path):
-            return self._delivery
+        if self._delivery.owns(path):
+            return self._delivery.handlers()
         hint = "; its path ends with a slash" if path + b"/" in self._fixed else ""
         raise Problem(404, f"there is no resource at {path.decode('ascii')[:200]!a}{hint}")

@@ -6,6 +6,8 @@ import codecs
 import json
 import math
 import re
+from collections import Counter
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
 from reference_robot.webservices.problems import Problem
@@ -61,6 +63,7 @@ def read(body: bytes, content_type: bytes | None, shape: Record) -> dict[str, An
     raise _unsupported(f"Content-Type {(content_type or b'').decode('latin-1')[:200]!a}")
 
 
+@lru_cache(maxsize=256)
 def parsed_content_type(field: bytes | None) -> tuple[str, str | None]:
     """Return media type and charset in lower case (RFC 9110 8.3.1); the charset is None where none is given."""
     media_type, *parameters = (field or b"").decode("latin-1").lower().split(";")
@@ -99,8 +102,7 @@ def read_json(body: bytes) -> Any:
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     result = dict(pairs)
     if len(result) != len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
+        twice, _ = Counter(name for name, _ in pairs).most_common(1)[0]
         raise Problem(422, f"the field {shown(twice)} occurs more than once in {shown(pairs)}")
     return result
 

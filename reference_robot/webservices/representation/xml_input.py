@@ -28,6 +28,15 @@ _UTF16: Final = frozenset({"utf-16", "utf-16-le", "utf-16-be"})
 # Attributes that one document may have in all. libxml2 before 2.12 compares those of an element pairwise.
 _MOST_ATTRIBUTES: Final = 1000
 
+_PARSER: Final = etree.XMLParser(
+    encoding="utf-8",  # decided before parsing, whatever the declaration says
+    resolve_entities=False,
+    no_network=True,
+    load_dtd=False,
+    huge_tree=False,
+    remove_comments=True,  # so that a value with a comment in it is one text
+)
+
 
 def parsed(body: bytes, charset: str | None = None) -> etree._Element:
     """Return the root element of a document.
@@ -45,16 +54,8 @@ def parsed(body: bytes, charset: str | None = None) -> etree._Element:
         raise Problem(400, "the document has a DOCTYPE, which is refused (WS-I BP R1008)")
     if text.count(b"=") > _MOST_ATTRIBUTES:
         raise Problem(400, f"the document has more than {_MOST_ATTRIBUTES} attributes")
-    parser = etree.XMLParser(
-        encoding="utf-8",  # decided above, whatever the declaration says
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=False,
-        remove_comments=True,  # so that a value with a comment in it is one text
-    )
     try:
-        root = etree.fromstring(text, parser)
+        root = etree.fromstring(text, _PARSER)
     except (etree.XMLSyntaxError, ValueError) as error:
         raise Problem(400, f"the body is not well-formed XML: {ascii(str(error))[1:-1]}") from error
     if root.getroottree().docinfo.internalDTD is not None:
