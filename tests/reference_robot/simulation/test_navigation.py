@@ -8,9 +8,15 @@ import time
 import pytest
 from geometry_msgs.msg import PoseStamped
 from nav2_msgs.action import ComputePathToPose
-from observer import pose, until
+from nav_msgs.msg import Odometry
+from observer import Observer, pose, until
 
-from reference_robot.simulation.office import DEPOT, SOURCE
+from reference_robot.names import RosNames
+from reference_robot.ros import RosRuntime
+from reference_robot.simulation.localisation import Localisation
+from reference_robot.simulation.navigation import Navigation
+from reference_robot.simulation.office import DEPOT, OFFICE, SOURCE
+from reference_robot.simulation.planner import Planner
 
 
 def test_a_goal_is_reached_with_feedback_and_shown_while_it_is_active(robot, statuses):
@@ -131,3 +137,22 @@ def test_compute_path_to_pose_plans_or_says_why_not(robot, statuses):
     assert refused.status == statuses.STATUS_ABORTED
     assert refused.result.error_code == ComputePathToPose.Result.NO_VALID_PATH
     assert "82" in refused.result.error_msg
+
+
+def test_a_goal_without_progress_is_aborted(domain_id, statuses):
+    names = RosNames()
+    with RosRuntime(domain_id) as ros:
+        observer = Observer(ros, names)
+        node = ros.create_node("navigation")
+        planner, localisation = Planner(OFFICE), Localisation(node, names)
+        navigation = Navigation(node, names, planner, localisation, time_scale=40.0)  # patience: half a second
+        stuck = Odometry()  # a base that does not move, whatever it is told
+        stuck.pose.pose = pose(*DEPOT).pose
+        odometry = node.create_publisher(Odometry, names.topics.odom, 1)
+        node.create_timer(0.02, lambda: odometry.publish(stuck))
+        ros.start()
+        until(lambda: observer.odometry and observer.navigate.server_is_ready())
+        handle = observer.send(pose(*SOURCE))
+        assert observer.end_of(handle) == statuses.STATUS_ABORTED
+        until(lambda: observer.current_goal is None)
+        assert navigation  # kept while it serves
