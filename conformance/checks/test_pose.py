@@ -40,9 +40,9 @@ def test_pose(roaas: Session, judge: Judge, effort: Effort) -> None:
         if odometry is not None:
             stamps.add(odometry.stamp)
             exchange = odometry.exchange
-        elif time.monotonic() > until:
-            break
         if readings >= effort.cases(100):
+            if not stamps and judge.evidence["rest-resources/pose-type"].findings:
+                break
             time.sleep(0.02)
     if not stamps:
         # What came instead has been judged, except for a robot that has no odometry for so long.

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.domain.robot import Robot
-from conformance.domain.velocity_walk import Walk, machine
+from conformance.domain.velocity_walk import machine
+from conformance.domain.walk import Walk
 from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
-from conformance.domain.drive import BusyError, Drive
-from conformance.domain.robot import STILL, Robot, Velocity
-from conformance.target.http import NoAnswerError
+from conformance.domain.robot import STILL, Velocity
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from conformance.domain.walk import Walk
 
 # Of the limits: fast enough to be told from rest, slow enough to stay near.
 _LINEAR_SHARE = 0.35
@@ -21,37 +21,6 @@ _ANGULAR_SHARE = 0.6
 # Farther than this from where the walk began, the next way leads back, m.
 _LEASH_M = 0.25
 _SHARES = st.floats(0.15, 1.0)
-
-
-class Walk:
-    """What all walks of one check share.
-
-    Attributes:
-        ended: why no further step is made: a requirement was refuted, the time is up, the robot is busy.
-        silence: the request that was not answered, if that ended it.
-    """
-
-    def __init__(self, robot: Robot, budget_s: float) -> None:
-        self.robot = robot
-        self.drive = Drive(robot)
-        self.until = time.monotonic() + budget_s
-        self.ended = ""
-        self.silence: NoAnswerError | None = None
-
-    def step(self, act: Callable[[], bool]) -> None:
-        """Make one step, unless the walk has ended."""
-        if self.ended:
-            return
-        if time.monotonic() > self.until:
-            self.ended = "the time is up"
-            return
-        try:
-            if not act():
-                self.ended = "refuted"
-        except NoAnswerError as none:
-            self.silence, self.ended = none, str(none)
-        except BusyError as busy:
-            self.ended = str(busy)
 
 
 def machine(walk: Walk) -> Callable[[], RuleBasedStateMachine]:
