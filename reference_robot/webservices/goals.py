@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import uuid
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -42,6 +43,7 @@ _STATUS_TEXTS: Final = {
     GoalStatus.STATUS_EXECUTING: "executing",
     GoalStatus.STATUS_CANCELING: "canceling",
 }
+_REMEMBERED: Final = 100
 _REASON_COMES_WITHIN: Final = 0.3  # seconds after a refusal in which its reason may still arrive
 _REASON_STEP: Final = 0.02
 
@@ -82,7 +84,8 @@ class Goals:
         self._calls = calls
         self._frames = frames
         self._own: _Goal | None = None
-        self._over = ""  # the goal that ended last: no longer current, even before the robot says so
+        # Goals that are not a mission's, or were cancelled: the robot's word on the current goal may lag behind.
+        self._known: deque[str] = deque(maxlen=_REMEMBERED)
         self._one_at_a_time = asyncio.Lock()
 
     def current(self) -> dict[str, Any] | None:
@@ -141,13 +144,14 @@ class Goals:
                 raise Problem(409, f"the navigation refuses to cancel goal {current['goal_id']['id']!a}")
             # Cancelled, unknown or ended: in each case it is current no longer.
             self._own = None
-            self._over = identity.hex()
+            self._known.append(identity.hex())
 
     def _active_own(self) -> _Goal | None:
         own = self._own
-        if own is not None and (own.status not in _STATUS_TEXTS or not self._publishers.navigation_is_served()):
-            self._over = own.identity.hex()  # it has ended, or whoever followed it is gone
-            self._own = own = None
+        if own is None or not self._publishers.navigation_is_served():
+            return None  # without a navigation, nobody follows it
+        if own.status not in _STATUS_TEXTS:
+            self._own = own = None  # it has ended
         return own
 
     def _foreign(self) -> dict[str, Any] | None:
@@ -167,7 +171,7 @@ class Goals:
             }
         except (ValueError, TypeError, KeyError, AssertionError):
             return None
-        return described if code in _STATUS_TEXTS and identity != self._over else None
+        return described if code in _STATUS_TEXTS and identity not in self._known else None
 
     def _filled_in(self, wanted: dict[str, Any]) -> dict[str, Any]:
         """Return the goal with what the client may leave out: stamps mean now, the id is a new one."""
@@ -184,6 +188,7 @@ class Goals:
         if not self._publishers.navigation_is_served():
             raise not_yet("the robot has no navigation that takes goals")
         identity = uuid.uuid4().bytes  # ROS's own: an id of the web may come again for another goal
+        self._known.append(identity.hex())
         pose = message_from(shape_of(PoseStamped), described["goal"]["target_pose"])
         handle = await self._calls.result(lambda: self._publishers.send_goal(identity, pose), "the navigation")
         if not handle.accepted:

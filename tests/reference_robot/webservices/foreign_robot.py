@@ -3,7 +3,8 @@
 Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent]``. It prints one JSON object a line: ``ready``, then
 ``delivery``, ``velocity``, ``goal`` and ``cancel`` as they come. Each line on its stdin is a command:
 ``{"odometry": {"x": …, "covariance": …, "stopped_clock": …}}`` publishes that odometry over and over,
-``{"finish": true}`` ends the goal.
+``{"finish": true}`` ends the goal, ``{"current_goal": …}`` tells of one that another client sent,
+``{"tell_next_goal_as": …}`` tells of the next one that comes, and of no later one.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
 
 _UNREACHABLE_X = 1000.0
 
@@ -45,10 +47,13 @@ class ForeignRobot(Node):
         super().__init__("foreign_robot", context=context)
         self.odometry = None if silent else Odometry()
         self.stopped_clock = False
+        self.tells_goal_as: dict[str, Any] | None = None
         self.finished = threading.Event()
         self._latest_goal: Any = None
         group = ReentrantCallbackGroup()
         self._publisher = self.create_publisher(Odometry, "odom", 10)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._current_goal = self.create_publisher(String, "navigation/current_goal", latched)
         self.create_timer(0.02, self._publish, callback_group=group)
         self.create_subscription(
             DeliveryRequestMsg, "/DeliveryRequestMsg/from_json", self._delivery, QoSProfile(depth=1000)
@@ -95,6 +100,10 @@ class ForeignRobot(Node):
 
     def _drive(self, handle: Any) -> NavigateToPose.Result:
         self._latest_goal = handle
+        if self.tells_goal_as:
+            told = self.tells_goal_as | {"goal_id": bytes(handle.goal_id.uuid).hex()}
+            self._current_goal.publish(String(data=json.dumps(told)))
+            self.tells_goal_as = None
         while handle.status != GoalStatus.STATUS_CANCELING:
             if self._latest_goal is not handle:
                 handle.abort()  # another goal has preempted this one
@@ -114,6 +123,10 @@ class ForeignRobot(Node):
             odometry.twist.twist.linear.x = command["odometry"]["x"] / 10
             self.stopped_clock = command["odometry"].get("stopped_clock", False)
             self.odometry = odometry
+        if "current_goal" in command:
+            self._current_goal.publish(String(data=json.dumps(command["current_goal"])))
+        if "tell_next_goal_as" in command:
+            self.tells_goal_as = command["tell_next_goal_as"]
         if "finish" in command:
             self.finished.set()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from lxml import etree
-from web_messages import goal, query_envelope
+from web_messages import goal, query_envelope, twist
 from web_robot import ForeignRobot, Served, eventually
 
 PATH = "/robot/navigation/action/goal/"
@@ -109,3 +109,41 @@ def test_a_goal_that_the_robot_refuses_is_422(served: Served, foreign: ForeignRo
     assert answer.status_code == 422
     assert foreign.next("goal")["x"] == 1000.0
     assert served.call("GET", PATH).status_code == 404
+
+
+def told(identity: str) -> dict[str, object]:
+    pose = goal(x=7.0)["goal"]["target_pose"] | {"header": {"stamp": {"sec": 5, "nanosec": 6}, "frame_id": "map"}}
+    return {"goal_id": identity, "status": 2, "pose": pose}
+
+
+def test_a_mission_s_goal_is_shown_and_cancelled(served: Served, foreign: ForeignRobot):
+    foreign.do(current_goal=told("ab" * 16))
+    shown = eventually(lambda: (answer := served.call("GET", PATH)).is_success and answer.json())
+    assert shown["goal_id"] == {"stamp": {"sec": 5, "nanosec": 6}, "id": "ab" * 16}
+    assert shown["goal"]["target_pose"]["pose"]["position"]["x"] == 7.0
+    assert served.call("PUT", "/robot/velocity/", json=twist()).status_code == 409
+    assert served.call("DELETE", PATH).status_code == 204
+    assert served.call("GET", PATH).status_code == 404
+    foreign.do(current_goal={})
+
+
+def test_a_goal_of_ours_is_never_taken_for_a_mission_s(served: Served, foreign: ForeignRobot):
+    """The robot's word on its current goal may lag behind: here it stays with a goal that was displaced."""
+    foreign.do(tell_next_goal_as=told(""))
+    assert served.call("PUT", PATH, json=goal("first")).status_code == 201
+    foreign.next("goal")
+    assert served.call("PUT", PATH, json=goal("second", x=5.0)).status_code == 202
+    foreign.next("goal")
+    assert served.call("DELETE", PATH).status_code == 204
+    assert served.call("GET", PATH).status_code == 404
+    foreign.forget_until("cancel")
+    foreign.do(current_goal={})
+
+
+@pytest.mark.parametrize("report", ["", [], {"goal_id": "x"}, {"goal_id": "x", "status": "2", "pose": {}}, 7])
+def test_a_report_amiss_is_no_goal(served: Served, foreign: ForeignRobot, report: object):
+    foreign.do(current_goal=report)
+    foreign.do(odometry={"x": 4.0, "covariance": 0.0})
+    eventually(lambda: served.call("GET", "/robot/velocity/").json()["linear"]["x"] == 0.4)
+    assert served.call("GET", PATH).status_code == 404
+    foreign.do(odometry={"x": 1.0, "covariance": 0.0})
