@@ -53,6 +53,7 @@ class Drive:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.trace: list[Odometry] = []
+        self._measured: list[Velocity] = []
         self.sent = self.answered = self.full_sent = time.monotonic()
         self._fastest: Velocity | None = None
         self._renew: Callable[[], object] = lambda: None
@@ -134,6 +135,8 @@ class Drive:
             self._judge_pending()
         at = time.monotonic()
         velocity, exchange = self.robot.velocity()
+        if odometry is not None:
+            self._measured.append(odometry.velocity if velocity is None else velocity)
         linear, linear_exchange = self.robot.linear()
         self._pending = _Reading(at, velocity, exchange, linear, linear_exchange)
         if velocity is not None and self._fastest is not None and not self.robot.limits_declared:
@@ -224,7 +227,7 @@ class Drive:
 
     def judge_motion(self) -> None:
         """Judge whether the pose moved by what the velocity said."""
-        judge_path(self.robot.judge, self.trace)
+        judge_path(self.robot.judge, self.trace, self._measured)
 
 
 def _part(velocity: Velocity, part: slice) -> Velocity:

@@ -12,7 +12,7 @@ from conformance.domain.geometry import wrapped
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from conformance.domain.robot import Odometry
+    from conformance.domain.robot import Odometry, Velocity
     from conformance.verdict.judge import Judge
 
 # Less than this is no drive to judge: m and rad.
@@ -45,11 +45,10 @@ class _Sum:
     turn_error: float
 
 
-def _summed(trace: Sequence[Odometry], *, by_stamp: bool) -> _Sum:
+def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sum:
     x = y = turn = length = turned = off = off_turn = turn_error = 0.0
-    for one, two in itertools.pairwise(trace):
+    for (one, first), (two, last) in itertools.pairwise(zip(trace, velocities, strict=True)):
         lapse = two.stamp - one.stamp if by_stamp else (two.sent + two.received - one.sent - one.received) / 2
-        first, last = one.velocity, two.velocity
         rate = (first.angular_z + last.angular_z) / 2
         step_turn = rate * lapse
         heading = one.pose.yaw + step_turn / 2
@@ -66,33 +65,50 @@ def _summed(trace: Sequence[Odometry], *, by_stamp: bool) -> _Sum:
     return _Sum(x, y, turn, length, turned, off, off_turn, turn_error)
 
 
-def judge_path(judge: Judge, trace: Sequence[Odometry]) -> None:
-    """Judge pose-motion and pose-rotation by the odometry along a drive, where it went far enough.
+def judge_path(judge: Judge, trace: Sequence[Odometry], measured: Sequence[Velocity]) -> None:
+    """Judge pose-motion and pose-rotation by the readings along a drive, where it went far enough.
 
-    The robot's stamps or the time of the readings has to fit: a simulation may run slower than the clock on the wall.
+    The robot's stamps or the time of the readings has to fit, as a simulation may run slower than the clock on the
+    wall; and the odometry's own velocity or the one that was measured beside it: whether these two agree is another
+    requirement.
+
+    Args:
+        judge: is told.
+        trace: readings of the odometry, in their order.
+        measured: a reading of GET /robot/velocity/ for each of them.
     """
     if len(trace) < 3:  # noqa: PLR2004 - a sum over one step says nothing
         return
-    sums = [_summed(trace, by_stamp=True), _summed(trace, by_stamp=False)]
+    sources = ([one.velocity for one in trace], measured)
+    sums = [_summed(trace, source, by_stamp=by_stamp) for source in sources for by_stamp in (True, False)]
+    _judge_way(judge, trace, [one for one in sums if one.length >= _SHORTEST])
+    _judge_turn(judge, trace, [one for one in sums if one.turned >= _LEAST_TURN])
+
+
+def _judge_way(judge: Judge, trace: Sequence[Odometry], sums: Sequence[_Sum]) -> None:
+    if not sums:
+        return
     first, last = trace[0], trace[-1]
     made_x, made_y = last.pose.x - first.pose.x, last.pose.y - first.pose.y
-    way = max(one.length for one in sums)
-    if way >= _SHORTEST:
-        misses = [math.hypot(made_x - one.x, made_y - one.y) - (_SHARE * one.length + _OFF + one.off) for one in sums]
-        judge.that(
-            "rest-resources/pose-motion",
-            any(miss <= 0 for miss in misses),
-            last.exchange,
-            f"a way of ({sums[0].x:.3f}, {sums[0].y:.3f}) m, which is what the velocity adds up to",
-            found=f"the pose moved by ({made_x:.3f}, {made_y:.3f}) m",
-            cause="another way",
-        )
-    if max(one.turned for one in sums) >= _LEAST_TURN:
-        judge.that(
-            "rest-resources/pose-rotation",
-            any(abs(one.turn_error) <= _SHARE * one.turned + _OFF_TURN + one.off_turn for one in sums),
-            last.exchange,
-            f"a turn of {sums[0].turn:.3f} rad, which is what the angular velocity adds up to",
-            found=f"the heading turned by {sums[0].turn + sums[0].turn_error:.3f} rad",
-            cause="another turn",
-        )
+    misses = [math.hypot(made_x - one.x, made_y - one.y) - (_SHARE * one.length + _OFF + one.off) for one in sums]
+    judge.that(
+        "rest-resources/pose-motion",
+        any(miss <= 0 for miss in misses),
+        last.exchange,
+        f"a way of ({sums[0].x:.3f}, {sums[0].y:.3f}) m, which is what the velocity adds up to",
+        found=f"the pose moved by ({made_x:.3f}, {made_y:.3f}) m",
+        cause="another way",
+    )
+
+
+def _judge_turn(judge: Judge, trace: Sequence[Odometry], sums: Sequence[_Sum]) -> None:
+    if not sums:
+        return
+    judge.that(
+        "rest-resources/pose-rotation",
+        any(abs(one.turn_error) <= _SHARE * one.turned + _OFF_TURN + one.off_turn for one in sums),
+        trace[-1].exchange,
+        f"a turn of {sums[0].turn:.3f} rad, which is what the angular velocity adds up to",
+        found=f"the heading turned by {sums[0].turn + sums[0].turn_error:.3f} rad",
+        cause="another turn",
+    )
