@@ -103,16 +103,40 @@ def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, **more: object) 
     )
 
 
+def without_fault(bench: Bench, effort: str = "quick", seed: int = 0) -> Outcome:
+    """What is said of the good robot behind a proxy that changes nothing."""
+    robot, proxy = bench.take()
+    try:
+        return judge(job_for(robot, proxy, effort, seed, domain_id=robot.domain_id))
+    finally:
+        bench.give(robot, proxy)
+
+
 def hunt(
-    bench: Bench, faults: Iterable[Fault], *, effort: str = "quick", seed: int = 0, tell: Callable[[Catch], None]
+    bench: Bench,
+    faults: Iterable[Fault],
+    *,
+    effort: str = "quick",
+    seed: int = 0,
+    already: frozenset[str] = frozenset(),
+    tell: Callable[[Catch], None],
 ) -> list[Catch]:
-    """Try every fault, several at once; ``tell`` is called as each is done."""
+    """Try every fault, several at once.
+
+    Args:
+        bench: the robots.
+        faults: what to try.
+        effort: of the first runs.
+        seed: of everything random.
+        already: requirements that say fail or warn of the good robot itself: nothing can be shown of them.
+        tell: called as each is done.
+    """
     lock = threading.Lock()
 
     def one(fault: Fault) -> Catch:
         robot, proxy = bench.take()
         try:
-            catch = _try(fault, robot, proxy, effort, seed)
+            catch = _try(fault, robot, proxy, effort, seed, already)
         finally:
             bench.give(robot, proxy)
         with lock:
@@ -123,8 +147,11 @@ def hunt(
         return list(pool.map(one, faults))
 
 
-def _try(fault: Fault, robot: Robot, proxy: Proxy, effort: str, seed: int) -> Catch:
+def _try(fault: Fault, robot: Robot, proxy: Proxy, effort: str, seed: int, already: frozenset[str]) -> Catch:
     catch = Catch(fault)
+    if already.intersection(fault.catches):
+        catch.unseen = f"{robot.kind} itself is blamed for {min(already.intersection(fault.catches))}, as it may be"
+        return catch
     if robot.kind != REFERENCE and fault.probe:
         catch.unseen = "only a ROS probe can see it, and there is no ROS"
         return catch

@@ -123,6 +123,23 @@ def rewritten(where: Where, edit: Callable[[Ask], object]) -> Make:
     return make
 
 
+def secretly(where: Where, edit: Callable[[Ask], object]) -> Make:
+    """Alter requests on their way to the robot, and answer 204, so that no answer tells."""
+
+    def make() -> Change:
+        def change(ask: Ask, forward: Forward) -> Answer:
+            if not where(ask):
+                return forward(ask)
+            altered_ask = ask.copy()
+            edit(altered_ask)
+            answer = forward(altered_ask)
+            return Answer(204, asked=ask.method) if success(answer) else answer
+
+        return change
+
+    return make
+
+
 def instead(where: Where, answer: Callable[[Ask], Answer]) -> Make:
     """Answer requests without asking the robot."""
 

@@ -18,7 +18,7 @@ from conformance.selftest.faults.changing import (
     problem,
     remembering,
     rest,
-    rewritten,
+    secretly,
     status,
     values,
 )
@@ -119,8 +119,8 @@ def _good(twist: Any) -> bool:
     """Whether a Twist is one that a robot would take; others stay as they are, to be refused."""
     try:
         numbers = [twist[part][axis] for part in ("linear", "angular") for axis in "xyz"]
-        moving = (twist["linear"]["x"], twist["angular"]["z"])
-        return all(isinstance(one, int | float) for one in numbers) and max(abs(one) for one in moving) < 0.4
+        slow = abs(twist["linear"]["x"]) < 0.5 and abs(twist["angular"]["z"]) < 1.6
+        return all(isinstance(one, int | float) for one in numbers) and slow
     except (TypeError, KeyError):
         return False
 
@@ -191,21 +191,21 @@ FAULTS = (
         "Velocities are accepted and forgotten.",
         ("rest-resources/velocity-converges",),
         "rest",
-        rewritten(_PUT, inputs(lambda twist: twist.update(_STILL) if _good(twist) else None)),
+        secretly(_PUT, inputs(lambda twist: twist.update(_STILL) if _good(twist) else None)),
     ),
     Fault(
         "velocity-halved",
         "The robot drives at half of what it is told.",
         ("rest-resources/velocity-converges",),
         "rest",
-        rewritten(_PUT, inputs(lambda twist: _times(0.5)(twist) if _good(twist) else None)),
+        secretly(_PUT, inputs(lambda twist: _times(0.5)(twist) if _good(twist) else None)),
     ),
     Fault(
         "velocity-reversed",
         "The robot turns the other way.",
         ("rest-resources/velocity-converges",),
         "rest",
-        rewritten(_PUT, inputs(lambda twist: _mirrored(twist) if _good(twist) else None)),
+        secretly(_PUT, inputs(lambda twist: _mirrored(twist) if _good(twist) else None)),
     ),
     Fault(
         "velocity-integers-refused",

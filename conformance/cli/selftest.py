@@ -1,0 +1,191 @@
+"""``roaas selftest``: shows that the suite catches faulty robots and blames no good one."""
+
+from __future__ import annotations
+
+import fnmatch
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from conformance.verdict.exit_codes import EXIT_CODES, INTERRUPTED, UNREACHABLE
+
+if TYPE_CHECKING:
+    from conformance.selftest.comparison import Seen
+    from conformance.selftest.faults.fault import Fault
+    from conformance.selftest.hunting import Catch
+    from conformance.selftest.innocents import Acquittal, Case
+    from conformance.selftest.report import Report
+
+# A dozen different ones, for a check in less than a minute.
+_SHORT = (
+    "pose-without-child-frame",
+    "sensors-twice",
+    "plan-jumps",
+    "format-no-vary",
+    "http-405-without-allow",
+    "http-nan",
+    "delivery-text-is-zero",
+    "soap-response-namespace",
+    "bp-fault-200",
+    "input-last-wins",
+    "input-soap-missing-is-zero",
+    "same-pose",
+    "safety-unactuated-ignored",
+    "wsdl-float",
+    "openapi-without-path",
+)
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--faults", "patterns", multiple=True, metavar="PATTERN", help="Only faults whose names match (repeatable)."
+)
+@click.option("--target", type=click.Choice(["reference", "plain", "baroque"]), default="reference", show_default=True,
+              help="The good robot behind the faults; the strangers need no ROS.")  # fmt: skip
+@click.option("--seeds", type=click.IntRange(min=0), default=20, show_default=True, help="Seeds for each good robot.")
+@click.option("--short", is_flag=True, help="A dozen faults and one seed, in less than a minute.")
+@click.option("--effort", type=click.Choice(["quick", "standard"]), default="quick", show_default=True,
+              help="Of the first run of each; a fault that is missed is tried again at standard.")  # fmt: skip
+@click.option(
+    "--compare/--no-compare", default=True, help="Run the plain Schemathesis command line against the REST faults too."
+)
+@click.option(
+    "--variants/--no-variants", default=True, help="Try good robots behind TLS, a prefix, a token and the like."
+)
+@click.option("--parallel", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at once.")
+@click.option(
+    "--domain-id", type=click.IntRange(0, 100), default=80, show_default=True, help="First ROS domain to use."
+)
+@click.option("--list", "listed", is_flag=True, help="List the faults, and run nothing.")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out/selftest"),
+              show_default=True, help="Folder for selftest.json and the matrix.")  # fmt: skip
+def selftest(**options: Any) -> None:
+    """Show that the suite catches faulty robots and blames no good one.
+
+    Each faulty robot is a good one behind a proxy with one named change. Exit code: 0 all caught and nobody blamed;
+    1 otherwise; 2 usage; 3 a robot does not start; 130 interrupted.
+    """
+    from conformance.selftest.faults import FAULTS  # noqa: PLC0415 - lxml and the like cost what --help need not pay
+    from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see above
+
+    if options["short"]:
+        options.update(seeds=min(options["seeds"], 1), compare=False, variants=False)
+    patterns = options["patterns"] or (_SHORT if options["short"] else ("*",))
+    chosen = [fault for fault in FAULTS if any(fnmatch.fnmatch(fault.name, pattern) for pattern in patterns)]
+    if not chosen and patterns != ("none",):
+        raise click.UsageError(f"no fault has a name like {', '.join(patterns)}; --list shows them")
+    if options["listed"]:
+        for fault in chosen:
+            click.echo(f"{fault.name:34} {fault.says} [{', '.join(fault.catches)}]")
+        return
+    try:
+        report = _run(chosen, options)
+    except RobotError as error:
+        click.echo(str(error), err=True)
+        sys.exit(UNREACHABLE)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    path = report.write(options["out"])
+    click.echo(report.summary())
+    click.echo(f"result: {path}")
+    sys.exit(0 if report.holds else EXIT_CODES["not-conformant"])
+
+
+def _run(chosen: list[Fault], options: dict[str, Any]) -> Report:
+    from conformance.selftest.hunting import Bench, hunt, without_fault  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.report import Report  # noqa: PLC0415 - see selftest()
+
+    started = time.monotonic()
+    report = Report(options["target"])
+    teller = _Teller(len(chosen))
+    if chosen:
+        with Bench(options["target"], options["parallel"], options["domain_id"]) as bench:
+            already: frozenset[str] = frozenset()
+            if not options["short"]:
+                already = frozenset(without_fault(bench, options["effort"]).caught())
+            report.catches = hunt(bench, chosen, effort=options["effort"], already=already, tell=teller.catch)
+            if options["compare"]:
+                _compare(report, bench, chosen, teller)
+    if options["seeds"]:
+        _acquit(report, options, teller)
+    report.seconds = time.monotonic() - started
+    return report
+
+
+def _compare(report: Report, bench: Any, chosen: list[Fault], teller: _Teller) -> None:
+    from conformance.selftest import comparison  # noqa: PLC0415 - see selftest()
+
+    if comparison.command() is None:
+        report.notes.append("Schemathesis' command line is not installed, so that nothing was compared with it.")
+        return
+    good, report.compared = comparison.compare(bench, chosen, tell=teller.seen)
+    report.good = tuple(sorted(f"{operation} {code}" for operation, code in good))
+    report.notes.append(
+        f"Schemathesis ran with --max-examples {comparison.EXAMPLES}, phases examples, coverage, fuzzing, and at most "
+        f"{comparison.LIMIT_S:g} s for each fault; findings that it has of the good robot as well do not count."
+    )
+
+
+def _acquit(report: Report, options: dict[str, Any], teller: _Teller) -> None:
+    from conformance.selftest import robots  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.innocents import Case, acquit  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.variants import VARIANTS  # noqa: PLC0415 - see selftest()
+
+    kinds = [*robots.STRANGERS, robots.REFERENCE]
+    try:
+        robots.check_available(robots.REFERENCE)
+    except robots.RobotError as error:
+        kinds.remove(robots.REFERENCE)
+        report.notes.append(f"Not among the good robots: {error}")
+    cases: list[Case] = []
+    if options["variants"]:
+        # The slow one first, so that it does not keep all others waiting in the end.
+        cases += [Case("baroque", variant, 0) for variant in VARIANTS]
+    cases += [Case(kind, None, seed) for seed in range(options["seeds"]) for kind in kinds]
+    teller.total = len(cases)
+    report.acquittals = acquit(
+        cases,
+        effort=options["effort"],
+        parallel=options["parallel"],
+        domain_id=options["domain_id"],
+        tell=teller.acquittal,
+    )
+
+
+class _Teller:
+    """Tells of progress on stderr."""
+
+    def __init__(self, total: int) -> None:
+        self.total = total
+        self._done = 0
+        self._compared = 0
+        self._acquitted = 0
+
+    def catch(self, catch: Catch) -> None:
+        """A fault has been tried."""
+        self._done += 1
+        said = catch.unseen or (f"MISSED by {', '.join(catch.missed)}" if catch.missed else f"caught by {_few(catch)}")
+        click.echo(f"[{self._done}/{self.total}] {catch.fault.name}: {said} ({catch.seconds:.1f} s)", err=True)
+
+    def seen(self, seen: Seen) -> None:
+        """Schemathesis has tried a fault."""
+        self._compared += 1
+        said = f"caught: {seen.findings[0]}" if seen.caught else "not caught"
+        click.echo(f"[{self._compared}] Schemathesis, {seen.fault}: {said}", err=True)
+
+    def acquittal(self, acquittal: Acquittal) -> None:
+        """A good robot has been judged."""
+        self._acquitted += 1
+        name = f"{acquittal.robot} {acquittal.variant}".strip()
+        said = acquittal.unseen or (
+            "conformant" if acquittal.acquitted else f"BLAMED: {acquittal.blamed or acquittal.unjudged or 'given up'}"
+        )
+        click.echo(f"[{self._acquitted}/{self.total}] {name}, seed {acquittal.seed}: {said}"[:400], err=True)
+
+
+def _few(catch: Catch) -> str:
+    rest = len(catch.caught) - len(catch.fault.catches)
+    return ", ".join(catch.fault.catches) + (f" and {rest} more" if rest > 0 else "")

@@ -1,0 +1,113 @@
+"""What the plain Schemathesis command line catches of the REST faults, with the same OpenAPI file.
+
+It is bounded in time, as our runs are. A fault counts as caught when Schemathesis reports something that it does not
+report of the good robot behind the same proxy: what it says of a good robot is no catch.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lxml import etree
+
+from conformance.contract.files import CONTRACT_DIR
+from conformance.selftest.proxy import unchanged
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from conformance.selftest.faults.fault import Fault
+    from conformance.selftest.hunting import Bench
+    from conformance.selftest.proxy import Proxy
+
+EXAMPLES, LIMIT_S = 3, 40.0
+_FINDING = re.compile(r"^- (ST\d+)", re.MULTILINE)
+# Operation and code of each finding.
+Findings = frozenset[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What Schemathesis says of one faulty robot.
+
+    Attributes:
+        fault: its name.
+        caught: whether it reports something beyond what it reports of the good robot.
+        findings: what is beyond, as "OPERATION CODE".
+    """
+
+    fault: str
+    caught: bool
+    findings: tuple[str, ...]
+
+
+def command() -> str | None:
+    """The Schemathesis command of this environment, or None."""
+    beside = Path(sys.executable).with_name("st")
+    return str(beside) if beside.exists() else shutil.which("st")
+
+
+def compare(bench: Bench, faults: Iterable[Fault], *, tell: Callable[[Seen], None]) -> tuple[Findings, list[Seen]]:
+    """Run Schemathesis against the good robot, and then against every REST fault that no ROS probe is needed for."""
+    lock = threading.Lock()
+    robot, proxy = bench.take()
+    try:
+        good = _findings(proxy)
+    finally:
+        bench.give(robot, proxy)
+
+    def one(fault: Fault) -> Seen:
+        robot, proxy = bench.take()
+        try:
+            proxy.change, proxy.serial = fault.make(), fault.serial
+            proxy.torn = fault.torn() if fault.torn else None
+            beyond = _findings(proxy, fault.token) - good
+        finally:
+            proxy.change = unchanged
+            bench.give(robot, proxy)
+        seen = Seen(fault.name, bool(beyond), tuple(sorted(f"{operation} {code}" for operation, code in beyond)))
+        with lock:
+            tell(seen)
+        return seen
+
+    tried = [fault for fault in faults if fault.interface == "rest" and not fault.probe]
+    with ThreadPoolExecutor(bench.size) as pool:
+        return good, list(pool.map(one, tried))
+
+
+def _findings(proxy: Proxy, token: str = "") -> Findings:
+    """What Schemathesis reports, by its JUnit file."""
+    schemathesis = command()
+    if schemathesis is None:
+        return frozenset()
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "junit.xml"
+        words = [schemathesis, "run", str(CONTRACT_DIR / "openapi.yaml"), "--url", proxy.rest, "--seed", "1"]
+        words += ["--max-examples", str(EXAMPLES), "--phases", "examples,coverage,fuzzing", "--continue-on-failure"]
+        words += ["--request-timeout", "5", "--generation-database", "none", "--no-color"]
+        words += ["--report", "junit", "--report-junit-path", str(report)]
+        if token:
+            words += ["-H", f"Authorization: Bearer {token}"]
+        try:
+            subprocess.run(words, capture_output=True, timeout=LIMIT_S, cwd=folder, check=False)  # noqa: S603 - made above
+        except subprocess.TimeoutExpired:
+            return frozenset({("every operation", "no end within the limit")})
+        if not report.exists():
+            return frozenset()
+        root = etree.fromstring(report.read_bytes())
+        return frozenset(
+            (str(case.get("name")), code)
+            for case in root.iter("testcase")
+            for problem in case
+            if problem.tag in {"failure", "error"}
+            for code in _FINDING.findall(problem.text or "") or ["error"]
+        )

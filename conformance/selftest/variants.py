@@ -1,0 +1,137 @@
+"""Circumstances in which a good robot stays a good one: what stands between it and its clients in the field."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import ssl
+import subprocess
+import threading
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from conformance.selftest.faults.changing import parsed, problem
+from conformance.selftest.proxy import unchanged
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conformance.selftest.proxy import Change
+    from conformance.selftest.wire import Answer, Ask
+
+    Forward = Callable[[Ask], Answer]
+
+_PREFIX = "/r2d2/api"
+_TOKEN = "open-sesame"  # noqa: S105 - of a robot that lives for seconds, on loopback
+_DELAY_S = 0.3
+_CEILING = 100.0
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One circumstance.
+
+    Attributes:
+        name: its name; says: what it is, in a few words.
+        make: makes the change.
+        host: where the proxy listens; prefix: its path; tls: whether it speaks TLS.
+        token: bearer token to send.
+        endpoints: what the statement says of it.
+    """
+
+    name: str
+    says: str
+    make: Callable[[], Change] = lambda: unchanged
+    host: str = "127.0.0.1"
+    prefix: str = ""
+    tls: bool = False
+    token: str = ""
+    endpoints: dict[str, Any] = field(default_factory=dict)
+
+
+class CertificateError(Exception):
+    """No certificate can be made here."""
+
+
+def certificate(folder: Path) -> tuple[ssl.SSLContext, Path]:
+    """A context that serves with a certificate of its own making, and the file by which to trust it.
+
+    Raises:
+        CertificateError: there is no openssl, or it fails.
+    """
+    openssl = shutil.which("openssl")
+    if openssl is None:
+        raise CertificateError("there is no openssl to make a certificate with")
+    key, cert = folder / "key.pem", folder / "cert.pem"
+    names = "subjectAltName=IP:127.0.0.1,IP:::1,DNS:localhost"
+    command = [openssl, "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=robot"]
+    command += ["-addext", names, "-keyout", str(key), "-out", str(cert)]
+    done = subprocess.run(command, capture_output=True, check=False)  # noqa: S603 - made above
+    if done.returncode:
+        raise CertificateError(f"openssl fails: {done.stderr.decode(errors='replace')[-200:]}")
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(cert, key)
+    return context, cert
+
+
+def _slow(ask: Ask, forward: Forward) -> Answer:
+    time.sleep(_DELAY_S)
+    return forward(ask)
+
+
+def _prefixed(ask: Ask, forward: Forward) -> Answer:
+    """Descriptions say under which path everything is."""
+    answer = forward(ask)
+    if ask.side == "rest" and ask.path.endswith("/openapi.json"):
+        value = parsed(answer.body)
+        if isinstance(value, dict):
+            answer.body = json.dumps({**value, "servers": [{"url": _PREFIX}]}).encode()
+    return answer
+
+
+def _closing(ask: Ask, forward: Forward) -> Answer:
+    answer = forward(ask)
+    answer.version = "HTTP/1.0"
+    answer.put("Connection", "close")
+    return answer
+
+
+def _guarded(ask: Ask, forward: Forward) -> Answer:
+    """A token is wanted for everything; without it, 401 as RFC 9110 has it."""
+    if ask.raw is None and ask.field("Authorization") != f"Bearer {_TOKEN}":
+        # Framing is looked at first, by the robot; a request that is none never comes to the question of the token.
+        if sum(name.lower() == "host" for name, _ in ask.fields) != 1:
+            return forward(ask)
+        return problem(401, "a bearer token is wanted", ("WWW-Authenticate", 'Bearer realm="robot"'))(ask)
+    return forward(ask)
+
+
+class _Ceiling:
+    """More requests than the ceiling allows within a second are answered 429."""
+
+    def __init__(self) -> None:
+        self._times: list[float] = []
+        self._lock = threading.Lock()
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        now = time.monotonic()
+        with self._lock:
+            self._times = [*(one for one in self._times if now - one < 1.0), now]
+            # A tenth more than the ceiling: clients' clocks and scheduling are no fault of theirs.
+            full = len(self._times) > _CEILING * 1.1
+        if full:
+            return problem(429, "too many requests", ("Retry-After", "1"))(ask)
+        return forward(ask)
+
+
+VARIANTS = (
+    Variant("slow", "every answer takes 300 ms more", lambda: _slow),
+    Variant("prefix", f"everything is under {_PREFIX}", lambda: _prefixed, prefix=_PREFIX),
+    Variant("close", "HTTP/1.0, and every connection is closed", lambda: _closing),
+    Variant("tls", "HTTPS with a certificate of the robot's own", tls=True),
+    Variant("token", "a bearer token is wanted", lambda: _guarded, token=_TOKEN),
+    Variant("ipv6", "the robot is at [::1]", host="::1"),
+    Variant("ceiling", "100 requests a second, and no more", _Ceiling, endpoints={"request_rate": _CEILING * 0.8}),
+)
