@@ -56,13 +56,12 @@ class Blocks:
     @classmethod
     def of(cls, histograms: Sequence[Histogram]) -> Blocks:
         """From one histogram for each block."""
-        occupied = sorted({index for histogram in histograms for index in histogram.counts})
-        place = {index: column for column, index in enumerate(occupied)}
-        counts = np.zeros((len(histograms), len(occupied)))
-        for row, histogram in enumerate(histograms):
-            for index, count in histogram.counts.items():
-                counts[row, place[index]] = count
-        return cls(np.array(occupied, dtype=np.int64), counts)
+        found = [histogram.arrays() for histogram in histograms]
+        occupied = np.unique(np.concatenate([bins for bins, _ in found]))
+        counts = np.zeros((len(found), len(occupied)))
+        for row, (bins, numbers) in enumerate(found):
+            counts[row, np.searchsorted(occupied, bins)] = numbers
+        return cls(occupied, counts)
 
     def statistic_ms(self, weights: Floats, name: str) -> Floats:
         """The mean or a quantile of weighted sums of blocks.

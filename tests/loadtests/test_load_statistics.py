@@ -35,7 +35,7 @@ def test_too_few_samples_say_so_instead_of_a_number():
 def test_intervals_cover_the_truth_as_often_as_they_promise():
     lot = np.random.default_rng(3)
     medians = ratios = 0
-    trials = 80
+    trials = 40
     for trial in range(trials):
         drift = lot.normal(0, 0.05, size=(30, 1))
         rest = np.exp(lot.normal(0, 0.2, size=(30, 20)) + drift)
@@ -45,8 +45,8 @@ def test_intervals_cover_the_truth_as_often_as_they_promise():
         found = compare([(block(a), block(b)) for a, b in zip(rest, soap, strict=True)], "p50", trial)
         ratios += found.ci95[0] <= 1.5 <= found.ci95[1]
         assert found.ci95[0] <= found.ratio <= found.ci95[1]
-    assert medians >= 0.87 * trials
-    assert ratios >= 0.87 * trials
+    assert medians >= 0.85 * trials
+    assert ratios >= 0.85 * trials
 
 
 def test_a_drift_that_meets_both_sides_does_not_widen_the_ratio():
