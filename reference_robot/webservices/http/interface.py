@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from abc import ABC, abstractmethod
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 _LOGGER: Final = logging.getLogger(__name__)
 
 
-class Interface:
+class Interface(ABC):
     """An ASGI application whose subclasses turn a request into an answer.
 
     Every answer carries ``Server-Timing: app;dur=MS``: the time from the complete head of the request to the answer,
@@ -36,9 +37,9 @@ class Interface:
     def __init__(self, authorization: Authorization) -> None:
         self._authorization = authorization
 
+    @abstractmethod
     def answer(self, request: Request) -> Response | Awaitable[Response]:
         """Return the answer, at once or awaited; a Problem that it raises becomes the answer."""
-        raise NotImplementedError
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         """Serve one request (ASGI 3)."""

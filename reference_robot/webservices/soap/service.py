@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Final
 
 from reference_robot.webservices.http.messages import Request, Response, content
@@ -27,7 +28,7 @@ _MEDIA_TYPE: Final = "text/xml"
 _SERVERS_FAULT: Final = 500
 
 
-class SoapService:
+class SoapService(ABC):
     """A service: a subclass gives the description and the operations.
 
     An operation takes the wrapper element, valid by the XSD, and returns the answering envelope.
@@ -36,9 +37,9 @@ class SoapService:
     path: str
     description: ServiceDescription
 
+    @abstractmethod
     def operations(self) -> dict[str, Operation]:
         """Return the operations by local name."""
-        raise NotImplementedError
 
     def __init__(self) -> None:
         namespace = self.description.namespace
