@@ -62,7 +62,7 @@ def _valid(judge: Judge, operation: str, answer: Answer) -> bool:
 @pytest.mark.requirement("soap-delivery/delivery", "soap-delivery/coffee", _VALID)
 def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> None:
     """Both operations take the paper's example, again and again, and answer with their own empty wrapper."""
-    for number in range(effort.cases(30)):
+    for number in range(effort.cases(55)):
         for operation, id_ in zip(_BOTH, ("soap-delivery/delivery", "soap-delivery/coffee"), strict=True):
             code = "3" if operation == "ExecuteDeliveryRequest" and number % 2 else "4"
             answer = call(publishers, paper.delivery(operation, code))

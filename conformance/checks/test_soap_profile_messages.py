@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.soap.asking import ask, call
-from conformance.soap.baseline import example
+from conformance.soap.baseline import candidates, example, typed
 from conformance.soap.envelope import envelope
 from conformance.soap.mutations import invalid_ones, mutants
 from conformance.soap.names import clark
@@ -47,6 +47,7 @@ def test_answers(roaas: Session, judge: Judge, effort: Effort) -> None:
         if not good:
             for id_ in _REPEATED:
                 judge.skip(id_, f"the robot took none of the messages tried at its {service.name} service")
+        _untyped(judge, service)
         for operation, message in good:
             for _ in range(effort.cases(15)):
                 answer = call(service, message)
@@ -65,6 +66,23 @@ def test_answers(roaas: Session, judge: Judge, effort: Effort) -> None:
                         f"{operation.response} in the Body",
                         found=answer.told,
                     )
+
+
+def _untyped(judge: Judge, service: SoapService) -> None:
+    """Where an operation takes no message, try one with xsi:type: if it takes that, it asks for what is not needed."""
+    for operation in service.contract.operations:
+        declared = service.contract.shape(operation.request) if operation.request else None
+        if declared is None or example(service, operation) is not None:
+            continue
+        plain = next(candidates(service, operation, declared))
+        answer = ask(service, typed(envelope([plain]), declared, plain))
+        judge.that(
+            "soap-basic-profile/R1017",
+            not answer.taken,
+            answer.exchange,
+            "the message taken without xsi:type as well",
+            found=f"{operation.name} is taken with xsi:type alone",
+        )
 
 
 @pytest.mark.requirement("soap-basic-profile/R1127", "xml-security/soapaction-spoofing")

@@ -5,12 +5,14 @@ A contract may limit values beyond its schema. So a message is not believed to b
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from conformance.soap import paper
 from conformance.soap.asking import call
 from conformance.soap.lexical import FLOATS, INTEGERS, bounds
 from conformance.soap.messages import ordinary, simple_leaves, with_text
+from conformance.soap.names import XSD, XSI, clark, namespace
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,7 +43,7 @@ def _found(service: SoapService, operation: Operation) -> Node | None:
     if declared is None:
         return None
     tried: set[bytes] = set()
-    for candidate in _candidates(service, operation, declared):
+    for candidate in candidates(service, operation, declared):
         document = candidate.written()
         if document not in tried and call(service, candidate).taken:
             return candidate
@@ -49,7 +51,12 @@ def _found(service: SoapService, operation: Operation) -> Node | None:
     return None
 
 
-def _candidates(service: SoapService, operation: Operation, declared: Element) -> Iterator[Node]:
+def candidates(service: SoapService, operation: Operation, declared: Element) -> Iterator[Node]:
+    """Messages of an operation to try, likeliest first, at least one.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
     if service.contract.target_namespace == paper.NAMESPACE:
         yield from paper.examples(service, operation)
     for optional in (False, True):
@@ -84,3 +91,18 @@ def quiet_example(service: SoapService) -> tuple[Operation, Node] | None:
 def _size(service: SoapService, operation: Operation) -> int:
     declared = service.contract.shape(operation.request) if operation.request else None
     return len(ordinary(declared, optional=True).paths()) if declared is not None else 1000
+
+
+def typed(message: Node, declared: Element, payload: Node) -> bytes:
+    """A message in which each value of the payload says its type by xsi:type, as RPC-encoded SOAP did."""
+    made = payload
+    for path, simple in simple_leaves(declared, payload):
+        attribute = (clark(XSI, "type"), f"xs:{simple.builtin}")
+        if path:
+            made = made.changed(path, lambda leaf, new=attribute: (replace(leaf, attributes=(new,)),))  # type: ignore[misc] # a default argument binds the loop's value
+    if made == payload:
+        made = replace(payload, attributes=((clark(XSI, "type"), f"tns:{payload.name}"),))
+    body = message.children[-1]
+    whole = replace(message, children=(*message.children[:-1], replace(body, children=(made,))))
+    bindings = f' xmlns:xs="{XSD}" xmlns:tns="{namespace(payload.tag)}" xmlns:n0='.encode()
+    return whole.written().replace(b" xmlns:n0=", bindings, 1)
