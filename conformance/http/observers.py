@@ -24,7 +24,8 @@ _NO_HTTP = "the answer is no HTTP"
 
 def watch(session: Session) -> None:
     """Have every exchange with the session's REST interface judged, whoever sends it."""
-    session.connection.listeners.append(Observer(session))
+    if not any(isinstance(listener, Observer) for listener in session.connection.listeners):
+        session.connection.listeners.append(Observer(session))
 
 
 class Observer:

@@ -88,15 +88,6 @@ class Operation:
         """Whether the method is safe by RFC 9110 9.2.1."""
         return self.method in SAFE
 
-    @cached_property
-    def pattern(self) -> re.Pattern[str]:
-        """Matches the paths that the template stands for."""
-        return re.compile(
-            "".join(
-                re.escape(part) if i % 2 == 0 else "[^/]*" for i, part in enumerate(_PARAMETER.split(self.template))
-            )
-        )
-
     def declared(self, status: int) -> dict[str, Schema] | None:
         """The media types that the contract declares for a status; None where it does not declare the status."""
         for key in (str(status), f"{status // 100}XX", f"{status // 100}xx", "default"):
@@ -224,6 +215,12 @@ class Resource:
     template: str
     operations: dict[str, Operation]
 
+    @cached_property
+    def pattern(self) -> re.Pattern[str]:
+        """Matches the paths that the template stands for."""
+        parts = _PARAMETER.split(self.template)
+        return re.compile("".join(re.escape(part) if i % 2 == 0 else "[^/]*" for i, part in enumerate(parts)))
+
     @property
     def methods(self) -> frozenset[str]:
         """The methods that the contract gives it, HEAD with GET included."""
@@ -249,19 +246,24 @@ def resources_of(contract: Contract) -> tuple[Resource, ...]:
     return tuple(Resource(template, operations) for template, operations in by_path.items())
 
 
+def resource_at(contract: Contract, path: str) -> Resource | None:
+    """The resource that a path is for; a literal path wins over a template (OpenAPI 3.1, 4.8.8.2)."""
+    found = [item for item in resources_of(contract) if item.pattern.fullmatch(path)]
+    return min(found, key=lambda item: item.template.count("{"), default=None)
+
+
 def matching(contract: Contract, method: str, path: str) -> Operation | None:
-    """The operation that a request is for; HEAD counts as GET; a literal path wins over a template.
+    """The operation that a request is for; HEAD counts as GET.
 
     Args:
         contract: whose.
         method: as sent.
         path: below the base URL, without query.
     """
-    wanted = "GET" if method == "HEAD" else method
-    found = [item for item in operations_of(contract) if item.method == wanted and item.pattern.fullmatch(path)]
-    return min(found, key=lambda item: item.template.count("{"), default=None)
+    resource = resource_at(contract, path)
+    return resource.operations.get("GET" if method == "HEAD" else method) if resource else None
 
 
 def known_path(contract: Contract, path: str) -> bool:
     """Whether any resource of the contract has this path."""
-    return any(item.pattern.fullmatch(path) for item in operations_of(contract))
+    return resource_at(contract, path) is not None

@@ -1,0 +1,75 @@
+"""The contract's WSDLs load in zeep, are what the paper prints, and their XSD is valid by itself."""
+
+from __future__ import annotations
+
+import pytest
+import xmlschema
+from lxml import etree
+from zeep import Client
+
+from conformance.contract.files import CONTRACT_DIR, Contract
+
+CONTRACT = Contract.load()
+NAMESPACE = "http://soap.turtlebot.mybot.org/"
+WSDL = "{http://schemas.xmlsoap.org/wsdl/}"
+READS = {"GetPose", "GetVelocity", "GetSensors", "GetNavigationServices", "GetGoal", "GetPlan"}
+SERVICES = {
+    "publishers": ("TurtlebotPublishers", {"ExecuteCoffeeRequest", "ExecuteDeliveryRequest"}),
+    "subscribers": ("TurtlebotSubscribers", READS),
+}
+
+
+@pytest.fixture(params=SERVICES)
+def described(request):
+    name = request.param
+    path = {"publishers": CONTRACT.publishers_path, "subscribers": CONTRACT.subscribers_path}[name]
+    return path, *SERVICES[name]
+
+
+def test_zeep_loads_it(described):
+    path, name, operations = described
+    client = Client(str(path))
+    service = client.wsdl.services[f"{name}WebServiceService"]
+    assert set(service.ports) == {f"{name}WebServicePort"}
+    port = service.ports[f"{name}WebServicePort"]
+    assert set(port.binding.all()) == operations
+    assert port.binding.port_type.name.localname == f"{name}Interface"
+
+
+def test_names_are_those_of_the_paper(described):
+    path, name, operations = described
+    root = etree.parse(path).getroot()
+    assert root.get("targetNamespace") == NAMESPACE
+    assert root.find(f"{WSDL}binding").get("name") == f"{name}WebServicePortBinding"
+    for operation in operations:
+        for suffix in ("", "Response"):
+            parts = root.findall(f"{WSDL}message[@name='{operation}{suffix}']/{WSDL}part")
+            assert [(part.get("name"), part.get("element")) for part in parts] == [
+                ("parameters", f"tns:{operation}{suffix}")
+            ]
+
+
+@pytest.mark.parametrize("name", ["publishers.xsd", "subscribers.xsd"])
+def test_the_xsd_is_valid_by_lxml_and_xmlschema(name):
+    path = CONTRACT_DIR / name
+    etree.XMLSchema(etree.parse(path))
+    schema = xmlschema.XMLSchema10(str(path))
+    assert schema.target_namespace == NAMESPACE
+
+
+def test_the_delivery_message_has_the_fields_of_the_paper_in_order():
+    schema = xmlschema.XMLSchema10(str(CONTRACT_DIR / "publishers.xsd"))
+    message = schema.types["deliveryRequestMessage"]
+    fields = [(item.name, item.type.local_name, item.min_occurs) for item in message.content.iter_elements()]
+    assert fields == [
+        ("depot_x", "double", 1),
+        ("depot_y", "double", 1),
+        ("destination_x", "double", 1),
+        ("destination_y", "double", 1),
+        ("message_code", "int", 1),
+        ("source_x", "double", 1),
+        ("source_y", "double", 1),
+    ]
+    for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"):
+        (argument,) = schema.elements[name].type.content.iter_elements()
+        assert (argument.name, argument.min_occurs) == ("arg0", 0)

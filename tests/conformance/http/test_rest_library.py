@@ -1,0 +1,58 @@
+"""``roaas certify --contract DIR`` judges a service of another domain, and finds what is wrong with a broken one."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+from click.testing import CliRunner
+from lending_library import CONTRACT, open_library
+
+from roaas import main
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+
+@pytest.fixture
+def certified(tmp_path) -> Iterator[Callable[[str], tuple[int, dict[str, tuple[str, str]], dict[str, str]]]]:
+    closing = []
+
+    def run(fault: str, *options: str):
+        rest, wsdl, close = open_library(fault)
+        closing.append(close)
+        arguments = ["certify", "--contract", str(CONTRACT), "--rest", rest, "--publishers-wsdl", wsdl]
+        result = CliRunner().invoke(main, [*arguments, "--effort", "quick", "--out", str(tmp_path), *options])
+        assert result.exception is None or isinstance(result.exception, SystemExit), result.output
+        document = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+        found = {item["id"]: (item["verdict"], item["reason"]) for item in document["requirements"]}
+        return result.exit_code, found, document["classes"]
+
+    yield run
+    for close in closing:
+        close()
+
+
+def test_a_good_library_conforms(certified):
+    code, found, classes = certified("", "--allow-motion")
+    assert {id_: told for id_, told in found.items() if told[0] in {"fail", "error", "skip", "warn"}} == {}
+    assert code == 0
+    assert classes["http"] == classes["rest-formats"] == classes["strict-input"] == classes["describe"] == "pass"
+    assert "rest-resources" not in classes or classes["rest-resources"] == "not-claimed"
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        ("every-20th-fails", "http/no-server-error"),
+        ("takes-unknown-fields", "strict-input/json-unknown"),
+        ("xml-rounds", "rest-formats/same-values"),
+        ("undescribed", "describe/openapi-operations"),
+    ],
+)
+def test_a_broken_library_does_not(certified, fault, expected):
+    class_ = expected.split("/", 1)[0]
+    code, found, _ = certified(fault, "--class", class_)
+    assert found[expected][0] == "fail"
+    assert code == 1
