@@ -169,7 +169,7 @@ class Goals:
                 "goal": {"target_pose": reader_of(PoseStamped)(message_from(shape_of(PoseStamped), pose))},
                 "status": {"code": code, "text": _STATUS_TEXTS.get(code, "")},
             }
-        except (ValueError, TypeError, KeyError, AssertionError):
+        except (ValueError, TypeError, KeyError, AssertionError, Problem):
             return None
         return described if code in _STATUS_TEXTS and identity not in self._known else None
 

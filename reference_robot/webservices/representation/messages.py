@@ -6,6 +6,7 @@ import math
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
+from reference_robot.webservices.problems import not_yet
 from reference_robot.webservices.representation.shapes import Record, Series, shape_of
 
 if TYPE_CHECKING:
@@ -14,36 +15,33 @@ if TYPE_CHECKING:
     from reference_robot.webservices.representation.shapes import Shape
 
 
-class NonFiniteValueError(ValueError):
-    """A message holds NaN or an infinity, which never leaves the robot (contract, REST)."""
-
-
 def reader_of(message: Any) -> Callable[[Any], dict[str, Any]]:
     """Return a function from a message of this class to plain data.
 
-    The function raises NonFiniteValueError, naming the field, for a value that is not finite.
+    The function raises the Problem 503, naming the field, for a value that is not finite: such a one never leaves the
+    robot (contract, REST).
     """
-    read = _reader(shape_of(message))
+    shape = shape_of(message)
+    read = _reader(shape)
 
     def to_plain(value: Any) -> dict[str, Any]:
         plain: dict[str, Any] = read(value)
-        require_finite(plain)
+        _require_finite(plain, shape.name)
         return plain
 
     return to_plain
 
 
-def require_finite(plain: Any, where: str = "") -> None:
-    """Raise NonFiniteValueError, naming the field, if plain data holds a value that is not finite."""
+def _require_finite(plain: Any, where: str) -> None:
     if isinstance(plain, float):
         if not math.isfinite(plain):
-            raise NonFiniteValueError(f"{where} is {plain}")
+            raise not_yet(f"what the robot tells is not finite: {where} is {plain}")
     elif isinstance(plain, dict):
         for name, value in plain.items():
-            require_finite(value, f"{where}.{name}" if where else name)
+            _require_finite(value, f"{where}.{name}")
     elif isinstance(plain, list):
         for index, value in enumerate(plain):
-            require_finite(value, f"{where}[{index}]")
+            _require_finite(value, f"{where}[{index}]")
 
 
 def message_from(shape: Record, plain: dict[str, Any]) -> Any:

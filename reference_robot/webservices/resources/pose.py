@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from nav_msgs.msg import Odometry
 
 from reference_robot.webservices.problems import not_yet
-from reference_robot.webservices.representation.messages import NonFiniteValueError, reader_of
+from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
 
 if TYPE_CHECKING:
@@ -46,7 +46,4 @@ class Pose(Resource):
         message = self._subscribers.odometry
         if message is None:
             raise not_yet("the robot has not published its odometry yet")
-        try:
-            return self._read(message)
-        except NonFiniteValueError as error:
-            raise not_yet(f"the robot's odometry is not finite: {error}") from error
+        return self._read(message)

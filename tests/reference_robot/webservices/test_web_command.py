@@ -81,6 +81,16 @@ def test_the_robot_ends_with_its_simulation(domain_id: int):
         assert "ended by itself" in served.process.stderr.read()
 
 
+@pytest.mark.parametrize("package", ["rclpy", "mybot_delivery_app", "nav2_msgs", "uvicorn"])
+def test_a_missing_package_is_named_with_its_remedy(package: str):
+    program = f"import sys; sys.modules[{package!r}] = None; from reference_robot.cli import robot; robot(['--attach'])"
+    done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert package in done.stderr
+    assert "pip install" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_a_port_in_use_is_named():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -78,4 +78,7 @@ def test_before_the_first_odometry_there_is_503(domain_id: int):
         refused = eventually(lambda: (a := served.call("GET", PATH)).status_code == 503 and a)
         assert "covariance[35] is nan" in refused.json()["detail"]
         assert served.soap(query_envelope("GetPose"), url=served.subscribers).status_code == 500
+        silent.do(odometry={"x": float("inf"), "covariance": 0.0})
+        refused = eventually(lambda: (a := served.call("GET", "/robot/velocity/")).status_code == 503 and a)
+        assert "linear.x is inf" in refused.json()["detail"]
     silent.close()

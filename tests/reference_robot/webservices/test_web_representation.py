@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import BatteryState, LaserScan
 
 from reference_robot.webservices.problems import Problem
-from reference_robot.webservices.representation.messages import NonFiniteValueError, message_from, reader_of
+from reference_robot.webservices.representation.messages import message_from, reader_of
 from reference_robot.webservices.representation.reading import read
 from reference_robot.webservices.representation.shapes import Record, Series, shape_of
 from reference_robot.webservices.representation.writing import write_json, write_text, write_xml
@@ -69,7 +69,7 @@ def test_shapes_come_from_the_definitions():
 def test_what_is_not_finite_is_named():
     message = Odometry()
     message.twist.covariance[7] = math.inf
-    with pytest.raises(NonFiniteValueError, match=r"twist\.covariance\[7\] is inf"):
+    with pytest.raises(Problem, match=r"Odometry\.twist\.covariance\[7\] is inf"):
         reader_of(Odometry)(message)
 
 
