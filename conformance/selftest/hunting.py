@@ -86,6 +86,7 @@ class Bench:
     def give(self, robot: Robot, proxy: Proxy) -> None:
         """Give them back, as they were."""
         proxy.change, proxy.torn, proxy.serial = unchanged, None, False
+        proxy.broken = []
         self._free.put((robot, proxy))
 
 
@@ -180,6 +181,11 @@ def _try(fault: Fault, robot: Robot, proxy: Proxy, effort: str, seed: int, alrea
         )
         seen.update(dict.fromkeys(outcome.caught()))
         _note(catch, outcome, tuple(seen), chosen)
+        if proxy.broken:
+            # What such a fault does is not what it says: nothing that it shows counts.
+            catch.missed = fault.catches
+            catch.reasons = dict.fromkeys(fault.catches, f"the fault itself is broken: {proxy.broken[0]}")
+            break
         if not catch.missed:
             break
     return catch

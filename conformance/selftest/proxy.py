@@ -6,6 +6,7 @@ import contextlib
 import socket
 import threading
 import time
+import traceback
 from typing import TYPE_CHECKING, Protocol
 from urllib.parse import urlsplit
 
@@ -60,6 +61,7 @@ class Proxy:
         torn: what is done with requests that are never completed.
         serial: whether a request is read only when the one before it has come to its end.
         asked: how many requests have come.
+        broken: what a change raised that it should not have: then the fault is wrong, not the robot.
     """
 
     def __init__(
@@ -69,6 +71,7 @@ class Proxy:
         self.torn: Torn | None = None
         self.serial = False
         self.asked = 0
+        self.broken: list[str] = []
         self._tls, self._prefix = tls, prefix
         self._robot = {side: urlsplit(url) for side, url in (("rest", rest), ("soap", soap))}
         self._sockets = {side: _listen(host) for side in self._robot}
@@ -143,13 +146,23 @@ class Proxy:
         if ask is None:
             return False
         self.asked += 1
-        answer = self.change(ask, forward)
+        answer = self._changed(ask, forward)
         stream.sock.sendall(answer.wire())
         closes = "close" in (answer.field("Connection") or "").lower() or "close" in (ask.field("Connection") or "")
         if answer.raw is not None or ask.raw is not None or closes or answer.version == "HTTP/1.0":
             _linger(stream.sock)
             return False
         return ask.version != "HTTP/1.0"
+
+    def _changed(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
+        try:
+            return self.change(ask, forward)
+        except (OSError, TornError, HangUpError):
+            raise
+        except Exception as error:
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            self.broken.append(f"{type(error).__name__}: {error} ({where.filename.rsplit('/', 1)[-1]}:{where.lineno})")
+            raise HangUpError from error
 
     def _next(self, side: str, stream: Stream) -> Ask | None:
         if not self.serial or side != "rest":

@@ -75,7 +75,7 @@ class Ask(_Fields):
 
     def copy(self, **changes: object) -> Ask:
         """A copy with other parts; its fields can be altered without altering ours."""
-        return replace(self, fields=list(self.fields), **changes)  # type: ignore[arg-type] # dataclass fields by name
+        return replace(self, **{"fields": list(self.fields), **changes})  # type: ignore[arg-type] # fields by name
 
     def wire(self) -> bytes:
         """Its octets, with a Content-Length that fits unless several contradict each other."""

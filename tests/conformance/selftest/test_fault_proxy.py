@@ -1,0 +1,211 @@
+"""The proxy hands on what it gets, and alters only what its change alters."""
+
+import contextlib
+import http.client
+import socket
+import ssl
+import threading
+import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import urlsplit
+
+import pytest
+
+from conformance.selftest.faults.changing import altered, becomes, header, instead, plain, rest, rewritten, values
+from conformance.selftest.proxy import HangUpError, Proxy
+from conformance.selftest.strangers.plain import serve as plain_robot
+from conformance.selftest.variants import VARIANTS, certificate
+from conformance.selftest.wire import Answer, Ask
+
+
+class Robot(BaseHTTPRequestHandler):
+    """Answers with what it was asked, and counts."""
+
+    protocol_version = "HTTP/1.1"
+    seen: list
+
+    def _do(self):
+        body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
+        self.seen.append((self.command, self.path, body))
+        port = self.server.server_port
+        got = b'{"x": 1, "at": "http://127.0.0.1:%d/here"}' % port if self.command == "GET" else body
+        self.send_response(200)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Length", str(len(got)))
+        self.end_headers()
+        self.wfile.write(got)
+
+    do_GET = do_PUT = do_POST = _do  # noqa: N815 - http.server's names
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def robot():
+    handler = type("Handler", (Robot,), {"seen": []})
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True).start()
+    server.seen = handler.seen
+    server.url = f"http://127.0.0.1:{server.server_port}"
+    yield server
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.fixture
+def proxy(robot):
+    proxy = Proxy(robot.url, robot.url + "/turtlesim_publisher_ws?wsdl")
+    yield proxy
+    proxy.close()
+
+
+def ask(url, method="GET", path="/robot/pose/", body=None, **headers):
+    where = urlsplit(url)
+    connection = http.client.HTTPConnection(where.hostname, where.port, timeout=10)
+    try:
+        connection.request(method, where.path + path, body, headers)
+        answer = connection.getresponse()
+        return answer, answer.read()
+    finally:
+        connection.close()
+
+
+def raw(url, octets):
+    where = urlsplit(url)
+    with socket.create_connection((where.hostname, where.port), timeout=10) as sock:
+        sock.sendall(octets)
+        sock.shutdown(socket.SHUT_WR)
+        got = b""
+        with contextlib.suppress(ConnectionResetError):
+            while data := sock.recv(65536):
+                got += data
+        return got
+
+
+def test_it_hands_on_and_puts_its_own_address_in(proxy, robot):
+    answer, body = ask(proxy.rest)
+    assert answer.status == 200
+    assert f"{proxy.rest}/here".encode() in body
+    assert robot.seen == [("GET", "/robot/pose/", b"")]
+    assert ask(proxy.rest, "PUT", body=b"abc")[1] == b"abc"
+
+
+def test_chunked_requests_are_handed_on(proxy, robot):
+    where = urlsplit(proxy.rest)
+    head = f"PUT /p HTTP/1.1\r\nHost: {where.netloc}\r\nTransfer-Encoding: chunked\r\nConnection: close\r\n\r\n"
+    # The robot of this test reads no chunks; what arrives is the proxy's affair.
+    raw(proxy.rest, head.encode() + b"3\r\nabc\r\n2\r\nde\r\n0\r\n\r\n")
+    assert robot.seen[0][:2] == ("PUT", "/p")
+
+
+def test_answers_are_altered_where_they_should_be(proxy):
+    proxy.change = altered(rest("GET", "/robot/pose/"), values(lambda value: value.update(x=2)))()
+    assert b'"x": 2' in ask(proxy.rest)[1]
+    assert b'"x": 1' in ask(proxy.rest, path="/robot/other/")[1]
+
+
+def test_every_nth_is_altered_and_no_other(proxy):
+    proxy.change = altered(rest("GET"), becomes(502), nth=3)()
+    assert [ask(proxy.rest)[0].status for _ in range(7)] == [200, 200, 502, 200, 200, 502, 200]
+
+
+def test_fields_and_requests_are_altered(proxy, robot):
+    proxy.change = altered(rest("GET"), header("Content-Type", None))()
+    assert "Content-Type" not in ask(proxy.rest)[0].headers
+    proxy.change = rewritten(rest("PUT"), lambda one: setattr(one, "body", b"other"))()
+    assert ask(proxy.rest, "PUT", body=b"abc")[1] == b"other"
+    proxy.change = instead(rest("PUT"), plain(418))()
+    assert ask(proxy.rest, "PUT", body=b"abc")[0].status == 418
+    assert [method for method, _, _ in robot.seen] == ["GET", "PUT"]
+
+
+def test_hanging_up_answers_nothing(proxy):
+    def change(_ask, _forward):
+        raise HangUpError
+
+    proxy.change = change
+    with pytest.raises(http.client.RemoteDisconnected):
+        ask(proxy.rest)
+
+
+def test_octets_can_be_sent_as_they_are(proxy):
+    proxy.change = lambda one, _forward: Answer(
+        200, raw=b"HTTP/1.1 200 OK\r\nContent-Length: 9\r\n\r\nshort", asked=one.method
+    )
+    assert raw(proxy.rest, b"GET / HTTP/1.1\r\nHost: a\r\n\r\n").endswith(b"\r\n\r\nshort")
+
+
+def test_what_is_no_http_reaches_the_robot():
+    rest_url, soap_url, stop = plain_robot(0, 0)
+    proxy = Proxy(rest_url, soap_url)
+    try:
+        assert b" 400 " in raw(proxy.rest, b"GARBAGE\r\n\r\n").split(b"\r\n")[0]
+    finally:
+        proxy.close()
+        stop()
+
+
+def test_a_broken_change_is_told(proxy):
+    proxy.change = lambda _ask, _forward: {}["nothing"]
+    with pytest.raises(http.client.RemoteDisconnected):
+        ask(proxy.rest)
+    assert proxy.broken[0].startswith("KeyError: 'nothing'")
+
+
+def test_a_request_that_ends_in_the_middle_is_torn(proxy, robot):
+    torn = []
+    proxy.torn = lambda side, got, _forward: torn.append((side, got))
+    raw(proxy.rest, b"PUT /p HTTP/1.1\r\nHost: a\r\nContent-Length: 10\r\n\r\nabc")
+    assert torn == [("rest", b"abc")]
+    assert robot.seen == []
+
+
+def test_a_serial_robot_waits_for_the_request_before(proxy):
+    proxy.serial = True
+    where = urlsplit(proxy.rest)
+    with socket.create_connection((where.hostname, where.port), timeout=10) as half:
+        half.sendall(b"GET / HTTP/1.1\r\n")
+        time.sleep(0.2)
+        with socket.create_connection((where.hostname, where.port), timeout=0.5) as other:
+            other.sendall(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n")
+            with pytest.raises(TimeoutError):
+                other.recv(1)
+
+
+def test_a_prefix_is_taken_off(robot):
+    proxy = Proxy(robot.url, robot.url, prefix="/r2d2/api")
+    try:
+        assert proxy.rest.endswith("/r2d2/api")
+        assert ask(proxy.rest)[0].status == 200
+        assert robot.seen == [("GET", "/robot/pose/", b"")]
+        assert ask(proxy.rest.removesuffix("/r2d2/api"))[0].status == 404
+    finally:
+        proxy.close()
+
+
+def test_it_speaks_tls_with_a_certificate_of_its_own(robot, tmp_path):
+    context, ca_file = certificate(tmp_path)
+    proxy = Proxy(robot.url, robot.url, tls=context)
+    try:
+        where = urlsplit(proxy.rest)
+        trust = ssl.create_default_context(cafile=str(ca_file))
+        connection = http.client.HTTPSConnection(where.hostname, where.port, timeout=10, context=trust)
+        connection.request("GET", "/")
+        assert connection.getresponse().status == 200
+        connection.close()
+    finally:
+        proxy.close()
+
+
+def test_the_token_variant_asks_as_rfc_9110_has_it(proxy):
+    variant = next(one for one in VARIANTS if one.name == "token")
+    proxy.change = variant.make()
+    answer, _ = ask(proxy.rest)
+    assert (answer.status, "WWW-Authenticate" in answer.headers) == (401, True)
+    assert ask(proxy.rest, Authorization=f"Bearer {variant.token}")[0].status == 200
+
+
+def test_a_request_keeps_contradicting_lengths():
+    one = Ask("rest", "PUT", "/", fields=[("Content-Length", "3"), ("Content-Length", "4")], body=b"abc")
+    assert one.wire().count(b"Content-Length") == 2

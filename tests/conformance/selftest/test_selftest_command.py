@@ -1,0 +1,100 @@
+"""``roaas selftest`` and ``roaas contract`` as a user meets them."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from conformance.cli.contract import contract
+from conformance.cli.selftest import selftest
+from conformance.contract.files import CONTRACT_FILES
+from conformance.selftest.faults import FAULTS
+from conformance.selftest.hunting import Catch
+from conformance.selftest.innocents import Acquittal
+from conformance.selftest.judging import Outcome
+from conformance.selftest.report import Report
+
+
+def run(command, *words):
+    return CliRunner().invoke(command, list(words))
+
+
+def test_faults_are_listed():
+    done = run(selftest, "--list", "--faults", "wsdl-*")
+    assert done.exit_code == 0
+    assert "wsdl-float" in done.output
+    assert "pose-stale" not in done.output
+
+
+def test_a_pattern_that_fits_nothing_is_an_error_of_usage():
+    done = run(selftest, "--faults", "no-such-*")
+    assert done.exit_code == 2
+    assert "no-such-*" in done.output
+
+
+def test_without_ros_it_says_what_to_do(monkeypatch):
+    monkeypatch.setattr("conformance.selftest.robots.find_spec", lambda _: None)
+    done = run(selftest, "--faults", "pose-gone", "--seeds", "0", "--no-compare")
+    assert done.exit_code == 3
+    assert "--target baroque" in done.output
+
+
+def test_a_faulty_robot_is_caught_and_a_good_one_is_not_blamed(tmp_path):
+    words = [
+        "--target",
+        "baroque",
+        "--faults",
+        "sensors-twice",
+        "--seeds",
+        "0",
+        "--no-variants",
+        "--no-compare",
+        "--short",
+    ]
+    done = run(selftest, *words, "--out", str(tmp_path))
+    assert done.exit_code == 0, done.output
+    document = json.loads((tmp_path / "selftest.json").read_text())
+    assert document["format"] == "roaas-selftest/1"
+    assert document["faults"][0]["caught"] == ["rest-resources/sensors-unique"]
+    assert "sensors-twice" in (tmp_path / "selftest.md").read_text()
+
+
+def outcome(code, **verdicts):
+    reasons = {id_.replace("_", "/", 1): "said" for id_, value in verdicts.items() if value != "pass"}
+    return Outcome(code, {id_.replace("_", "/", 1): value for id_, value in verdicts.items()}, reasons, 10, 1.0)
+
+
+def test_a_missed_fault_and_a_blamed_robot_are_told(tmp_path):
+    fault = FAULTS[0]
+    report = Report("reference", [Catch(fault, missed=fault.catches, reasons={fault.catches[0]: "pass: pass"})])
+    report.acquittals = [Acquittal("plain", "", 3, outcome(1, http_date="fail"))]
+    assert not report.holds
+    assert f"MISSED {fault.name}" in report.summary()
+    assert "BLAMED plain, seed 3, exit code 1: http/date: said" in report.summary()
+    report.write(tmp_path)
+    assert json.loads((tmp_path / "selftest.json").read_text())["holds"] is False
+
+
+def test_nothing_tried_is_no_proof():
+    assert not Report("reference").holds
+    assert Report("reference", acquittals=[Acquittal("plain", "", 0, outcome(0, http_date="pass"))]).holds
+    assert not Report("reference", acquittals=[Acquittal("plain", "", 0, outcome(4, http_date="skip"))]).holds
+
+
+def test_requirements_are_listed():
+    done = run(contract, "list", "--class", "safety", "--level", "MUST")
+    assert "safety/watchdog" in done.output
+    assert "http/" not in done.output
+    assert json.loads(run(contract, "list", "--json", "--class", "http").stdout)[0]["id"] == "http/reachable"
+
+
+def test_the_contract_is_exported_and_not_over_what_is_there(tmp_path):
+    assert run(contract, "export", str(tmp_path / "there")).exit_code == 0
+    assert {path.name for path in (tmp_path / "there").iterdir()} == set(CONTRACT_FILES)
+    assert run(contract, "export", str(tmp_path / "there")).exit_code == 2
+    assert run(contract, "export", str(tmp_path / "there"), "--force").exit_code == 0
+
+
+@pytest.mark.parametrize("words", [(), ("--help",)])
+def test_the_group_explains_itself(words):
+    assert "coverage" in run(contract, *words).output
