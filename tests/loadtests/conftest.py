@@ -1,12 +1,15 @@
 """Toy robots in processes of their own, and `roaas load` as people start it."""
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in `roaas load`: its threads spin on a busy machine
 
 HERE = Path(__file__).parent
 CONTRACT = HERE.parents[1] / "conformance" / "contract"

@@ -15,6 +15,7 @@ def filled(values):
     return histogram
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(0, HIGHEST_US), min_size=1))
 def test_bins_are_those_of_hdrhistogram(values):
     reference = HdrHistogram(1, HIGHEST_US, 3)
@@ -27,6 +28,7 @@ def test_bins_are_those_of_hdrhistogram(values):
     assert bins.max() < BINS
 
 
+@settings(deadline=None)
 @given(st.lists(durations, max_size=6))
 def test_merged_is_the_union(parts):
     merged = Histogram()
@@ -36,6 +38,7 @@ def test_merged_is_the_union(parts):
     assert merged.pack() == union.pack()
 
 
+@settings(deadline=None)
 @given(durations.filter(bool))
 def test_other_readers_find_the_same_in_the_encoded_histogram(values):
     decoded = HdrHistogram.decode(filled(values).encode())
@@ -47,6 +50,7 @@ def test_other_readers_find_the_same_in_the_encoded_histogram(values):
         assert decoded.get_value_at_percentile(percentile) == reference.get_value_at_percentile(percentile)
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(0, 10_000_000_000), min_size=1, max_size=200), st.floats(0.0, 1.0))
 def test_quantiles_lie_within_a_bin_of_the_exact_ones(values, quantile):
     histogram = filled(values)
@@ -87,7 +91,7 @@ def recorded(events):
     return recorder
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 @given(st.lists(requests, max_size=4))
 def test_workers_reports_merge_into_the_union(shares):
     merged = Recorder()
