@@ -190,7 +190,7 @@ def _await_motion(robot: Robot) -> None:
 
 def _stays(robot: Robot, judge: Judge) -> None:
     """No motion and no goal come back."""
-    until = time.monotonic() + _STAYS_S
+    until = time.monotonic() + _STAYS_S * robot.watchfulness
     while time.monotonic() < until:
         velocity, exchange = robot.velocity()
         goal, shown = robot.goal()
@@ -220,7 +220,7 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, roaas: Session) ->
     here = robot.map_pose()
     if here is None:
         pytest.skip("the robot's pose cannot be read")
-    (there,) = choose_goals(robot, 0.6, 1)
+    (there,) = choose_goals(robot, 0.6 if robot.watchfulness == 1 else 0.55, 1)
     body = goal_body(there, robot.statement.motion.frame, "reached")
     exchange = put_goal(robot, body)
     status = exchange.response.status if exchange.response else 0

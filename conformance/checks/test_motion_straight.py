@@ -40,7 +40,7 @@ def test_straight_drive(roaas: Session) -> None:
         if not drive.command(ahead):
             return
         reached = drive.reach(ahead, "rest-resources/velocity-converges")
-        drive.keep(0.45 if reached else 0.0)
+        drive.keep(0.4 if reached else 0.0)
         drive.command(STILL)
         drive.reach(STILL, "safety/stop")
     except BusyError as busy:

@@ -13,12 +13,13 @@ from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
     from conformance.session import Session
+    from conformance.target.exchange import Exchange
     from conformance.verdict.judge import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 # Where no hold time is declared: a velocity is renewed so often, for so long, and has to end within so long, s.
 _RENEW_S: Final = 0.2
-_KEEP_S: Final = 1.5
+_KEEP_S: Final = 1.3
 _ENDS_S: Final = 10.0
 _LINEAR: Final = slice(0, 3)
 # A robot that drops its angular velocity needs so long to show it, s.
@@ -71,7 +72,7 @@ def _turn(robot: Robot, drive: Drive, judge: Judge) -> None:
     if robot.actuated(0):
         _arc(robot, drive, judge, turning)
     _renew(robot, drive, judge, turning, started)
-    _let_go(robot, drive, judge, turning)
+    _let_go(robot, drive, judge, turning, started)
 
 
 def _refused(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
@@ -120,28 +121,31 @@ def _arc(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
 
 
 def _renew(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started: float) -> None:
-    """Keep turning beyond the time at which the first command would have ended."""
+    """Keep turning; where the hold time is known, for so long that the first command ends before the last one does."""
     hold = robot.limits.hold_s
-    until = started + _KEEP_S if hold is None else started + hold + robot.limits.settle_s + 0.1
+    until = started + (_KEEP_S if hold is None else robot.limits.settle_s + 0.2)
     drive.command(turning)
     drive.reach(turning)
     while True:
         if time.monotonic() > drive.answered + (_RENEW_S if hold is None else 0.4 * hold):
             drive.command(turning)
-        velocity, exchange = drive.look()
-        judge.that(
-            "safety/renewal",
-            velocity is not None and abs(velocity.angular_z) > 0.5 * abs(turning.angular_z),
-            exchange,
-            f"{turning} as long as it is renewed",
-            found=str(velocity) if velocity else "",
-            cause="ended",
-        )
+        _judge_renewed(judge, turning, *drive.look())
         if time.monotonic() > until:
             return
 
 
-def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
+def _judge_renewed(judge: Judge, turning: Velocity, velocity: Velocity | None, exchange: Exchange) -> None:
+    judge.that(
+        "safety/renewal",
+        velocity is not None and abs(velocity.angular_z) > 0.5 * abs(turning.angular_z),
+        exchange,
+        f"{turning} as long as it is renewed",
+        found=str(velocity) if velocity else "",
+        cause="ended",
+    )
+
+
+def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started: float) -> None:
     """No more renewal: the velocity holds for its time, and then ends by itself."""
     limits = robot.limits
     if not drive.command(turning):
@@ -164,6 +168,8 @@ def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None
                 found=str(velocity) if velocity else "",
                 cause="ended early",
             )
+            if limits.hold_s is not None and asked > started + limits.hold_s + limits.settle_s:
+                _judge_renewed(judge, turning, velocity, exchange)
         calm = calm + 1 if velocity is not None and robot.near(velocity, STILL) else 0
         if calm > 1 or asked > ends_by:
             break

@@ -68,7 +68,7 @@ def test_pose(roaas: Session, judge: Judge, effort: Effort) -> None:
 def test_velocity_and_odometry(roaas: Session, effort: Effort) -> None:
     """Velocity, its linear part and the odometry agree; observer and drive judge each reading."""
     drive = Drive(Robot(roaas))
-    until = time.monotonic() + 0.5
+    until = time.monotonic() + 0.4
     readings = 0
     # Two readings agree where the odometry has been steady for a while: so look for that long at least.
     while readings < effort.cases(60) or time.monotonic() < until:

@@ -64,7 +64,7 @@ def test_an_invalid_velocity_moves_nothing(roaas: Session, robot: Robot, judge: 
             if not _judge_still(robot, judge, velocity, sent):
                 bring_to_rest(roaas)
                 sent.clear()
-    drive.keep(_WATCH_S)
+    drive.keep(_WATCH_S * robot.watchfulness)
     velocity, _ = drive.look()
     _judge_still(robot, judge, velocity, sent)
 

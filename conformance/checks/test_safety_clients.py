@@ -46,7 +46,7 @@ def test_client_vanished(roaas: Session, rest: HttpClient, judge: Judge) -> None
     ):
         with PartialRequest(rest, "PUT", path, sent=sent, promised=promised) as partial:
             time.sleep(0.01)  # the robot reads what has come before the connection breaks
-        until = time.monotonic() + _WATCH_S / 5
+        until = time.monotonic() + _WATCH_S / 5 * robot.watchfulness
         while True:
             velocity, exchange = drive.look()
             moves = velocity is not None and not robot.near(velocity, STILL, 2)
@@ -62,7 +62,7 @@ def test_client_vanished(roaas: Session, rest: HttpClient, judge: Judge) -> None
         )
         if moves:
             bring_to_rest(roaas)
-    drive.keep(_WATCH_S / 2)
+    drive.keep(_WATCH_S / 2 * robot.watchfulness)
     velocity, exchange = drive.look()
     judge.that(
         "safety/client-vanished",

@@ -88,7 +88,7 @@ def _judge_refused(robot: Robot, judge: Judge, bad: Velocity) -> None:
 def _judge_rest(robot: Robot, judge: Judge) -> None:
     """Nothing of what was refused shows a little later."""
     drive = Drive(robot)
-    until = time.monotonic() + _WATCH_S
+    until = time.monotonic() + _WATCH_S * robot.watchfulness
     velocity: Velocity | None = None
     exchange: Exchange | None = None
     while time.monotonic() < until:

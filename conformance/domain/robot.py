@@ -97,6 +97,8 @@ class Robot:
         self.limits = session.statement.limits
         # A ceiling on the rate of requests makes a robot as slow as one that answers slowly.
         self.usual_s = max(session.effort.usual_ms / 1000, 1 / (session.connection.request_rate or 1e9))
+        # How long what must not happen is watched for, in relation to standard effort.
+        self.watchfulness = 0.5 if session.effort.name == "quick" else 1.0
         observe(session)
 
     @property
