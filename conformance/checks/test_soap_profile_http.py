@@ -8,8 +8,8 @@ import pytest
 
 from conformance.soap.asking import Answer, ask, call, read_exchange
 from conformance.soap.baseline import quiet_example
-from conformance.soap.envelope import envelope
-from conformance.soap.names import clark
+from conformance.soap.envelope import NotXmlError, envelope, parse
+from conformance.soap.names import WSDL, XSD, clark
 from conformance.soap.node import Node
 from conformance.soap.services import askable
 from conformance.target.http import NoAnswerError
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from conformance.effort import Effort
     from conformance.session import Session
     from conformance.soap.service import SoapService
+    from conformance.target.exchange import Exchange
     from conformance.verdict.judge import Judge
 
 pytestmark = pytest.mark.phase("delivery")
@@ -118,24 +119,33 @@ def _truncated(judge: Judge, service: SoapService) -> None:
 
 @pytest.mark.requirement("soap-basic-profile/R1114")
 def test_methods(roaas: Session, judge: Judge, effort: Effort) -> None:
-    """Methods other than POST are answered 405."""
+    """Methods other than POST are answered 405; GET may be answered with a description."""
     for service in askable(roaas, "soap-basic-profile/R1114"):
         body = envelope([_message(service)]).written()
-        for method in ("PUT", "DELETE", "PATCH") * effort.cases(3):
+        for method in ("PUT", "GET", "DELETE", "PATCH") * effort.cases(3):
             exchange = service.client.send(
                 method,
                 service.path,
                 headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
-                body=body if method != "DELETE" else b"",
+                body=body if method in {"PUT", "PATCH"} else b"",
             )
             status = exchange.response.status if exchange.response else 0
             judge.that(
                 "soap-basic-profile/R1114",
-                status == 405,
+                status == 405 or (method == "GET" and _is_description(exchange)),
                 exchange,
                 f"405 for {method}",
                 found=read_exchange(exchange).told if status == 500 else "",
             )
+
+
+def _is_description(exchange: Exchange) -> bool:
+    """Whether an answer is a WSDL or a schema."""
+    try:
+        root = parse(exchange.response.body if exchange.response is not None else b"")
+    except NotXmlError:
+        return False
+    return root.tag in {clark(WSDL, "definitions"), clark(XSD, "schema")}
 
 
 @pytest.mark.requirement("soap-basic-profile/R1115")
