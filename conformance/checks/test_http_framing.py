@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.needs("rest")
 # How long a robot may think about octets that are no request before it is taken to wait for more of them, s.
 _THINK_S = 3.0
+_IN_ALL = 56
+_FAST_MS = 50.0
 _GARBAGE = (
     b"ROBOT\r\n\r\n",
     b"\x00\x01\x02\x03\xff\xfe\r\n\r\n",
@@ -37,9 +39,14 @@ def _first(session: Session) -> Call:
 @pytest.mark.phase("reading")
 @pytest.mark.requirement("http/framing")
 def test_every_octet_of_an_answer(roaas: Session, rest: HttpClient, judge: Judge) -> None:
-    """A status line, valid fields, exactly as many octets as are said, and nothing behind them."""
-    for call in reads(roaas):
-        for method in ("GET", "OPTIONS"):
+    """A status line, valid fields, exactly as many octets as are said, and nothing behind them.
+
+    Often enough for a robot that is wrong one time in fifty: client libraries do not see what is behind an answer.
+    """
+    calls = reads(roaas)
+    turns = -(-_IN_ALL // max(1, len(calls))) if roaas.effort.usual_ms <= _FAST_MS else 1
+    for turn, call in enumerate(calls * turns):
+        for method in ("GET", "OPTIONS") if turn < len(calls) else ("GET",):
             octets = raw.head(rest, method, call.path, "Accept: application/json", "Connection: close")
             exchange, surplus = raw.read_one(rest, octets, raw.talk(rest, octets), method)
             fault = exchange.problem or (

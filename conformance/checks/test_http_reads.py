@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 # Of each resource at standard effort; and in all at any effort with a robot that is fast enough: one fault in fifty.
 _EACH = 60
 _IN_ALL = 56
-_FAST_MS = 10.0
+_FAST_MS = 50.0
 
 
 @pytest.mark.requirement(
