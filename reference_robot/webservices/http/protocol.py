@@ -23,8 +23,48 @@ HEAD_LIMIT: Final = 64 * 1024  # octets: request line and fields (RFC 6585 5)
 _LINGER: Final = 2.0  # seconds in which what a refused client still sends is read and dropped
 _DRAINED: Final = 16 * BODY_LIMIT  # octets of content beyond the limit that are dropped before the line is cut
 
+_FINAL_HEADS: Final = tuple(b"HTTP/1.1 %d" % kind for kind in (2, 3, 4, 5))
 _SERVED: Final = (b"GET ", b"PUT ", b"POST ", b"DELETE ", b"HEAD ", b"OPTIONS ")
 _METHOD: Final = re.compile(rb"[!#$%&'*+.^_`|~0-9A-Za-z-]++(?= [^ \r\n]+ HTTP/1\.[01]\r?\n)")
+
+
+class _OneWriteTransport:
+    """A transport on which the head of an answer waits for its content, so that both leave in one write.
+
+    uvicorn writes them apart, which costs a second system call and often a second packet for each answer.
+    """
+
+    def __init__(self, transport: Transport) -> None:
+        self._write, self._close = transport.write, transport.close
+        self._head = b""
+        # The rest is the transport's own.
+        self.abort, self.is_closing, self.get_extra_info = (
+            transport.abort,
+            transport.is_closing,
+            transport.get_extra_info,
+        )
+        self.pause_reading, self.resume_reading = transport.pause_reading, transport.resume_reading
+        self.can_write_eof, self.write_eof = transport.can_write_eof, transport.write_eof
+
+    def write(self, data: bytes) -> None:
+        """Write, unless it is the head of a final answer."""
+        if self._head:
+            data, self._head = self._head + data, b""
+        elif data.startswith(_FINAL_HEADS):
+            self._head = data
+            return
+        self._write(data)
+
+    def flush(self) -> None:
+        """Write a head that still waits: its answer has no content."""
+        if self._head:
+            self._write(self._head)
+            self._head = b""
+
+    def close(self) -> None:
+        """Close once everything is written."""
+        self.flush()
+        self._close()
 
 
 class RobotHttpProtocol(HttpToolsProtocol):
@@ -32,6 +72,7 @@ class RobotHttpProtocol(HttpToolsProtocol):
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
+        self._one_write: _OneWriteTransport
         self._busy_since: float | None = None
         self._head_octets = 0
         self._reading_head = True
@@ -41,7 +82,8 @@ class RobotHttpProtocol(HttpToolsProtocol):
 
     def connection_made(self, transport: Transport) -> None:  # type: ignore[override]  # as uvicorn narrows it
         """Start the clock: a client that connects must also ask."""
-        super().connection_made(transport)
+        self._one_write = _OneWriteTransport(transport)
+        super().connection_made(self._one_write)  # type: ignore[arg-type]  # all of a transport that uvicorn uses
         self._busy_since = self.loop.time()
 
     def data_received(self, data: bytes) -> None:
@@ -105,6 +147,11 @@ class RobotHttpProtocol(HttpToolsProtocol):
         self._head_octets = 0
         super().on_message_complete()
 
+    def on_response_complete(self) -> None:
+        """Let the head of an answer without content go."""
+        self._one_write.flush()
+        super().on_response_complete()
+
     def _refuse(self, problem: Problem) -> None:
         """Stop the parser, whose caller then sends the refusal: an exception is the only way out of its callback."""
         self._refusal = problem
@@ -130,7 +177,8 @@ class RobotHttpProtocol(HttpToolsProtocol):
             (b"connection", b"close"),
         ]
         head = b"".join(name + b": " + value + b"\r\n" for name, value in fields)
-        self.transport.write(STATUS_LINE[problem.status] + head + b"\r\n" + body)
+        self.transport.write(STATUS_LINE[problem.status] + head + b"\r\n")
+        self.transport.write(body)
         self._lingering = True
         if self.transport.can_write_eof():
             self.transport.write_eof()
