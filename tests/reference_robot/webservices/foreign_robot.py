@@ -1,7 +1,7 @@
 """A robot that is not ours: a node in a process of its own, which tells what reaches it over ROS.
 
-Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent]``. It prints one JSON object a line: ``ready``, then
-``delivery``, ``velocity``, ``goal`` and ``cancel`` as they come. Each line on its stdin is a command:
+Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent] [planner]``. It prints one JSON object a line:
+``ready``, then ``delivery``, ``velocity``, ``goal`` and ``cancel`` as they come. Each line on its stdin is a command:
 ``{"odometry": {"x": …, "covariance": …, "stopped_clock": …}}`` publishes that odometry over and over,
 ``{"finish": true}`` ends the goal, ``{"current_goal": …}`` tells of one that another client sent,
 ``{"tell_next_goal_as": …}`` tells of the next one that comes, and of no later one.
@@ -20,7 +20,7 @@ import rclpy
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist, TwistStamped
 from mybot_delivery_app.msg import DeliveryRequestMsg
-from nav2_msgs.action import NavigateToPose
+from nav2_msgs.action import ComputePathToPose, NavigateToPose
 from nav_msgs.msg import Odometry
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -114,6 +114,20 @@ class ForeignRobot(Node):
         handle.canceled()
         return NavigateToPose.Result()
 
+    def plan_like_nav2(self) -> None:
+        """Offer no GetPlan service, but the action of Nav2's planner."""
+        self._planner = ActionServer(self, ComputePathToPose, "compute_path_to_pose", self._plan)
+
+    def _plan(self, handle: Any) -> ComputePathToPose.Result:
+        goal, result = handle.request, ComputePathToPose.Result()
+        if goal.goal.pose.position.x == _UNREACHABLE_X:
+            handle.abort()
+            return result
+        result.path.header.frame_id = "map"
+        result.path.poses = [goal.start, goal.goal]
+        handle.succeed()
+        return result
+
     def obey(self, command: dict[str, Any]) -> None:
         if "odometry" in command:
             odometry = Odometry()
@@ -136,6 +150,8 @@ def main() -> None:
     context = Context()
     rclpy.init(args=[], context=context, domain_id=int(domain))
     robot = ForeignRobot(context, {"Twist": Twist, "TwistStamped": TwistStamped}[velocity], silent="silent" in rest)
+    if "planner" in rest:
+        robot.plan_like_nav2()
     executor = MultiThreadedExecutor(4, context=context)
     executor.add_node(robot)
     spinner = threading.Thread(target=executor.spin, daemon=True)

@@ -1,0 +1,47 @@
+"""Plans of a robot that plans as Nav2 does, by an action; those of a GetPlan service are our simulated robot's."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from lxml import etree
+from web_messages import query_envelope
+from web_robot import ForeignRobot, eventually, running_robot
+
+PATH = "/robot/navigation/service/plan"
+
+
+def test_a_planner_of_nav2_is_asked(domain_id: int):
+    robot = ForeignRobot(domain_id, "Twist", "planner")
+    with running_robot(domain_id, "--attach") as served:
+        robot.do(odometry={"x": 2.5, "covariance": 0.0})
+        eventually(lambda: served.call("GET", "/robot/pose/").is_success)
+        plan = eventually(
+            lambda: (a := served.call("GET", PATH + "?x=1e+1&y=-2&yaw=1")).is_success and a.json()["plan"]
+        )
+        start, end = (pose["pose"] for pose in plan["poses"])
+        assert start["position"] == {"x": 2.5, "y": 0.0, "z": 0.0}
+        assert end["position"] == {"x": 10.0, "y": -2.0, "z": 0.0}
+        assert end["orientation"]["z"] == pytest.approx(math.sin(0.5))
+        assert {pose["header"]["frame_id"] for pose in plan["poses"]} == {"map"}
+
+        given = served.call("GET", PATH + "?x=1&y=1&start_x=4&start_y=5&start_yaw=0").json()["plan"]["poses"][0]["pose"]
+        assert given["position"] == {"x": 4.0, "y": 5.0, "z": 0.0}
+        assert given["orientation"]["w"] == 1.0
+        # A part of the start that is left out is the robot's own.
+        mixed = served.call("GET", PATH + "?x=1&y=1&start_y=5").json()["plan"]["poses"][0]["pose"]
+        assert mixed["position"] == {"x": 2.5, "y": 5.0, "z": 0.0}
+
+        unreachable = served.call("GET", PATH + "?x=1000&y=1")
+        assert unreachable.status_code == 422
+        assert "1000" in unreachable.json()["detail"]
+        other_frame = served.call("GET", PATH + "?x=1&y=1&frame_id=odom")
+        assert other_frame.status_code == 422  # this planner knows the map alone
+
+        soap = served.soap(query_envelope("GetPlan", "<x>1000</x><y>1</y>"), url=served.subscribers)
+        assert soap.status_code == 500
+        soap = served.soap(query_envelope("GetPlan", "<x>3</x><y>1</y>"), url=served.subscribers)
+        xs = etree.fromstring(soap.content).findall(".//poses/pose/position/x")
+        assert [float(x.text) for x in xs] == [2.5, 3.0]
+    robot.close()
