@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from conformance.domain.path import judge_path
-from conformance.domain.robot import STILL, VELOCITY, Velocity
+from conformance.domain.robot import VELOCITY, Velocity
 from conformance.domain.shapes import TWIST, VECTOR3, fault_in, read_json
 
 if TYPE_CHECKING:
@@ -57,7 +57,6 @@ class Drive:
         self.sent = self.answered = self.full_sent = time.monotonic()
         self._fastest: Velocity | None = None
         self._renew: Callable[[], object] = lambda: None
-        self._full = STILL
         self._pending: _Reading | None = None
         self._turn_at = 0.0
 
@@ -72,7 +71,6 @@ class Drive:
             BusyError: a goal of the robot's own is active.
         """
         self.sent = self.full_sent = time.monotonic()
-        self._full = velocity
         self._renew = lambda: self.robot.put_velocity(velocity)
         if integers:
             whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
@@ -84,8 +82,8 @@ class Drive:
     def command_linear(self, velocity: Velocity) -> bool:
         """PUT the linear part of a velocity, and judge how it is answered."""
         self.sent = time.monotonic()
-        full = self._full._replace(linear_x=velocity.linear_x)
-        self._renew = lambda: self.robot.put_velocity(full)
+        # Renewed as it was given: a PUT of all components would do what this one may have failed to do.
+        self._renew = lambda: self.robot.put_linear(velocity)
         return self._judge_put(self.robot.put_linear(velocity), velocity, "linear-put")
 
     def _judge_put(self, exchange: Exchange, velocity: Velocity, name: str) -> bool:

@@ -6,12 +6,12 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from conformance.domain.shapes import ODOMETRY, TWIST, body_of, read_as
+from conformance.domain.shapes import ODOMETRY, TWIST, body_of, read_as, read_json
 from conformance.target.http import HttpClient, NoAnswerError
 
 if TYPE_CHECKING:
     from conformance.session import Session
-    from conformance.target.exchange import Exchange
+    from conformance.target.exchange import Exchange, Response
 
 _GOAL: Final = "/robot/navigation/action/goal/"
 _VELOCITY: Final = "/robot/velocity/"
@@ -65,6 +65,12 @@ def leave_at_rest(session: Session) -> None:
         return
 
 
+def _shows(answer: Response) -> bool:
+    """Whether an answer shows anything that may be a goal."""
+    value, problem = read_json(answer)
+    return not problem and isinstance(value, dict) and bool(value)
+
+
 class _Stiller:
     """Stops one robot.
 
@@ -93,7 +99,7 @@ class _Stiller:
             current = self._ask("GET", _GOAL, _ACCEPT)
             # Anything but a goal that can be read: there is none, or no such resource, or no telling. Whether the robot
             # moves is seen by its velocity.
-            if current is None or current.response is None or not current.response.ok:
+            if current is None or current.response is None or not current.response.ok or not _shows(current.response):
                 return True
             if time.monotonic() > until:
                 return False
