@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.domain.drive import BusyError, Drive
-from conformance.domain.robot import STILL, Robot, Velocity
+from conformance.domain.robot import Robot, Velocity
 from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
@@ -41,8 +41,7 @@ def test_straight_drive(roaas: Session) -> None:
             return
         reached = drive.reach(ahead, "rest-resources/velocity-converges")
         drive.keep(0.4 if reached else 0.0)
-        drive.command(STILL)
-        drive.reach(STILL, "safety/stop")
+        drive.stop(ahead)
     except BusyError as busy:
         pytest.skip(str(busy))
     drive.judge_motion()

@@ -184,15 +184,24 @@ class Drive:
             found=str(velocity),
         )
 
-    def reach(self, wanted: Velocity, *ids: str, part: slice = slice(None)) -> bool:
+    def stop(self, moving: Velocity) -> bool:
+        """Command a velocity once more and then zero; judge that the robot stops because of it, and not by itself."""
+        if not self.command(moving) or not self.command(STILL):
+            return False
+        hold_s, settle_s = self.robot.limits.hold_s, self.robot.limits.settle_s
+        within = max(1.1 * settle_s, 0.9 * hold_s) if hold_s is not None else self.robot.settle_s
+        return self.reach(STILL, "safety/stop", within=within)
+
+    def reach(self, wanted: Velocity, *ids: str, part: slice = slice(None), within: float | None = None) -> bool:
         """Look until the velocity is what was wanted; judge that it comes within the settle time.
 
         Args:
             wanted: velocity.
             ids: requirements, of any class.
             part: the components that count.
+            within: another time than the settle time, s.
         """
-        judge, patience = self.robot.judge, self.robot.settle_s
+        judge, patience = self.robot.judge, min(self.robot.settle_s, within or self.robot.settle_s)
         # A velocity may end before it is reached, where it does not hold for as long as the robot takes to settle.
         hold_s = self.robot.limits.hold_s
         every = _COUNTED_ON_S if hold_s is None else 0.6 * hold_s
