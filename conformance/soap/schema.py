@@ -101,8 +101,10 @@ class Types:
 
     def python_problem(self, element: etree._Element) -> str:
         """Why xmlschema finds the element invalid; empty where it finds it valid."""
-        # A copy, because what stands around the element is none of the schema's business.
+        # A copy, because what stands around the element is none of the schema's business; without comments, because
+        # xmlschema takes a value to end at the first one.
         alone = copy.deepcopy(element)
+        etree.strip_tags(alone, etree.Comment, etree.PI)
         try:
             error = next(iter(self.python.iter_errors(alone)), None)
         except (xmlschema.XMLSchemaException, ValueError, ArithmeticError, RecursionError) as problem:
