@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from conformance.domain.path import judge_path
-from conformance.domain.robot import VELOCITY, Velocity
+from conformance.domain.robot import STILL, VELOCITY, Velocity
 from conformance.domain.shapes import TWIST, VECTOR3, fault_in, read_json
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ class Drive:
         self.sent = self.answered = self.full_sent = time.monotonic()
         self._fastest: Velocity | None = None
         self._renew: Callable[[], object] = lambda: None
+        self._of_all = True
         self._pending: _Reading | None = None
         self._turn_at = 0.0
 
@@ -71,7 +72,7 @@ class Drive:
             BusyError: a goal of the robot's own is active.
         """
         self.sent = self.full_sent = time.monotonic()
-        self._renew = lambda: self.robot.put_velocity(velocity)
+        self._renew, self._of_all = (lambda: self.robot.put_velocity(velocity)), True
         if integers:
             whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
             exchange = self.robot.put(VELOCITY, whole)
@@ -83,7 +84,7 @@ class Drive:
         """PUT the linear part of a velocity, and judge how it is answered."""
         self.sent = time.monotonic()
         # Renewed as it was given: a PUT of all components would do what this one may have failed to do.
-        self._renew = lambda: self.robot.put_linear(velocity)
+        self._renew, self._of_all = (lambda: self.robot.put_linear(velocity)), False
         return self._judge_put(self.robot.put_linear(velocity), velocity, "linear-put")
 
     def _judge_put(self, exchange: Exchange, velocity: Velocity, name: str) -> bool:
@@ -210,7 +211,8 @@ class Drive:
             asked = time.monotonic()
             if asked > renewed + every and (hold_s is None or hold_s < patience):
                 self._renew()
-                renewed = self.sent = self.full_sent = asked
+                renewed = self.sent = asked
+                self.full_sent = asked if self._of_all else self.full_sent
             velocity, exchange = self.look()
             there = velocity is not None and self.robot.near(_part(velocity, part), _part(wanted, part))
             if there or asked > self.answered + patience:
