@@ -58,7 +58,7 @@ def _targets(session: Session, *, moving: bool) -> list[Target]:
     from conformance.http.thesis import targets  # noqa: PLC0415 - half a second that an unclaimed class need not pay
 
     chosen = []
-    for target in targets(session.contract.openapi):
+    for target in targets(session.contract):
         operation = _operation(session, target)
         if operation is not None and operation.motion == moving and allowed(session, operation):
             chosen.append(target)
@@ -93,6 +93,8 @@ def test_moving_operations(roaas: Session, judge: Judge, explore: Explorer) -> N
 
 
 def _run(session: Session, judge: Judge, explore: Explorer, harmless: Harmless, target: Target) -> None:
+    if session.effort.name == "quick" and "{" in target.label:
+        return  # half a second of looking for values that are none of an enumeration, which test_path_parameters has
     # At quick effort the first cases will do: making all of them takes longer than sending them.
     coverage = (
         list(islice(target.coverage(), _QUICK_COVERAGE))

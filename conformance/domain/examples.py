@@ -10,6 +10,8 @@ from conformance.domain.goals import choose_goals
 from conformance.domain.robot import Robot
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from conformance.session import Session
     from conformance.verdict.judge import Judge
 
@@ -28,22 +30,18 @@ def fit(session: Session, operation_id: str, value: Any) -> Any:
         operation_id: of the contract.
         value: its body, or its parameters by name.
     """
-    if session.rest is None or not isinstance(value, dict):
+    fitted = _FITTED.get(operation_id)
+    if session.rest is None or fitted is None or not isinstance(value, dict):
         return value
-    if operation_id == "putVelocity":
-        return {part: _slow(session, part, axes) for part, axes in value.items()}
-    if operation_id == "putLinearVelocity":
-        return _slow(session, "linear", value)
-    if operation_id == "putGoal":
-        return _goal(session, value)
-    if operation_id == "getPlan":
-        place = _place(session)
-        return {**value, "x": place.x, "y": place.y, "frame_id": session.statement.motion.frame}
-    if operation_id == "putDelivery":
-        place = _place(session)
-        there = {name: place.x if name.endswith("_x") else place.y for name in value if name != "code"}
-        return {**value, **there}
-    return value
+    return fitted(session, value)
+
+
+def _velocity(session: Session, value: dict[str, Any]) -> dict[str, Any]:
+    return {part: _slow(session, part, axes) for part, axes in value.items()}
+
+
+def _linear(session: Session, value: dict[str, Any]) -> dict[str, Any]:
+    return _slow(session, "linear", value)
 
 
 def _slow(session: Session, part: str, axes: dict[str, float]) -> dict[str, float]:
@@ -63,7 +61,27 @@ def _goal(session: Session, value: dict[str, Any]) -> dict[str, Any]:
     return {**value, "goal": {"target_pose": target}}
 
 
+def _plan(session: Session, value: dict[str, Any]) -> dict[str, Any]:
+    place = _place(session)
+    return {**value, "x": place.x, "y": place.y, "frame_id": session.statement.motion.frame}
+
+
+def _delivery(session: Session, value: dict[str, Any]) -> dict[str, Any]:
+    place = _place(session)
+    there = {name: place.x if name.endswith("_x") else place.y for name in value if name != "code"}
+    return {**value, **there}
+
+
 def _place(session: Session) -> Pose:
     if session.judge not in _PLACES:
         (_PLACES[session.judge],) = choose_goals(Robot(session), _FAR_M, 1)
     return _PLACES[session.judge]
+
+
+_FITTED: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any]]] = {
+    "putVelocity": _velocity,
+    "putLinearVelocity": _linear,
+    "putGoal": _goal,
+    "getPlan": _plan,
+    "putDelivery": _delivery,
+}

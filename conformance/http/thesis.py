@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     from hypothesis.strategies import SearchStrategy
 
+    from conformance.contract.files import Contract
     from conformance.session import Session
     from conformance.target.exchange import Exchange
 
@@ -110,18 +112,19 @@ class Target:
         return strategy.map(made)
 
 
-def targets(document: dict[str, Any]) -> list[Target]:
-    """The operations of an OpenAPI document; those that Schemathesis cannot read are left out."""
+@lru_cache(maxsize=2)
+def targets(contract: Contract) -> tuple[Target, ...]:
+    """The operations of a contract; those that Schemathesis cannot read are left out."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        schema = schemathesis.openapi.from_dict(document)
+        schema = schemathesis.openapi.from_dict(contract.openapi)
         found = []
         for result in schema.get_all_operations():
             operation: Any = result.ok() if isinstance(result, Ok) else None
             if operation is None:
                 continue
             found.append(Target(operation.label, operation, schema))
-        return found
+        return tuple(found)
 
 
 def state_machine(document: dict[str, Any]) -> Any:
