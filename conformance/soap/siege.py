@@ -36,7 +36,7 @@ class Siege:
         ask: sends the harmless request.
         usual_ms: how long the robot takes for that.
         ids: the requirements that an attack is a case of.
-        lured: the attacks so far that name an address of the trap.
+        lured: the attacks so far that name an address of the trap, with what they are cases of.
     """
 
     judge: Judge
@@ -44,7 +44,7 @@ class Siege:
     ask: Callable[[], Exchange]
     usual_ms: float
     ids: Callable[[Attack], tuple[str, ...]] = lambda attack: (f"xml-security/{attack.name}",)
-    lured: list[tuple[Attack, Exchange]] = field(default_factory=list)
+    lured: list[tuple[Attack, Exchange, tuple[str, ...]]] = field(default_factory=list)
 
     def attack(self, attack: Attack) -> None:
         """Send one attack and judge what became of it.
@@ -58,7 +58,7 @@ class Siege:
         for id_ in ids:
             self._judge(id_, attack, exchange)
         if attack.lure:
-            self.lured.append((attack, exchange))
+            self.lured.append((attack, exchange, ids))
         self._well(attack, exchange)
         self.judge.at_risk = ()
 
@@ -108,11 +108,10 @@ def judge_calls(judge: Judge, trap: Trap, sieges: Iterable[Siege]) -> None:
     lured = [one for siege in sieges for one in siege.lured]
     if lured:
         trap.settle()
-    for attack, exchange in lured:
-        named = {"addressing-spoofing"} & {attack.name}
-        for name in ("no-callback", *named):
+    for attack, exchange, ids in lured:
+        for id_ in {"xml-security/no-callback": None, **dict.fromkeys(ids)}:
             judge.that(
-                f"xml-security/{name}",
+                id_,
                 not trap.calls(attack.lure),
                 exchange,
                 f"no connection for {attack.what}",
