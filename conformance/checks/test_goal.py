@@ -51,9 +51,8 @@ def robot(roaas: Session) -> Robot:
     return Robot(roaas)
 
 
-def _put_new(robot: Robot, judge: Judge, body: dict[str, Any], *ids: str) -> bool:
-    """Put a goal that is new, and judge the status and what GET then shows."""
-    exchange = put_goal(robot, body)
+def _judge_new(robot: Robot, judge: Judge, exchange: Exchange, body: dict[str, Any], *ids: str) -> bool:
+    """Judge the answer to a goal that is new, and what GET then shows."""
     status = exchange.response.status if exchange.response else 0
     holds = judge.that("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal")
     if status not in NEW and status not in REPEATED:
@@ -111,7 +110,7 @@ def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge) -> None:
     there, back = choose_goals(robot, 1.5, 2)
     frame = robot.statement.motion.frame
     first = goal_body(there, frame, _ID)
-    if not _put_new(robot, judge, first, "rest-resources/goal-id"):
+    if not _judge_new(robot, judge, put_goal(robot, first), first, "rest-resources/goal-id"):
         return
     _repeat(robot, judge, first, goal_body(back, frame, _ID))
     _velocity_meanwhile(robot, judge)
@@ -119,13 +118,26 @@ def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge) -> None:
         put_goal(robot, first)  # a robot may end a goal when it takes a velocity
     second = goal_body(back, frame)
     second["goal"]["target_pose"]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
-    if _put_new(robot, judge, second, "rest-resources/goal-preempt"):
-        goal, exchange = robot.goal()
-        filled = goal is not None and goal["goal_id"]["id"] != _ID
-        judge.that("rest-resources/goal-fills-in", filled, exchange, "a header and a goal_id of the robot's own")
+    _displace(robot, judge, second)
     _await_motion(robot)
     _cancel(robot, judge)
     _stays(robot, judge)
+
+
+def _displace(robot: Robot, judge: Judge, second: dict[str, Any]) -> None:
+    """Put another goal, without a goal_id, while one is active."""
+    put = put_goal(robot, second)
+    if put.response is not None and put.response.status not in NEW | REPEATED:
+        # Is it the missing id that is not taken, or another goal?
+        named = put_goal(robot, second | {"goal_id": {"id": "another"}})
+        taken = named.response is not None and named.response.status in NEW | REPEATED
+        name = "goal-fills-in" if taken else "goal-preempt"
+        judge.that(f"rest-resources/{name}", False, put, "201 or 202 for another goal")
+        return
+    _judge_new(robot, judge, put, second, "rest-resources/goal-preempt")
+    goal, exchange = robot.goal()
+    filled = goal is not None and goal["goal_id"]["id"] not in {"", _ID}
+    judge.that("rest-resources/goal-fills-in", filled, exchange, "a header and a goal_id of the robot's own")
 
 
 def _judge_none(robot: Robot, judge: Judge) -> None:
