@@ -25,6 +25,7 @@ _DRAINED: Final = 16 * BODY_LIMIT  # octets of content beyond the limit that are
 
 _FINAL_HEADS: Final = tuple(b"HTTP/1.1 %d" % kind for kind in (2, 3, 4, 5))
 _SERVED: Final = (b"GET ", b"PUT ", b"POST ", b"DELETE ", b"HEAD ", b"OPTIONS ")
+_UPGRADE: Final = re.compile(rb"(?i)(?<=\r\n)Upgrade(?=:)")
 _METHOD: Final = re.compile(rb"[!#$%&'*+.^_`|~0-9A-Za-z-]++(?= [^ \r\n]+ HTTP/1\.[01]\r?\n)")
 
 
@@ -92,7 +93,7 @@ class RobotHttpProtocol(HttpToolsProtocol):
             return
         if self._reading_head:
             if self._head_octets == 0:
-                data = self._served_method(data)
+                data = _without_upgrade(self._served_method(data))
             self._head_octets += len(data)
         super().data_received(data)
         if self._reading_head and self._head_octets > HEAD_LIMIT and not self._lingering:
@@ -197,3 +198,15 @@ class RobotHttpProtocol(HttpToolsProtocol):
             self.send_400_response("")
         else:
             self.transport.abort()
+
+
+def _without_upgrade(data: bytes) -> bytes:
+    """Return the beginning of a request with its Upgrade field under a name that says nothing.
+
+    The robot upgrades to nothing and may ignore the field (RFC 9110 7.8), but the parser would take the content for
+    another protocol's octets. Java's HttpClient asks for h2c with every first request.
+    """
+    if b"pgrade:" not in data:
+        return data
+    head, end, rest = data.partition(b"\r\n\r\n")
+    return _UPGRADE.sub(b"X-Ignored-Upgrade", head) + end + rest

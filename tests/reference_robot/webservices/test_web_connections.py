@@ -93,6 +93,19 @@ def test_a_client_that_expects_100_is_told_to_continue(served: Served, foreign: 
     foreign.next("delivery")
 
 
+def test_an_offer_of_http_2_is_ignored_and_the_content_read(served: Served, foreign: ForeignRobot):
+    """As Java's HttpClient sends its first request."""
+    body = delivery_envelope().encode()
+    answer = served.raw(
+        b"POST /turtlesim_publisher_ws HTTP/1.1\r\nConnection: Upgrade, HTTP2-Settings, close\r\n"
+        b"Content-Length: %d\r\nHost: robot\r\nHTTP2-Settings: AAEAAEAAAAIAAAABAAMAAABk\r\nUpgrade: h2c\r\n"
+        b"Content-Type: text/xml\r\n\r\n%b" % (len(body), body),
+        soap=True,
+    )
+    assert answer.startswith(b"HTTP/1.1 200 ")
+    foreign.next("delivery")
+
+
 def test_500_connections_at_once(served: Served):
     request = b"GET /robot/pose/ HTTP/1.1\r\nHost: robot\r\nConnection: close\r\n\r\n"
     with contextlib.ExitStack() as stack:
