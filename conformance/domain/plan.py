@@ -85,7 +85,7 @@ def ask(
 def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list[Pose]:
     """Poses about ``distance`` metres from the robot, inside the arena, to which the robot says there is a plain way.
 
-    Declared goals come first, where they are about so far away; a distance at which there is nothing is halved once.
+    Declared goals come first, where they are about so far away; a distance at which there is nothing is halved, twice.
     """
     found = [
         pose
@@ -93,7 +93,7 @@ def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list
         if distance / 2 <= here.distance(pose) <= 2 * distance
     ][:count]
     round_about: list[Pose] = []
-    for reach in (distance, distance / 2):
+    for reach in (distance, distance / 2, distance / 4):
         for turn in _TURNS:
             if len(found) >= count:
                 return found
