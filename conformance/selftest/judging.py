@@ -113,7 +113,7 @@ def _run(job: Job, answer: Pipe) -> None:
                 "exit_code": certification.exit_code,
                 "verdicts": {item["id"]: item["verdict"] for item in items},
                 "reasons": {item["id"]: item["reason"] for item in items if item["verdict"] != "pass"},
-                "requests": document.get("target", {}).get("requests", 0),
+                "requests": document["requests"],
             }
         )
 

@@ -114,7 +114,7 @@ FAULTS = (
     _fault(
         "delivery-sometimes-lost",
         "One delivery in 50 is answered 500.",
-        "put",
+        "put-range",
         altered(deliveries, becomes(500), nth=50),
     ),
     _fault(

@@ -366,10 +366,10 @@ FAULTS = (
     ),
     _fault("goal-delete-ignored", "DELETE is 204 and cancels nothing.", "goal-delete", instead(_DELETE, plain(204))),
     _fault(
-        "goal-delete-ok",
-        "DELETE of a goal is 200 with a text.",
+        "goal-delete-conflict",
+        "DELETE of a goal cancels it, and is 409.",
         "goal-delete",
-        altered(_DELETE, lambda answer: _nothing(answer, 200), status(204)),
+        altered(_DELETE, becomes(409), success),
     ),
     _fault(
         "goal-delete-none-fine",
