@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import signal
 import sys
+import traceback
+
+from loadtests.exits import INCONCLUSIVE
 
 
 def main() -> int:
@@ -17,7 +20,11 @@ def main() -> int:
     from loadtests.settings import Settings  # noqa: PLC0415 -- as above
 
     _raise_file_limit()
-    return carry_out(Settings.from_json(sys.stdin.read()))
+    try:
+        return carry_out(Settings.from_json(sys.stdin.read()))
+    except Exception:  # noqa: BLE001 -- exit code 1 would say that the robot missed a threshold
+        traceback.print_exc()
+        return INCONCLUSIVE
 
 
 def _raise_file_limit() -> None:

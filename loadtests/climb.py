@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from loadtests import steps
+from loadtests.crew import busiest
 from loadtests.document import asked_of, step_operation
 from loadtests.plan import Plan
 
@@ -64,7 +65,7 @@ def climb(
         for interface in list(standing):
             asked = asked_of(plan, plan.length_s, phase="step", interface=interface)
             result = steps.step_result(plan, crew.recorder, interface, asked, criterion)
-            found.append(result)
+            found.append(result | {"cpu_share": busiest(crew)})
             kept = "" if result["meets"] else f": {result['reason']}"
             tell(
                 f"step {rate:g}/s over {interface}: p50 {result['p50_ms'] or 0:.3f} ms, "

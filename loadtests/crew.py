@@ -88,6 +88,11 @@ def new_environment() -> Any:
     return Environment(user_classes=[RobotUser], events=Events(), stop_timeout=0)
 
 
+def busiest(crew: Crew) -> float | None:
+    """The busiest process's share of a core in the plan that was carried out last."""
+    return max((member.cpu_share for member in crew.members if member.cpu_share is not None), default=None)
+
+
 def boot_id() -> str:
     """Which running system this is: processes of one share CLOCK_MONOTONIC. Empty where unknown."""
     try:

@@ -45,6 +45,7 @@ class Outcome:
         notes: worth knowing; invalid: makes the run worthless.
         interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
         plan: the duel's plan, once there is one; elapsed_s: how much of it was carried out.
+        cpu_share: the busiest worker's share of a core in the duel.
         steps: results of the stepped load.
     """
 
@@ -59,6 +60,7 @@ class Outcome:
     crew: Crew | None = None
     plan: Plan | None = None
     elapsed_s: float = 0.0
+    cpu_share: float | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
 
 
@@ -88,7 +90,7 @@ def compose(outcome: Outcome, plan: Plan, gone: Gone | None) -> tuple[int, dict[
         "plan": _plan_words(settings, plan, pacing), "generator": figures, "workers": workers,
         "series": summary.series(measured, outcome.findings.sizes), "comparisons": summary.comparisons(measured),
         "noise_floor": summary.noise_floor(measured), "time_series": summary.time_series(measured),
-        "steps": outcome.steps, "knee": _knee(outcome, plan, figures["cpu_share"]),
+        "steps": outcome.steps, "knee": _knee(outcome, plan),
         "errors": summary.errors(recorder, plan.operations) + _early_errors(outcome.findings), "thresholds": judged,
     }  # fmt: skip
     return code, document
@@ -109,16 +111,15 @@ def asked_of(plan: Plan, elapsed_s: float, *, phase: str, interface: str | None 
 def _figures(outcome: Outcome, measured: summary.Measured) -> dict[str, Any]:
     plan = measured.plan
     asked = sum(asked_of(plan, outcome.elapsed_s, phase=phase) for phase in ("duel", "aa"))
-    members = outcome.crew.members if outcome.crew else []
-    cpu = max((member.cpu_share for member in members if member.cpu_share is not None), default=None)
-    return verdict.generator_figures(measured, asked, max(0.0, outcome.elapsed_s - plan.warmup_s), cpu)
+    elapsed_s = max(0.0, outcome.elapsed_s - plan.warmup_s)
+    return verdict.generator_figures(measured, asked, elapsed_s, outcome.cpu_share)
 
 
 def _endings(outcome: Outcome, plan: Plan) -> list[str]:
     """Why the plan was not carried out to its end."""
     found = []
     if outcome.dead_at is not None:
-        found.append(f"the robot answered nothing from {outcome.dead_at:.1f} s on")
+        found.append(f"no request succeeded from {outcome.dead_at:.1f} s on")
     if outcome.interrupted:
         found.append(f"interrupted after {outcome.elapsed_s:.1f} of {plan.length_s:.1f} s")
     return found
@@ -182,12 +183,12 @@ def step_operation(operations: tuple[str, ...]) -> int:
     return reads[0] if reads else 0
 
 
-def _knee(outcome: Outcome, plan: Plan, cpu_share: float | None) -> list[dict[str, Any]]:
+def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
     if not outcome.steps:
         return []
     operation = plan.operations[step_operation(plan.operations)]
     criterion = steps.Criterion.of(list(outcome.settings.thresholds), operation)
-    return steps.knee(outcome.steps, plan.interfaces, criterion, cpu_share)
+    return steps.knee(outcome.steps, plan.interfaces, criterion)
 
 
 def _plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:

@@ -17,9 +17,9 @@ from typing import Any
 import gevent
 
 from loadtests.climb import climb
-from loadtests.crew import Crew, LocalCrew
+from loadtests.crew import Crew, LocalCrew, busiest
 from loadtests.document import Gone, Outcome, compose
-from loadtests.exits import INCONCLUSIVE, UNREACHABLE, USAGE
+from loadtests.exits import INCONCLUSIVE, INTERRUPTED, UNREACHABLE, USAGE
 from loadtests.failures import CallError, CrewError
 from loadtests.leader import LedCrew
 from loadtests.metrics import Collector, serve
@@ -34,6 +34,7 @@ from loadtests.wsdl import WsdlError, address_in, fetch
 
 _DEAD_S = 3.0
 _DEAD_REQUESTS = 10
+_LOOK_S = 0.5
 _LEAST_USERS, _MOST_USERS = 32, 512
 _STALL_S = 3.0  # the stall that the users of an open model outlast before arrivals queue for one
 
@@ -66,11 +67,13 @@ class Run:
         self.outcome = Outcome(settings, self.robot, datetime.now(UTC))
         self.collector: Collector | None = None
         self._alive_at = (0.0, 0)
-        self._told = 0.0
+        self._told = self._looked = 0.0
         self._parent = os.getppid()
 
     def interrupt(self) -> None:
         """Ctrl-C: end, keeping what there is."""
+        if self.outcome.interrupted:
+            os._exit(INTERRUPTED)  # asked for twice: not even for the result
         self.outcome.interrupted = True
 
     # Before the measurement.
@@ -113,16 +116,16 @@ class Run:
         ]
         if not names:
             raise Gone(USAGE, "no operation can be measured with these endpoints")
-        self.outcome.findings = preflight(self.robot, names, self.settings.seed)
-        self.outcome.notes += self.outcome.findings.notes
-        if self.outcome.findings.unreachable:
-            raise Gone(UNREACHABLE, "the robot cannot be reached: " + "; ".join(self.outcome.findings.messages()))
-        if self.outcome.findings.failures:
-            raise Gone(
-                INCONCLUSIVE, "the robot does not answer as it should: " + "; ".join(self.outcome.findings.messages())
-            )
+        findings = self.outcome.findings = preflight(self.robot, names, self.settings.seed)
+        self.outcome.notes += findings.notes
+        if self.outcome.interrupted:
+            raise Gone(INTERRUPTED, "interrupted before the measurement began")
+        if findings.unreachable:
+            raise Gone(UNREACHABLE, "the robot cannot be reached: " + "; ".join(findings.messages()))
+        if findings.failures:
+            raise Gone(INCONCLUSIVE, "the robot does not answer as it should: " + "; ".join(findings.messages()))
         self.outcome.invalid += [
-            f"the interfaces' payloads are not equivalent: {reason}" for reason in self.outcome.findings.unequal
+            f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
         ]
 
     def first_plan(self) -> Plan:
@@ -194,9 +197,10 @@ class Run:
                     self.robot, settings.operations, settings.seed, zeep="zeep" in plan.clients, users=plan.connections
                 )
             except CrewError as error:
-                raise Gone(USAGE, str(error)) from None
+                raise Gone(INTERRUPTED if self.outcome.interrupted else USAGE, str(error)) from None
             self._tell_plan(plan, crew)
             self._carry_out(plan, crew)
+            self.outcome.cpu_share = busiest(crew)
             self.outcome.plan = plan
             if settings.step_rates and not self.outcome.interrupted and self.outcome.dead_at is None:
                 self.outcome.steps += climb(plan, crew, settings, lambda: self.outcome.interrupted, self._number, tell)
@@ -204,7 +208,14 @@ class Run:
     def _crew(self) -> Crew:
         settings = self.settings
         if settings.expect:
-            return LedCrew(settings.master_host, settings.master_port, settings.processes, settings.expect, tell)
+            return LedCrew(
+                settings.master_host,
+                settings.master_port,
+                settings.processes,
+                settings.expect,
+                tell,
+                lambda: self.outcome.interrupted,
+            )
         return LocalCrew()
 
     @staticmethod
@@ -229,8 +240,8 @@ class Run:
         self.outcome.elapsed_s = max(0.0, min(elapsed, plan.length_s))
         if os.getppid() != self._parent:  # whoever started us is gone
             self.outcome.interrupted = True
-        if plan.step_rate is None and self.outcome.dead_at is None:
-            recorder.flush()
+        if elapsed - self._looked >= _LOOK_S and self.outcome.dead_at is None:
+            self._looked = elapsed
             succeeded = sum(cell.service.total for cell in recorder.cells.values())
             failed = sum(failure.count for failure in recorder.failures.values())
             since, before = self._alive_at
@@ -238,8 +249,8 @@ class Run:
                 self._alive_at = (elapsed, succeeded)
             elif elapsed - since > _DEAD_S + (1.0 if self.settings.expect else 0.0):
                 self.outcome.dead_at = since
-                tell(f"the robot has answered nothing since {since:.1f} s: ending the run")
-        if elapsed - self._told >= 1.0 and plan.step_rate is None:
+                tell(f"no request has succeeded since {since:.1f} s: ending the run")
+        if elapsed - self._told >= 1.0:
             self._told = elapsed
             done = sum(cell.service.total for cell in recorder.cells.values())
             tell(f"{elapsed:6.1f} s of {plan.length_s:.0f} s: {done} requests answered")

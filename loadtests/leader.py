@@ -36,10 +36,17 @@ class LedCrew:
         processes: workers to start on this machine.
         expected: workers to wait for in all; those beyond `processes` come from elsewhere.
         tell: says how things stand, for the terminal.
+        stopped: whether somebody wants an end; asked while waiting for workers.
     """
 
     def __init__(
-        self, host: str, port: int, processes: int, expected: int, tell: Callable[[str], None] = lambda _: None
+        self,
+        host: str,
+        port: int,
+        processes: int,
+        expected: int,
+        tell: Callable[[str], None],
+        stopped: Callable[[], bool],
     ) -> None:
         self.environment = new_environment()
         try:
@@ -52,6 +59,7 @@ class LedCrew:
         self.members: list[Member] = []
         self.pacing = ""
         self.tell = tell
+        self.stopped = stopped
         self._host, self._port = host, self.runner.server.port if port == 0 else port
         self._processes = processes
         self._expected = max(expected, processes)
@@ -105,6 +113,8 @@ class LedCrew:
         deadline = time.monotonic() + (_READY_S if self._expected <= self._processes else 10 * _READY_S)
         while not reached():
             gevent.sleep(0.02)
+            if self.stopped():
+                raise CrewError("interrupted while waiting for workers")
             dead = [child.returncode for child in self._children.values() if child.poll() is not None]
             if dead:
                 raise CrewError(f"a worker process ended at once, with exit code {dead[0]}")

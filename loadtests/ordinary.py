@@ -91,6 +91,8 @@ def request_error(error: requests.RequestException, where: str, timeout_s: float
         reason = getattr(cause, "reason", None)
         following = reason if isinstance(reason, BaseException) else (arguments[0] if arguments else None)
         cause = following or cause.__cause__ or cause.__context__
+    if isinstance(error, requests.ConnectTimeout):
+        return connect_error(TimeoutError(), where)
     if isinstance(error, requests.ReadTimeout) or isinstance(cause, TimeoutError):
         return CallError("timeout", f"no complete answer within {timeout_s:g} s")
     if isinstance(cause, ConnectionResetError | BrokenPipeError):

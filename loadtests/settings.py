@@ -166,8 +166,7 @@ def settle(wishes: Wishes, statement: Statement) -> Settings:
     rate, duration_s = _bounded(wishes, statement, operations)
     ceiling = _ceiling(statement, operations)[0]
     return Settings(
-        **addresses,
-        **descriptions,
+        **(addresses | descriptions),
         ca_file=ca_file,
         token=_token(wishes.token_file or endpoints.get("token_file")),
         timeout_s=wishes.timeout_s or statement.timeout_s or DEFAULT_TIMEOUT_S,
@@ -213,6 +212,8 @@ def _operations(wishes: Wishes) -> tuple[str, ...]:
 def _check_numbers(wishes: Wishes) -> None:
     if wishes.rate is not None and wishes.users is not None:
         raise SettingsError("--rate (open model) and --users (closed model) exclude each other")
+    if wishes.users is not None and (wishes.steps or wishes.step_rates):
+        raise SettingsError("--steps offers rates, which is an open model: give --rate instead of --users")
     if wishes.processes + wishes.expect < 1:
         raise SettingsError("--processes 0 leaves the work to others: say how many with --expect-workers")
     ranges: list[tuple[str, Any, float, float]] = [

@@ -119,9 +119,7 @@ def _answered_in_time(answered: int, last: Histogram, seconds: float) -> float:
     return answered / length if length > 0 else 0.0
 
 
-def knee(
-    results: list[dict[str, Any]], interfaces: tuple[str, ...], criterion: Criterion, cpu: float | None
-) -> list[dict[str, Any]]:
+def knee(results: list[dict[str, Any]], interfaces: tuple[str, ...], criterion: Criterion) -> list[dict[str, Any]]:
     """The highest rate up to which every step met the criterion, for each interface."""
     found = []
     for interface in interfaces:
@@ -134,7 +132,7 @@ def knee(
                 missed = step
                 break
             highest = step["offered_rate"]
-        busy = missed is not None and cpu is not None and cpu > _BUSY
+        busy = missed is not None and (missed["cpu_share"] or 0.0) > _BUSY
         found.append(
             {
                 "interface": interface, "highest_rate": highest,

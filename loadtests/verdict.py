@@ -70,10 +70,8 @@ def invalid_because(figures: dict[str, Any], plan: Plan, pacing: str) -> tuple[l
     if plan.open_model and lag["p50"] is not None:
         limits = {"p50": MOST_LAG_MEDIAN_MS, "p95": MOST_LAG_P95_MS, "p99": MOST_LAG_P99_MS}
         if any((lag[name] or 0.0) > limit for name, limit in limits.items()):
-            reasons.append(
-                f"requests started {lag['p50']:.3f} ms (median) and {lag['p99'] or 0.0:.3f} ms (p99) after their time: "
-                "the generator's machine is overloaded"
-            )
+            told = " and ".join(f"{lag[name]:.3f} ms ({name})" for name in limits if lag[name] is not None)
+            reasons.append(f"requests started {told} after their time: the generator's machine is overloaded")
         elif (lag["p99"] or 0.0) > NOTED_LAG_P99_MS:
             notes.append(f"1 % of the requests started {lag['p99']:.3f} ms or more after their time ({pacing})")
     if plan.open_model and figures["scheduled"]:

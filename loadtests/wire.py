@@ -96,9 +96,12 @@ class Connection:
         try:
             return self._call(request.octets)
         except gevent.Timeout as timer:
+            connected = self._socket is not None
             self.close()
             if timer is not deadline:
                 raise
+            if not connected:
+                raise connect_error(TimeoutError(), self.endpoint.url) from None
             raise CallError("timeout", f"no complete answer within {self.timeout_s:g} s") from None
         except BaseException:
             self.close()

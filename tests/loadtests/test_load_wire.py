@@ -11,7 +11,7 @@ from urllib3 import Retry
 
 from loadtests.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.failures import CallError
-from loadtests.ordinary import Sent, new_session
+from loadtests.ordinary import OrdinaryRest, Sent, new_session
 from loadtests.payloads import rest_request
 from loadtests.robot import Robot
 from loadtests.wire import Connection, Request
@@ -82,6 +82,26 @@ def test_nobody_listens(toy):
     with pytest.raises(CallError) as caught:
         connect(robot).call(get(Endpoint.parse(robot.url)))
     assert caught.value.kind == "refused"
+
+
+def test_a_host_that_takes_no_connection():
+    with socket.socket() as full:
+        full.bind(("127.0.0.1", 0))
+        full.listen(0)
+        address = full.getsockname()
+        waiting = [socket.socket() for _ in range(4)]
+        for one in waiting:  # fill the queue of connections that nobody accepts: further ones get no answer
+            one.setblocking(False)
+            one.connect_ex(address)
+        endpoint = Endpoint("http", *address, "")
+        with pytest.raises(CallError, match="no connection within the deadline") as caught:
+            Connection(endpoint, 0.3).call(get(endpoint))
+        assert caught.value.kind == "network"
+        with pytest.raises(CallError, match="no connection within the deadline") as caught:
+            OrdinaryRest(Robot(endpoint.url, None, None, timeout_s=0.3)).call("pose", {})
+        assert caught.value.kind == "network"
+        for one in waiting:
+            one.close()
 
 
 def test_a_name_that_does_not_resolve():
