@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.domain.drive import BusyError, Drive
+from conformance.domain.goals import make_room
 from conformance.domain.robot import Robot, Velocity
 from conformance.target.stillness import bring_to_rest
 
@@ -33,6 +34,7 @@ def test_straight_drive(roaas: Session) -> None:
     robot = Robot(roaas)
     if not robot.actuated(0):
         pytest.skip("the statement says that the robot cannot drive straight ahead")
+    make_room(robot)
     drive = Drive(robot)
     try:
         drive.look()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import pytest
 
 from conformance.domain.drive import BusyError, Drive
+from conformance.domain.goals import make_room
 from conformance.domain.robot import STILL, Robot, Velocity
 from conformance.target.stillness import bring_to_rest
 
@@ -48,6 +49,7 @@ def test_turn(roaas: Session, judge: Judge) -> None:
     robot = Robot(roaas)
     if not robot.actuated(5):
         pytest.skip("the statement says that the robot cannot turn on the spot")
+    make_room(robot)
     drive = Drive(robot)
     try:
         _turn(robot, drive, judge)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.domain.goals import make_room
 from conformance.domain.robot import Robot
 from conformance.domain.velocity_walk import machine
 from conformance.domain.walk import Walk
@@ -34,7 +35,9 @@ def test_velocity_walk(roaas: Session, effort: Effort, explore: Explorer) -> Non
     reason = bring_to_rest(roaas)
     if reason:
         pytest.skip(reason)
-    walk = Walk(Robot(roaas), 0.8 * effort.budget_s)
+    robot = Robot(roaas)
+    make_room(robot)
+    walk = Walk(robot, 0.8 * effort.budget_s)
     explore.machine(machine(walk), cases=10, steps=effort.cases(12))
     walk.drive.judge_motion()
     if walk.silence:

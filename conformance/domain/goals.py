@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
 from conformance.domain.geometry import Pose
+from conformance.domain.goal import await_none, goal_body, put_goal
 from conformance.domain.plan import ask, reachable
 
 if TYPE_CHECKING:
     from conformance.domain.robot import Robot
+
+# How far velocities may take a robot: aside, and straight ahead, m.
+_NEAR_M: Final = 0.4
+_FAR_M: Final = 0.7
+_PLACES: Final = 8
+# A robot that makes room is waited for so long, s.
+_ARRIVES_S: Final = 10.0
 
 
 def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
@@ -33,3 +42,33 @@ def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
             x, y = (one + share * (other - one) for one, other in zip(here[:2], goals[0][:2], strict=True))
             goals.append(Pose(x, y, goals[0].yaw))
     return goals
+
+
+def make_room(robot: Robot) -> None:
+    """Drive a robot that stands close to something to where it can be driven about by its velocity.
+
+    A simulated robot's wheels go on turning against a wall, and its pose then moves otherwise than its velocity says.
+    Where the robot stays if it knows of no such place, or does not go there, is for the checks to find out.
+    """
+    here = robot.map_pose()
+    if here is None or _is_open(robot, here):
+        return
+    for distance in (0.8, 1.5, 2.5):
+        for pose in reachable(robot, here, distance, _PLACES):
+            if _is_open(robot, pose):
+                exchange = put_goal(robot, goal_body(pose, robot.statement.motion.frame))
+                if exchange.response is not None and exchange.response.ok:
+                    await_none(robot, _ARRIVES_S)
+                    robot.delete_goal()
+                    await_none(robot)
+                return
+
+
+def _is_open(robot: Robot, pose: Pose) -> bool:
+    """Whether the robot knows plain ways from a pose into all directions, and farther ones ahead and back."""
+    around = [pose.ahead(_NEAR_M, math.radians(angle)) for angle in range(60, 360, 60)]
+    for there in (pose.ahead(_FAR_M), pose.ahead(-_FAR_M), *around):
+        _, plan, _ = ask(robot, there, pose)
+        if plan is None or plan.length > 1.2 * pose.distance(there) + 0.1 or not robot.in_arena(there):
+            return False
+    return True
