@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import struct
-import threading
 from typing import TYPE_CHECKING, Any
 
 from conformance.selftest.faults.changing import (
@@ -23,6 +20,17 @@ from conformance.selftest.faults.changing import (
     values,
 )
 from conformance.selftest.faults.delivery import segments
+from conformance.selftest.faults.distortion import (
+    EveryNth,
+    OutOfOrder,
+    as_delivery,
+    doubled,
+    narrow,
+    narrow_soap,
+    narrow_twist,
+    rounded_soap,
+    swapped_soap,
+)
 from conformance.selftest.faults.fault import Fault
 from conformance.selftest.faults.soap_services import enveloped
 
@@ -35,113 +43,6 @@ if TYPE_CHECKING:
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
-_CODE_PLACE = 4
-_DOUBLES = rb"(<(?:\w+:)?(?:depot|destination|source)_[xy][^>]*>\s*)([^<\s]+)(\s*<)"
-
-
-def _doubled(where: Callable[[Ask], bool]) -> Callable[[], Any]:
-    def change(ask: Ask, forward: Forward) -> Answer:
-        if where(ask):
-            forward(ask)
-        return forward(ask)
-
-    return lambda: change
-
-
-class _EveryNth:
-    """Each nth is answered and forgotten."""
-
-    def __init__(self, where: Callable[[Ask], bool], answer: Callable[[Ask], Answer], nth: int) -> None:
-        self._where, self._answer, self._nth = where, answer, nth
-        self._seen = 0
-
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        if self._where(ask):
-            self._seen += 1
-            if self._seen % self._nth == 0:
-                return self._answer(ask)
-        return forward(ask)
-
-
-class _OutOfOrder:
-    """A delivery waits for the one after it, which overtakes it (or for a moment, when there is none)."""
-
-    def __init__(self) -> None:
-        self._held: tuple[Ask, Forward] | None = None
-        self._lock = threading.Lock()
-
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        if not deliveries(ask):
-            # Whoever looks at what has arrived finds everything, in the wrong order.
-            self._let_go(forward)
-            return forward(ask)
-        with self._lock:
-            held, self._held = self._held, None
-            if held is None:
-                self._held = (ask.copy(), forward)
-                return plain(204)(ask)
-        answer = forward(ask)
-        forward(held[0])
-        return answer
-
-    def _let_go(self, forward: Forward) -> None:
-        with self._lock:
-            held, self._held = self._held, None
-        if held is not None:
-            forward(held[0])
-
-
-def _float32(text: str) -> str:
-    try:
-        return repr(struct.unpack("f", struct.pack("f", float(text)))[0])
-    except (ValueError, OverflowError, struct.error):
-        return text
-
-
-def _narrow(place: int, text: str) -> str:
-    return text if place == _CODE_PLACE else _float32(text)
-
-
-def _narrow_soap(ask: Ask) -> None:
-    ask.body = re.sub(
-        _DOUBLES, lambda found: found[1] + _float32(found[2].decode("latin-1")).encode() + found[3], ask.body
-    )
-
-
-def _rounded_soap(ask: Ask) -> None:
-    def short(found: re.Match[bytes]) -> bytes:
-        text = found[2].decode("latin-1")
-        digits = re.fullmatch(r"([+-]?\d*\.\d{3})\d+", text)
-        return found[1] + (digits[1] if digits else text).encode() + found[3]
-
-    ask.body = re.sub(_DOUBLES, short, ask.body)
-
-
-def _swapped_soap(ask: Ask) -> None:
-    """Source and destination are exchanged, in their places."""
-    found = {
-        name: re.search(rb"<(?:\w+:)?%s[^>]*>([^<]*)<" % name, ask.body) for name in (b"source_x", b"destination_x")
-    }
-    one, other = found[b"source_x"], found[b"destination_x"]
-    if one and other:
-        first, second = sorted((one, other), key=lambda match: match.start(1))
-        ask.body = (
-            ask.body[: first.start(1)]
-            + second[1]
-            + ask.body[first.end(1) : second.start(1)]
-            + first[1]
-            + ask.body[second.end(1) :]
-        )
-
-
-def _as_delivery(ask: Ask, forward: Forward) -> Answer:
-    """A coffee is published with the code that it came with, 3 as it happens."""
-    if not _COFFEE(ask):
-        return forward(ask)
-    body = ask.body.replace(b"ExecuteCoffeeRequest", b"ExecuteDeliveryRequest")
-    answer = forward(ask.copy(body=re.sub(rb"(message_code[^>]*>\s*)[+-]?\d+", rb"\g<1>3", body)))
-    answer.body = answer.body.replace(b"ExecuteDeliveryRequest", b"ExecuteCoffeeRequest")
-    return answer
 
 
 def _shift(name: str, by: float) -> Callable[[Any], None]:
@@ -188,20 +89,12 @@ def _fault(
 _NO_GOAL = enveloped(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
 
 
-def _narrow_twist(twist: Any) -> None:
-    try:
-        for part, axis in (("linear", "x"), ("angular", "z")):
-            twist[part][axis] = float(_float32(repr(float(twist[part][axis]))))
-    except (TypeError, KeyError, ValueError):
-        return
-
-
 FAULTS = (
     _fault(
         "same-rest-doubled",
         "A REST delivery is published twice.",
         ("delivery-rest",),
-        _doubled(deliveries),
+        doubled(deliveries),
         "rest",
         observer=True,
     ),
@@ -209,7 +102,7 @@ FAULTS = (
         "same-rest-lost",
         "Each third REST delivery is never published.",
         ("delivery-rest",),
-        lambda: _EveryNth(deliveries, plain(204), 3),
+        lambda: EveryNth(deliveries, plain(204), 3),
         "rest",
         observer=True,
     ),
@@ -217,7 +110,7 @@ FAULTS = (
         "same-rest-narrow",
         "REST deliveries go through 32-bit floats.",
         ("delivery-rest",),
-        rewritten(deliveries, segments(_narrow)),
+        rewritten(deliveries, segments(narrow)),
         "rest",
         observer=True,
     ),
@@ -225,7 +118,7 @@ FAULTS = (
         "same-soap-doubled",
         "A SOAP delivery is published twice.",
         ("delivery-soap",),
-        _doubled(_DELIVERY),
+        doubled(_DELIVERY),
         "soap",
         observer=True,
     ),
@@ -233,7 +126,7 @@ FAULTS = (
         "same-soap-swapped",
         "Over SOAP, source_x and destination_x are exchanged.",
         ("delivery-soap", "delivery-same"),
-        rewritten(_BOTH, _swapped_soap),
+        rewritten(_BOTH, swapped_soap),
         "soap",
         observer=True,
     ),
@@ -241,7 +134,7 @@ FAULTS = (
         "same-soap-narrow",
         "SOAP deliveries go through 32-bit floats.",
         ("delivery-soap",),
-        rewritten(_DELIVERY, _narrow_soap),
+        rewritten(_DELIVERY, narrow_soap),
         "soap",
         observer=True,
     ),
@@ -249,7 +142,7 @@ FAULTS = (
         "same-coffee-code",
         "A coffee is published with code 3.",
         ("coffee-soap",),
-        lambda: _as_delivery,
+        lambda: as_delivery,
         "soap",
         observer=True,
     ),
@@ -257,7 +150,7 @@ FAULTS = (
         "same-coffee-lost",
         "Each second coffee is never published.",
         ("coffee-soap",),
-        lambda: _EveryNth(_COFFEE, enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>'), 2),
+        lambda: EveryNth(_COFFEE, enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>'), 2),
         "soap",
         observer=True,
     ),
@@ -265,7 +158,7 @@ FAULTS = (
         "same-soap-rounded",
         "SOAP rounds to three digits, REST does not.",
         ("delivery-same",),
-        rewritten(_BOTH, _rounded_soap),
+        rewritten(_BOTH, rounded_soap),
         "soap",
         observer=True,
     ),
@@ -273,7 +166,7 @@ FAULTS = (
         "same-order",
         "A REST delivery is overtaken by the one after it.",
         ("delivery-order",),
-        _OutOfOrder,
+        OutOfOrder,
         "rest",
         observer=True,
     ),
@@ -281,7 +174,7 @@ FAULTS = (
         "same-velocity-narrow",
         "Velocities go through 32-bit floats.",
         ("velocity-message",),
-        rewritten(rest("PUT", VELOCITY), inputs(_narrow_twist)),
+        rewritten(rest("PUT", VELOCITY), inputs(narrow_twist)),
         "rest",
         probe=True,
     ),

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import threading
 from typing import TYPE_CHECKING, Any
 
 from conformance.selftest.faults.changing import (
@@ -24,38 +22,26 @@ from conformance.selftest.faults.changing import (
     values,
 )
 from conformance.selftest.faults.fault import Fault
-from conformance.selftest.wire import Answer
+from conformance.selftest.faults.goal_memory import (
+    Abandoned,
+    Lingering,
+    OnlyOnce,
+    Previous,
+    Unreachable,
+    active,
+    identity,
+    pose_of,
+    position,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Ask
+    from conformance.selftest.wire import Answer, Ask
 
     Forward = Callable[[Ask], Answer]
 
 _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
-
-
-def position(goal: Any) -> Any:
-    """The position in a MoveBaseActionGoal."""
-    return goal["goal"]["target_pose"]["pose"]["position"]
-
-
-def identity(ask: Ask) -> str | None:
-    """The id in a PUT goal."""
-    value = parsed(ask.body)
-    try:
-        return str(value["goal_id"]["id"])
-    except (TypeError, KeyError):
-        return None
-
-
-def active(forward: Forward, ask: Ask) -> Any:
-    """The robot's goal, or None."""
-    answer = forward(
-        ask.copy(method="GET", target=GOAL, body=b"", fields=[("Host", "robot"), ("Accept", "application/json")])
-    )
-    return parsed(answer.body) if answer.status == 200 else None
 
 
 def _swap(goal: Any) -> None:
@@ -88,131 +74,12 @@ def _when_active(answer_: Callable[[Ask], Answer], *, same: bool, other_pose: bo
         if _PUT(ask):
             now, given = active(forward, ask), identity(ask)
             if now is not None and (now["goal_id"]["id"] == given) is same:
-                moved = _pose(now) != _pose(parsed(ask.body))
+                moved = pose_of(now) != pose_of(parsed(ask.body))
                 if other_pose is None or moved is other_pose:
                     return answer_(ask)
         return forward(ask)
 
     return lambda: change
-
-
-def _pose(goal: Any) -> Any:
-    try:
-        pose = goal["goal"]["target_pose"]["pose"]
-        return {part: {axis: float(pose[part][axis]) for axis in pose[part]} for part in ("position", "orientation")}
-    except (TypeError, KeyError, ValueError):
-        return None
-
-
-class _Lingering:
-    """GET goes on showing a goal that has ended by itself."""
-
-    def __init__(self) -> None:
-        self._last: Answer | None = None
-
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        answer = forward(ask)
-        if _DELETE(ask):
-            self._last = None
-        if _GET(ask):
-            if answer.status == 200:
-                self._last = answer.copy()
-            elif self._last is not None and answer.status == 404:
-                return self._last.copy()
-        return answer
-
-
-class _Previous:
-    """GET shows the goal before the active one."""
-
-    def __init__(self) -> None:
-        self._seen: list[Any] = []
-
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        answer = forward(ask)
-        value = parsed(answer.body)
-        if _GET(ask) and answer.status == 200 and isinstance(value, dict):
-            if not self._seen or self._seen[-1]["goal_id"] != value["goal_id"]:
-                self._seen.append(value)
-            if len(self._seen) > 1:
-                answer.body = json.dumps(self._seen[-2]).encode()
-        return answer
-
-
-class _OnlyOnce:
-    """An id that was used before is refused for ever."""
-
-    def __init__(self) -> None:
-        self._used: set[str] = set()
-
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        id_ = identity(ask) if _PUT(ask) else None
-        if id_ is not None and id_ in self._used and active(forward, ask) is None:
-            return problem(409, f"goal_id.id: {id_!r} was used before")(ask)
-        answer = forward(ask)
-        if id_ is not None and success(answer):
-            self._used.add(id_)
-        return answer
-
-
-class _Abandoned:
-    """The robot gives a goal up on its way."""
-
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        answer = forward(ask)
-        if _PUT(ask) and answer.status in {201, 202}:
-            later = ask.copy(method="DELETE", body=b"", fields=[("Host", "robot"), ("Connection", "close")])
-            threading.Timer(0.4, _quietly, (forward, later)).start()
-        return answer
-
-
-def _quietly(forward: Forward, ask: Ask) -> None:
-    try:
-        forward(ask)
-    except Exception:  # noqa: BLE001 - the run may be over
-        return
-
-
-class _Unreachable:
-    """A goal far away is accepted, and is active for ever."""
-
-    def __init__(self) -> None:
-        self._goal: Any = None
-
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        if ask.path != GOAL or ask.side != "rest":
-            return forward(ask)
-        if _PUT(ask):
-            value = parsed(ask.body)
-            pose = _pose(value)
-            far = pose is not None and max(abs(pose["position"][axis]) for axis in "xy") > 90
-            self._goal = None
-            if far and math.isfinite(sum(pose["position"].values())):
-                header = {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "map"}
-                status_ = {"code": 2, "text": "on my way"}
-                self._goal = {
-                    "header": header,
-                    "goal_id": {"stamp": header["stamp"], "id": identity(ask) or "far"},
-                    "goal": value["goal"],
-                    "status": status_,
-                }
-                value["goal"]["target_pose"]["header"].setdefault("stamp", header["stamp"])
-                return _said(202, self._goal, ask)
-        if _DELETE(ask) and self._goal is not None:
-            self._goal = None
-            return plain(204)(ask)
-        if _GET(ask) and self._goal is not None:
-            return _said(200, self._goal, ask)
-        return forward(ask)
-
-
-def _said(status_: int, value: Any, ask: Ask) -> Answer:
-    return Answer(
-        status_,
-        [("Content-Type", "application/json"), ("Vary", "Accept")],
-        json.dumps(value).encode(),
-        asked=ask.method,
-    )
 
 
 def _known_frame(goal: Any) -> None:
@@ -232,7 +99,7 @@ def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
     """Leaves inputs of another shape as they are, to be refused."""
 
     def apply(goal: Any) -> None:
-        if _pose(goal) is not None:
+        if pose_of(goal) is not None:
             try:
                 edit(goal)
             except (TypeError, KeyError, ValueError, OverflowError):
@@ -287,7 +154,7 @@ FAULTS = (
         "goal-get",
         altered(_GET, values(lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2"))),
     ),
-    _fault("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", remembering(_Previous)),
+    _fault("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", remembering(Previous)),
     _fault(
         "goal-get-other-id",
         "GET gives the goal under another id.",
@@ -383,9 +250,9 @@ FAULTS = (
         "goal-delete-none-success",
         lambda: _delete_conflict,
     ),
-    _fault("goal-lingers", "A goal that has ended is still shown.", "goal-ended", remembering(_Lingering)),
-    _fault("goal-id-only-once", "The id of a goal that has ended is refused.", "goal-id-again", remembering(_OnlyOnce)),
-    _fault("goal-abandoned", "The robot gives up on its way.", "goal-drives", remembering(_Abandoned)),
+    _fault("goal-lingers", "A goal that has ended is still shown.", "goal-ended", remembering(Lingering)),
+    _fault("goal-id-only-once", "The id of a goal that has ended is refused.", "goal-id-again", remembering(OnlyOnce)),
+    _fault("goal-abandoned", "The robot gives up on its way.", "goal-drives", remembering(Abandoned)),
     _fault(
         "goal-beside",
         "The robot stops 40 cm beside the goal, and shows the goal that it was given.",
@@ -396,7 +263,7 @@ FAULTS = (
         "goal-unreachable-forever",
         "A goal far outside the map is accepted and stays active.",
         "goal-unreachable",
-        remembering(_Unreachable),
+        remembering(Unreachable),
     ),
     _fault(
         "goal-frame-ignored",

@@ -182,9 +182,9 @@ FAULTS = (
     ),
     _fault(
         "http-length-too-short",
-        "After an answer come octets that Content-Length does not count, one time in 50.",
+        "After an answer come octets that Content-Length does not count.",
         "framing",
-        altered(_GET, _shorter, nth=50),
+        altered(_GET, _shorter),
     ),
     _fault("http-broken-field", "An answer has a line that is no field.", "framing", altered(_POSE, _broken_field)),
     _fault(

@@ -20,7 +20,7 @@ from conformance.selftest.faults.changing import (
     values,
 )
 from conformance.selftest.faults.fault import Fault
-from conformance.selftest.faults.goal import active
+from conformance.selftest.faults.goal_memory import active
 from conformance.selftest.faults.input_effects import drive, goal_ahead, sent
 from conformance.selftest.wire import Ask
 
