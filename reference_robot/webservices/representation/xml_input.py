@@ -3,12 +3,16 @@
 No entity is resolved, nothing is fetched, no DTD is loaded, the tree stays within libxml2's ordinary limits (depth
 256), and a document with a DOCTYPE or a processing instruction is refused (WS-I Basic Profile 1.1 R1008, R1009).
 The size is bounded before a body comes here.
+
+libxml2 keeps every name that it has met for as long as the thread lives that met it. So documents with new names are
+parsed in a thread of their own once there have been many: strangers cannot fill the robot's memory with names.
 """
 
 from __future__ import annotations
 
 import codecs
 import re
+from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
 from lxml import etree
@@ -28,14 +32,24 @@ _UTF16: Final = frozenset({"utf-16", "utf-16-le", "utf-16-be"})
 # Attributes that one document may have in all. libxml2 before 2.12 compares those of an element pairwise.
 _MOST_ATTRIBUTES: Final = 1000
 
-_PARSER: Final = etree.XMLParser(
-    encoding="utf-8",  # decided before parsing, whatever the declaration says
-    resolve_entities=False,
-    no_network=True,
-    load_dtd=False,
-    huge_tree=False,
-    remove_comments=True,  # so that a value with a comment in it is one text
-)
+_ELEMENT_NAME: Final = re.compile(rb"<([^\s/>!?]++)")
+_MOST_NAMES: Final = 2000
+_LONGEST_NAME: Final = 100  # octets
+_known_names: Final[set[bytes]] = set()
+
+
+def _new_parser() -> etree.XMLParser:
+    return etree.XMLParser(
+        encoding="utf-8",  # decided before parsing, whatever the declaration says
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,  # so that a value with a comment in it is one text
+    )
+
+
+_PARSER: Final = _new_parser()
 
 
 def parsed(body: bytes, charset: str | None = None) -> etree._Element:
@@ -55,7 +69,7 @@ def parsed(body: bytes, charset: str | None = None) -> etree._Element:
     if text.count(b"=") > _MOST_ATTRIBUTES:
         raise Problem(400, f"the document has more than {_MOST_ATTRIBUTES} attributes")
     try:
-        root = etree.fromstring(text, _PARSER)
+        root = etree.fromstring(text, _PARSER) if _has_known_names(text) else _parsed_apart(text)
     except (etree.XMLSyntaxError, ValueError) as error:
         raise Problem(400, f"the body is not well-formed XML: {ascii(str(error))[1:-1]}") from error
     if root.getroottree().docinfo.internalDTD is not None:
@@ -63,6 +77,26 @@ def parsed(body: bytes, charset: str | None = None) -> etree._Element:
     if text.find(b"<?", len(b"<?") if _DECLARED.match(text) else 0) >= 0:
         _refuse_instructions(root)
     return root
+
+
+def _has_known_names(text: bytes) -> bool:
+    """Tell whether a document brings no new names, or few enough to remember them."""
+    names = _ELEMENT_NAME.findall(text)
+    # What precedes an equals sign names an attribute; words of a text may be among it, which does no harm.
+    for before in text.split(b"=")[:-1]:
+        names += before.rsplit(None, 1)[-1:]
+    if _known_names.issuperset(names):
+        return True
+    new = set(names) - _known_names
+    if len(_known_names) + len(new) > _MOST_NAMES or max(map(len, new)) > _LONGEST_NAME:
+        return False
+    _known_names.update(new)
+    return True
+
+
+def _parsed_apart(text: bytes) -> etree._Element:
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(etree.fromstring, text, _new_parser()).result()
 
 
 def _as_utf8(body: bytes, charset: str | None) -> bytes:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import resource
+from pathlib import Path as FilePath
 
 import pytest
 import yaml
@@ -18,6 +20,7 @@ from reference_robot.webservices.representation.messages import message_from, re
 from reference_robot.webservices.representation.reading import read
 from reference_robot.webservices.representation.shapes import Record, Series, shape_of
 from reference_robot.webservices.representation.writing import write_json, write_text, write_xml
+from reference_robot.webservices.representation.xml_input import parsed
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -77,3 +80,28 @@ def test_what_is_not_finite_is_named():
 def test_a_value_for_a_list_is_refused(kind: type, value: str):
     with pytest.raises(Problem, match="poses must be a list, not 1"):
         read(value.encode(), b"application/json", shape_of(kind))
+
+
+def resident_megabytes() -> float:
+    pages = int(FilePath("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
+def test_names_of_strangers_do_not_fill_the_memory():
+    """libxml2 keeps each name that a thread has met: 1.5 MB for each of these documents, if we let it."""
+
+    def document(number: int) -> bytes:
+        return b"<a>" + b"".join(b"<n%dx%d%s/>" % (number, each, b"y" * 20) for each in range(30_000)) + b"</a>"
+
+    for number in range(10):
+        parsed(document(number))
+    before = resident_megabytes()
+    for number in range(10, 30):
+        parsed(document(number))
+    assert resident_megabytes() - before < 15
+
+
+@pytest.mark.parametrize("text", [b"", b"=", b"   = ", b"<", b"<=", b"\t=\n=", b"<a ="])
+def test_what_only_looks_like_names_is_malformed(text: bytes):
+    with pytest.raises(Problem):
+        parsed(text)
