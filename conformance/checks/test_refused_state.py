@@ -13,12 +13,14 @@ from conformance.domain.goal import await_goal, await_none, difference, goal_bod
 from conformance.domain.goals import choose_goals
 from conformance.domain.invalid import invalid_bodies
 from conformance.domain.robot import GOAL_PATH, LINEAR, STILL, VELOCITY, Robot, Velocity
+from conformance.domain.sampling import some
 from conformance.domain.shapes import body_of
 from conformance.domain.soap import message, send_delivery
 from conformance.probe.client import ProbeError
 from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
+    from conformance.effort import Effort
     from conformance.session import Session
     from conformance.soap.service import SoapService
     from conformance.target.exchange import Exchange
@@ -58,7 +60,7 @@ def test_an_invalid_velocity_moves_nothing(roaas: Session, robot: Robot, judge: 
     drive = Drive(robot)
     sent: list[tuple[str, Exchange]] = []
     for path, valid, number in ((VELOCITY, fast.twist, "linear.x"), (LINEAR, fast.linear, "x")):
-        for what, media_type, body in invalid_bodies(valid, number):
+        for what, media_type, body in some(list(invalid_bodies(valid, number)), roaas.effort):
             sent.append((f"{path} with {what}", _put(robot, path, media_type, body)))
             velocity, _ = robot.velocity()
             if not _judge_still(robot, judge, velocity, sent):
@@ -87,13 +89,14 @@ def _judge_still(robot: Robot, judge: Judge, velocity: Velocity | None, sent: li
 
 @pytest.mark.phase("motion")
 @pytest.mark.requirement("strict-input/goal-refused")
-def test_an_invalid_goal_is_not_followed(robot: Robot, judge: Judge) -> None:
+def test_an_invalid_goal_is_not_followed(robot: Robot, judge: Judge, effort: Effort) -> None:
     """Neither where there is no goal, nor in place of one."""
     frame = robot.statement.motion.frame
     near, other = choose_goals(robot, 1.5, 2)
     number = "goal.target_pose.pose.position.x"
     bodies = list(invalid_bodies(goal_body(near, frame, "not to be followed"), number))
     bodies += [(what, "application/json", body_of(body)) for what, body in _invalid_goals(near, frame)]
+    bodies = some(bodies, effort)
     for what, media_type, body in bodies:
         exchange = _put(robot, GOAL_PATH, media_type, body)
         goal, _ = robot.goal()
@@ -154,7 +157,7 @@ def test_an_invalid_delivery_reaches_nobody(roaas: Session, rest: HttpClient, ju
         observer = None
         judge.note("strict-input/delivery-refused", f"judged by the answers alone: {nobody}")
     exchanges = []
-    for place, text in _BAD_PARTS:
+    for place, text in some(_BAD_PARTS, roaas.effort):
         values = list(_CORRECT)
         values[place] = text
         exchanges.append(rest.send("PUT", path_of(*values), fresh=True))

@@ -70,9 +70,10 @@ class PartialRequest:
     def __exit__(self, *_: object) -> None:
         self.vanish()
 
-    def vanish(self) -> None:
-        """Break the connection off, as a client does that loses power or network."""
+    def vanish(self, *, reset: bool = True) -> None:
+        """Break the connection off: by a reset, or by an end in the middle, as when a client's process is killed."""
         with contextlib.suppress(OSError):
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+            if reset:
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
         with contextlib.suppress(OSError):
             self._socket.close()
