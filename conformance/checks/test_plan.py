@@ -10,7 +10,7 @@ import pytest
 from hypothesis import strategies as st
 
 from conformance.domain.geometry import Pose, wrapped
-from conformance.domain.plan import Plan, ask, plan_of, query, reachable
+from conformance.domain.plan import START_OFF, Plan, ask, judge_start, plan_of, query, reachable
 from conformance.domain.robot import POSE, Robot
 from conformance.domain.shapes import GET_PLAN, ODOMETRY, read_as
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from conformance.verdict.judge import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
-# How far from the robot, or from the given start, a path may begin: a planner's grid is not finer, m.
-_START_OFF = 0.25
 # A step that a robot cannot follow without another plan of its own, m.
 _LONGEST_STEP = 1.0
 _YAW_OFF = 0.2
@@ -107,19 +105,9 @@ def test_plans_from_the_robot(robot: Robot, here: Pose, judge: Judge, explore: E
         if not known and exchange.response and 400 <= exchange.response.status < 500:
             return  # something stands there
         judge.that("rest-resources/plan-type", not problem, exchange, _EXPECTED, found=problem)
-        after = robot.map_pose()
-        if plan is None or before is None or after is None:
-            return
-        _judge_plan(judge, plan, goal, tolerance, exchange, frame)
-        first = plan.poses[0]
-        judge.that(
-            "rest-resources/plan-start",
-            first.distance(before) <= _START_OFF + before.distance(after),
-            exchange,
-            f"a path that starts at the robot, ({before.x:.3f}, {before.y:.3f})",
-            found=f"({first.x:.3f}, {first.y:.3f})",
-            cause="starts elsewhere",
-        )
+        if plan is not None and before is not None:
+            _judge_plan(judge, plan, goal, tolerance, exchange, frame)
+            judge_start(robot, plan, before, exchange)
 
     for goal in found:
         turn = wrapped(math.atan2(goal.y - here.y, goal.x - here.x) - here.yaw)
@@ -150,7 +138,7 @@ def test_plans_from_a_given_start(robot: Robot, here: Pose, judge: Judge, explor
         problem, plan, exchange = ask(robot, goal, start)
         judge.that(
             "rest-resources/plan-given-start",
-            plan is not None and plan.poses[0].distance(start) <= _START_OFF,
+            plan is not None and plan.poses[0].distance(start) <= START_OFF,
             exchange,
             f"a path that starts at ({start.x:.3f}, {start.y:.3f})",
             found=problem or (f"({plan.poses[0].x:.3f}, {plan.poses[0].y:.3f})" if plan else ""),
@@ -184,7 +172,7 @@ def _judge_defaults(robot: Robot, judge: Judge, start: Pose, goal: Pose) -> None
             problem = f"a last heading of {one.yaw:.3f} rad for {other.yaw:.3f}"
         elif found.frames != wanted.frames:
             problem = f"frames {sorted(found.frames)} for {sorted(wanted.frames)}"
-        elif found.poses[0].distance(wanted.poses[0]) > _START_OFF:
+        elif found.poses[0].distance(wanted.poses[0]) > START_OFF:
             problem = f"a start {found.poses[0].distance(wanted.poses[0]):.3f} m away from the other's"
     judge.that(
         "rest-resources/plan-defaults",
