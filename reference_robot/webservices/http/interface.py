@@ -41,6 +41,10 @@ class Interface(ABC):
     def answer(self, request: Request) -> Response | Awaitable[Response]:
         """Return the answer, at once or awaited; a Problem that it raises becomes the answer."""
 
+    def never_waits(self, scope: Message) -> bool:  # noqa: ARG002 - for subclasses that know
+        """Tell whether this request is answered without waiting for anything: its content, ROS, another task."""
+        return False
+
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         """Serve one request (ASGI 3)."""
         started = perf_counter()

@@ -7,10 +7,11 @@ says.
 
 from __future__ import annotations
 
+import contextlib
 import re
 from typing import TYPE_CHECKING, Any, Final
 
-from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
+from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol, RequestResponseCycle
 
 from reference_robot.webservices.http.messages import BODY_LIMIT
 from reference_robot.webservices.problems import PROBLEM_JSON, Problem
@@ -147,6 +148,17 @@ class RobotHttpProtocol(HttpToolsProtocol):
         self._reading_head = True
         self._head_octets = 0
         super().on_message_complete()
+
+    def _start_asgi_task(self, cycle: RequestResponseCycle, app: Any) -> None:
+        """Answer at once what never waits, and spare it the task and its turn in the event loop.
+
+        Not while earlier requests of the connection are pending: each would be answered within the other.
+        """
+        if self.pipeline or self.flow.write_paused or not app.never_waits(cycle.scope):
+            super()._start_asgi_task(cycle, app)
+            return
+        with contextlib.suppress(StopIteration):
+            cycle.run_asgi(app).send(None)
 
     def on_response_complete(self) -> None:
         """Let the head of an answer without content go."""
