@@ -121,8 +121,9 @@ class Goals:
                 if _destination(wanted) != _destination(current):
                     raise Problem(409, f"goal_id.id {identity!a} is the current goal's, which has another target_pose")
                 return 200, current
-            self._own = await self._accepted(self._filled_in(wanted))
-            sent = self.current() or self._own.described | {"status": {"code": 1, "text": "accepted"}}
+            own = self._own = await self._accepted(self._filled_in(wanted))
+            # A goal where the robot already stands may have ended by now: then it is no longer current.
+            sent = self.current() or own.described | {"status": {"code": 1, "text": "accepted"}}
             return (201 if current is None else 202), sent
 
     async def cancel(self) -> None:
