@@ -14,6 +14,7 @@ from conformance.soap.forms import written_integer
 from conformance.soap.messages import variants, with_text
 from conformance.soap.names import ADDRESSING, clark, local
 from conformance.soap.node import Node
+from conformance.soap.services import rounds
 from conformance.soap.syntax import single_changes, spell, syntaxes
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort
 def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> None:
     """WS-Addressing headers change nothing, with the action as the paper prints it and as JAX-WS RI makes it."""
     address = publishers.endpoint
-    for number in range(effort.cases(5)):
+    for number in range(rounds(effort, 5)):
         for operation in _BOTH:
             for form in (operation, f"{operation}Request"):
                 action = f"{paper.NAMESPACE}TurtlebotPublishersInterface/{form}"

@@ -8,6 +8,7 @@ import pytest
 
 from conformance.soap import paper
 from conformance.soap.baseline import example
+from conformance.soap.services import rounds
 from conformance.target.http import NoAnswerError
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def test_publishers(roaas: Session, judge: Judge, effort: Effort) -> None:
     client = _client(judge, "soap-delivery/interop", roaas.publishers)
     if client is None:
         return
-    for code in (paper.COFFEE, paper.COURIER) * effort.cases(4):
+    for code in (paper.COFFEE, paper.COURIER) * rounds(effort, 4):
         values: dict[str, Any] = {key: float(text) for key, text in paper.COORDINATES.items()} | {"message_code": code}
         for operation in ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest"):
             if operation == "ExecuteCoffeeRequest":
@@ -101,7 +102,7 @@ def test_subscribers(roaas: Session, judge: Judge, effort: Effort) -> None:
     if client is None or roaas.subscribers is None:
         return
     plan = _plan(roaas.subscribers)
-    for _ in range(effort.cases(5)):
+    for _ in range(rounds(effort, 5)):
         for operation, arguments in (
             ("GetPose", {}),
             ("GetVelocity", {}),

@@ -12,7 +12,7 @@ from conformance.soap.baseline import example, quiet_example
 from conformance.soap.envelope import envelope
 from conformance.soap.names import ENVELOPE, NEXT_ACTOR, clark
 from conformance.soap.node import Node
-from conformance.soap.services import askable
+from conformance.soap.services import askable, rounds
 
 if TYPE_CHECKING:
     from conformance.effort import Effort
@@ -122,7 +122,7 @@ def test_order_of_faults(roaas: Session, judge: Judge, effort: Effort) -> None:
         broken = replace(message, children=(*message.children, Node("no_such_element", "x")))
         for payload, what in ((_UNKNOWN, "an unknown operation"), (broken, "an invalid message"), (None, "no Body")):
             body = [payload] if payload is not None else []
-            for space in (_OTHER_VERSION,) * effort.cases(3):
+            for space in (_OTHER_VERSION,) * rounds(effort, 3):
                 old = envelope(body, (_block("1", space=space),), space=space)
                 answer = ask(service, old)
                 _is_fault(
@@ -132,6 +132,6 @@ def test_order_of_faults(roaas: Session, judge: Judge, effort: Effort) -> None:
                     "VersionMismatch",
                     f"another envelope with a mandatory block and {what}",
                 )
-            for _ in range(effort.cases(3)):
+            for _ in range(rounds(effort, 3)):
                 answer = call(service, *body, headers=(_block("1"),))
                 _is_fault(judge, "soap-basic-profile/R2725", answer, "MustUnderstand", f"a mandatory block and {what}")

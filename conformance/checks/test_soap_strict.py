@@ -79,7 +79,7 @@ def test_single_mutations(roaas: Session, judge: Judge, effort: Effort) -> None:
         # Of each kind alike, so that the many ways to miswrite a number do not crowd out the rest.
         for kind in _KINDS:
             ours = [mutant for _, mutant in found if mutant.kind == kind]
-            for mutant in invalid_ones(ours[: effort.cases(30)], service.contract.types):
+            for mutant in invalid_ones(ours[: effort.cases(60)], service.contract.types):
                 asked[kind] += 1
                 _judged(judge, mutant, call(service, *mutant.payload))
     for kind, count in asked.items():

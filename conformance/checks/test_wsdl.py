@@ -11,6 +11,7 @@ import pytest
 from conformance.soap import comparison
 from conformance.soap.description import Description, DescriptionError, describe, faults, name
 from conformance.soap.names import WSDL_SOAP, clark
+from conformance.soap.services import rounds
 from conformance.soap.wsdl_rules import RULES
 from conformance.target.http import HttpClient, NoAnswerError
 
@@ -83,7 +84,7 @@ def _served(service: SoapService) -> _Served:
 def test_served(roaas: Session, judge: Judge, effort: Effort) -> None:
     """GET ?wsdl answers with the description, and everything that it refers to can be had."""
     for service in _services(roaas, "describe/wsdl"):
-        for _ in range(effort.cases(6)):
+        for _ in range(rounds(effort, 6)):
             served = _served(service)
             judge.that(
                 "describe/wsdl",
@@ -99,7 +100,7 @@ def test_same_as_contract(roaas: Session, judge: Judge, effort: Effort) -> None:
     """Names, operations, types and actions are those of the contract."""
     ids = [f"describe/{name_}" for name_ in _COMPARED]
     for service in _services(roaas, *ids):
-        for _ in range(effort.cases(3)):
+        for _ in range(rounds(effort, 3)):
             served = _served(service)
             broken = served.problem if served.description is None else comparison.broken(served.description)
             for name_, (compare, expected) in _COMPARED.items():
@@ -167,7 +168,7 @@ def _answers(service: SoapService, location: str) -> tuple[Exchange | None, str]
 def test_profile(roaas: Session, judge: Judge, effort: Effort) -> None:
     """The description keeps the rules of the Basic Profile."""
     for service in _services(roaas, *(f"describe/wsdl-{rule}" for rule in RULES)):
-        for _ in range(effort.cases(3)):
+        for _ in range(rounds(effort, 3)):
             served = _served(service)
             for rule, check in RULES.items():
                 found = iter([served.problem]) if served.description is None else _guarded(check, served.description)

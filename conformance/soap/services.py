@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
+    from conformance.effort import Effort
     from conformance.session import Session
     from conformance.soap.service import SoapService
 
@@ -51,3 +52,8 @@ def _add(roaas: Session, service: SoapService, found: list[SoapService], reasons
         reasons.append(f"the contract describes no {service.name} service")
     else:
         found.append(service)
+
+
+def rounds(effort: Effort, standard: int) -> int:
+    """How often to repeat what one time shows already, for the sake of failures that come now and then."""
+    return max(1, round(standard * effort.factor))

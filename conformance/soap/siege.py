@@ -23,6 +23,8 @@ _LEAK: Final = re.compile(LEAKS)
 _SLOWER: Final = 20
 _ALWAYS_MS: Final = 1000.0
 _TRIES: Final = 3
+# Attacks that cost a deadline, after which the rest is left out: what a robot does then is known.
+_TROUBLES: Final = 3
 _REFUSED: Final = 400
 
 
@@ -36,6 +38,7 @@ class Siege:
         ask: sends the harmless request.
         usual_ms: how long the robot takes for that.
         ids: the requirements that an attack is a case of.
+        troubles: how often the robot let a deadline pass or was slow afterwards. After three that is known.
         lured: the attacks so far that name an address of the trap, with what they are cases of.
     """
 
@@ -44,6 +47,7 @@ class Siege:
     ask: Callable[[], Exchange]
     usual_ms: float
     ids: Callable[[Attack], tuple[str, ...]] = lambda attack: (f"xml-security/{attack.name}",)
+    troubles: int = 0
     lured: list[tuple[Attack, Exchange, tuple[str, ...]]] = field(default_factory=list)
 
     def attack(self, attack: Attack) -> None:
@@ -52,9 +56,13 @@ class Siege:
         Raises:
             NoAnswerError: the robot answers nothing any more.
         """
+        if self.troubles >= _TROUBLES:
+            return
         ids = self.ids(attack)
         self.judge.at_risk = (*ids, "xml-security/responsive")
         exchange = self.send(attack)
+        if exchange.response is None and not _closed(exchange):
+            self.troubles += 1
         for id_ in ids:
             self._judge(id_, attack, exchange)
         if attack.lure:
@@ -93,6 +101,8 @@ class Siege:
                 fastest = min(fastest, answer.elapsed_ms)
             if fastest <= allowed:
                 break
+        else:
+            self.troubles += 1
         self.judge.that(
             "xml-security/responsive",
             fastest <= allowed,

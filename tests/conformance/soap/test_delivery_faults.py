@@ -68,4 +68,5 @@ CASES = [
 
 @pytest.mark.parametrize(("fault", "check", "id_"), [case[1:] for case in CASES], ids=[case[0] for case in CASES])
 def test_caught(judged, run, fault, check, id_):
-    assert id_ in run(judged(fault, effort="standard"), check)
+    # Quickly first; what is rare shows at standard effort.
+    assert id_ in run(judged(fault), check) or id_ in run(judged(fault, effort="standard"), check)
