@@ -11,7 +11,7 @@ from conformance.http.formats import disagreements
 from conformance.http.operations import Operation, is_xml, operations_of
 from conformance.http.representation import UnreadableError, local_name, parse_xml
 from conformance.http.schemas import kind_of
-from conformance.http.targets import answered, reads
+from conformance.http.targets import answered, few, reads
 
 if TYPE_CHECKING:
     from conformance.effort import Effort
@@ -77,7 +77,7 @@ def _root_fault(operation: Operation, body: bytes) -> str:
 def test_formats_carry_the_same_values(roaas: Session, judge: Judge) -> None:
     """Every value of each resource is the same in all its formats."""
     compared = 0
-    for call in reads(roaas):
+    for call in few(roaas, reads(roaas), 5):
         others = [name for name in _IDS if name in call.operation.formats]
         if not others:
             continue

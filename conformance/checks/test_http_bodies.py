@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.http.calls import JSON, Call, example_call
-from conformance.http.targets import need
+from conformance.http.targets import few, need
 from conformance.target.http import NoAnswerError
 from conformance.target.stillness import bring_to_rest
 
@@ -63,7 +63,7 @@ def test_media_types_that_are_not_taken(roaas: Session, judge: Judge) -> None:
     """A valid body under another media type, and under none at all, is not looked at."""
     for operation in need(roaas, ["http/unsupported-media-type"], _takes_json, "takes JSON"):
         call = example_call(roaas, operation)
-        for media_type in _OTHERS:
+        for media_type in few(roaas, _OTHERS, 2):
             if media_type in operation.bodies:
                 continue
             exchange = call.send(roaas, ("Content-Type", media_type))
@@ -82,7 +82,7 @@ def test_media_types_that_are_not_taken(roaas: Session, judge: Judge) -> None:
 def test_charset_parameter(roaas: Session, judge: Judge) -> None:
     """application/json is the same with a charset parameter as without."""
     for call in _valid(roaas, judge, ("http/charset",)):
-        for media_type in _CHARSETS:
+        for media_type in few(roaas, _CHARSETS, 1):
             exchange = call.send(roaas, ("Content-Type", media_type))
             judge.that(
                 "http/charset",

@@ -10,7 +10,7 @@ from conformance.http import raw
 from conformance.http.calls import Call, example_call
 from conformance.http.observers import KNOWN_METHODS
 from conformance.http.operations import Resource, resources_of
-from conformance.http.targets import reads
+from conformance.http.targets import few, reads
 
 if TYPE_CHECKING:
     from conformance.session import Session
@@ -43,9 +43,7 @@ def _resources(session: Session) -> list[tuple[Resource, Call]]:
 def test_methods_that_a_resource_has_not(roaas: Session, judge: Judge) -> None:
     """Each resource refuses each method that the contract does not give it with 405 and Allow."""
     for resource, call in _resources(roaas):
-        for method in _TRIED:
-            if method in resource.methods:
-                continue
+        for method in few(roaas, [name for name in _TRIED if name not in resource.methods], 2):
             exchange = call.send(roaas, method=method)
             status = exchange.response.status if exchange.response else 0
             unknown = method not in KNOWN_METHODS

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.http.accept import quality
-from conformance.http.targets import answered, sampled
+from conformance.http.targets import answered, few, sampled
 
 if TYPE_CHECKING:
     from conformance.session import Session
@@ -38,7 +38,7 @@ def test_no_acceptable_format(roaas: Session, judge: Judge) -> None:
 @pytest.mark.requirement("http/q-zero")
 def test_quality_zero(roaas: Session, judge: Judge) -> None:
     """A format with q=0 is not sent, whatever else is: another one, or 406."""
-    for call in answered(roaas):
+    for call in few(roaas, answered(roaas), 2):
         first = call.operation.formats[0] if call.operation.formats else "application/json"
         others = [name for name in call.operation.formats if name != first]
         refused = [f"{first};q=0", f"{first};q=0.000, */*", f"{first} ; q=0"]

@@ -13,7 +13,7 @@ from hypothesis.errors import Unsatisfiable
 
 from conformance.http.harmless import Harmless
 from conformance.http.refusals import judge_refusal
-from conformance.http.targets import allowed, sampled
+from conformance.http.targets import allowed, few, is_slow, sampled
 from conformance.http.validity import INVALID, VALID, validity
 from conformance.target.stillness import bring_to_rest
 
@@ -101,14 +101,14 @@ def _run(session: Session, judge: Judge, explore: Explorer, harmless: Harmless, 
         if session.effort.name == "quick"
         else sampled(session, list(target.coverage()), _COVERAGE, f"coverage {target.label}")
     )
-    for item in [*target.examples(), *coverage]:
+    for item in [*target.examples(), *few(session, coverage, 2)]:
         _judge_made(session, judge, harmless, item)
 
     def fuzz(item: Made | None) -> None:
         if item is not None:
             _judge_made(session, judge, harmless, item)
 
-    if session.effort.name == "quick" or not target.has_input:
+    if session.effort.name == "quick" or is_slow(session) or not target.has_input:
         return
     for negative in (True, False):
         try:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from conformance.http.operations import Operation
     from conformance.session import Session
 
+# A robot on a network nearby answers sooner, even one that is written in Python and on a loaded machine.
+_SLOW_MS = 50.0
 NO_MOTION = "it moves the robot, and --allow-motion was not given"
 Item = TypeVar("Item")
 
@@ -94,6 +96,18 @@ def need(session: Session, ids: Sequence[str], wanted: Callable[[Operation], boo
     if not usable:
         pytest.skip(NO_MOTION)
     return usable
+
+
+def is_slow(session: Session) -> bool:
+    """Whether each request costs so much time that few have to do (an Arduino takes hundreds of milliseconds)."""
+    return session.effort.usual_ms > _SLOW_MS
+
+
+def few(session: Session, items: Sequence[Item], count: int) -> list[Item]:
+    """All items with a robot that answers quickly; with a slow one ``count`` of them, spread evenly."""
+    if not is_slow(session) or len(items) <= count:
+        return list(items)
+    return [items[index * len(items) // count] for index in range(count)]
 
 
 def sampled(session: Session, items: Sequence[Item], standard: int, name: str) -> list[Item]:
