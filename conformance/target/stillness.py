@@ -26,7 +26,7 @@ _CANCEL_S: Final = 3.0
 _GRACE_S: Final = 1.5
 _STEP_S: Final = 0.02
 # At the end of a run a robot that does not answer must not keep the user waiting, s.
-_LAST_TIMEOUT_S: Final = 1.0
+_LAST_TIMEOUT_S: Final = 0.7
 _LAST_S: Final = 3.0
 
 
