@@ -50,14 +50,14 @@ def test_an_ordinary_message_is_valid():
     assert [child.name for child in ordinary(ORDER).children] == ["size", "hot", "cups", "weight", "serial", "milk"]
 
 
-@settings(max_examples=300, database=None)
+@settings(max_examples=300, database=None, deadline=None)
 @given(variants(ORDER, ordinary(ORDER, optional=True)))
 def test_all_variants_are_valid(message):
     element = parse(message.written())
     assert (TYPES.libxml_problem(element), TYPES.python_problem(element)) == ("", "")
 
 
-@settings(max_examples=300, database=None)
+@settings(max_examples=300, database=None, deadline=None)
 @given(variants(REQUEST, ordinary(REQUEST)))
 def test_variants_of_the_contract_are_valid_and_finite(message):
     assert DELIVERY.types.valid(parse(message.written()))
@@ -96,12 +96,14 @@ def test_a_text_that_one_validator_takes_is_no_mutation():
     assert not DELIVERY.types.invalid(element)
 
 
+@settings(database=None, deadline=None)
 @given(st.floats(allow_nan=False, allow_infinity=False), st.integers(0, 7))
 def test_every_form_of_a_float_is_exactly_it(value, form):
     assert float(written_float(value, form)) == value
     assert Decimal(written_float(value, form)) == Decimal(repr(value))
 
 
+@settings(database=None, deadline=None)
 @given(st.integers(-(2**31), 2**31), st.integers(0, 7))
 def test_every_form_of_an_integer_is_exactly_it(value, form):
     assert int(written_integer(value, form)) == value
@@ -129,7 +131,7 @@ def test_single_spellings_say_the_same(syntax):
     assert DELIVERY.types.valid(read(spell(message, syntax).encode()).first)
 
 
-@settings(max_examples=200, database=None)
+@settings(max_examples=200, database=None, deadline=None)
 @given(syntaxes())
 def test_any_spelling_says_the_same(syntax):
     message = envelope([ordinary(REQUEST)])
