@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -63,8 +64,8 @@ def _served(service: SoapService) -> _Served:
     """Ask for the description, where the statement says it is, else at ?wsdl of the endpoint."""
     source = service.wsdl_source if service.wsdl_source and "://" in service.wsdl_source else f"{service.endpoint}?wsdl"
     parts = urlsplit(source)
-    client = HttpClient(f"{parts.scheme}://{parts.netloc}", service.client.connection)
-    exchange = client.send("GET", f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/")
+    with closing(HttpClient(f"{parts.scheme}://{parts.netloc}", service.client.connection)) as client:
+        exchange = client.send("GET", f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/")
     answer = exchange.response
     if answer is None or answer.status != 200:
         return _Served(exchange, None, exchange.came)
@@ -147,17 +148,17 @@ def _answers(service: SoapService, location: str) -> tuple[Exchange | None, str]
         usable = False
     if not usable:
         return None, "no http URL"
-    client = HttpClient(f"{parts.scheme}://{parts.netloc}", service.client.connection)
     # The token is for the robot that the statement names.
     ours = parts.hostname == service.client.host
     try:
-        exchange = client.send(
-            "POST",
-            parts.path or "/",
-            headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
-            body=_EMPTY,
-            authorized=ours,
-        )
+        with closing(HttpClient(f"{parts.scheme}://{parts.netloc}", service.client.connection)) as client:
+            exchange = client.send(
+                "POST",
+                parts.path or "/",
+                headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
+                body=_EMPTY,
+                authorized=ours,
+            )
     except NoAnswerError as none:
         return none.exchange, str(none)
     status = exchange.response.status if exchange.response else 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+from contextlib import closing
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -152,7 +153,8 @@ class SoapService:
         # A robot behind a proxy or another name writes locations with its own: the same path is asked for here.
         base, path = _split(source)[0], _split(location)[1]
         try:
-            exchange = HttpClient(base, self.client.connection).send("GET", path)
+            with closing(HttpClient(base, self.client.connection)) as client:
+                exchange = client.send("GET", path)
         except NoAnswerError as none:
             raise OSError(str(none)) from none
         if exchange.response is None or exchange.response.status != 200:  # noqa: PLR2004 - RFC 9110 15.3.1
@@ -210,7 +212,8 @@ def _obtain(name: str, wsdl: str, connection: Connection) -> tuple[bytes | None,
             raise StatementError(f"{name} WSDL {wsdl!r} cannot be read: {error.strerror or error}") from error
     base, path = _split(wsdl)
     try:
-        exchange = HttpClient(base, connection).send("GET", path)
+        with closing(HttpClient(base, connection)) as client:
+            exchange = client.send("GET", path)
     except NoAnswerError as none:
         return None, str(none), none.exchange
     answer = exchange.response
@@ -246,7 +249,8 @@ def _answers(address: str, wsdl: str, connection: Connection) -> bool:
         return False
     base, path = _split(address)
     try:
-        HttpClient(base, connection).send("GET", path, timeout_s=min(_PROBE_S, connection.timeout_s))
+        with closing(HttpClient(base, connection)) as client:
+            client.send("GET", path, timeout_s=min(_PROBE_S, connection.timeout_s))
     except NoAnswerError:
         return False
     return True
