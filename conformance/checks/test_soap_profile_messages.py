@@ -162,7 +162,7 @@ def test_invalid_messages(roaas: Session, judge: Judge, effort: Effort) -> None:
                 continue
             wrong = [item for item in mutants(declared, message) if item.kind not in {"body", "non-finite"}]
             # Spread over all kinds and elements, rather than the first of them.
-            step = max(1, len(wrong) // effort.cases(25))
+            step = max(1, len(wrong) // effort.cases(40))
             for mutant in invalid_ones(wrong[::step], service.contract.types):
                 answer = call(service, *mutant.payload)
                 judge.that(

@@ -107,7 +107,7 @@ def test_mutations_of_any_message(roaas: Session, judge: Judge, explore: Explore
                 if not _judged(judge, invalid, call(service, *invalid.payload)):
                     raise RefutedError(invalid.what)
 
-        explore(st.sampled_from(targets).flatmap(_broken), refused, cases=40)
+        explore(st.sampled_from(targets).flatmap(_broken), refused, cases=80)
 
 
 def _broken(target: tuple[Element, Node]) -> st.SearchStrategy[tuple[Element, Mutant]]:
