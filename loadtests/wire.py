@@ -2,7 +2,7 @@
 
 It serves REST and SOAP by the same octet path: a request built beforehand goes out in one send, and the answer
 is fed as it comes to llhttp (httptools). Locust's FastHttpUser (geventhttpclient) was tried first: 190 us a
-request against 60 us here, and it resends GET and PUT on its own when a connection drops; both would be
+request against 50 us here, and it resends GET and PUT on its own when a connection drops; both would be
 reported as the robot's. The gain comes from a read watcher that lives as long as the connection: no EAGAIN
 probe and no epoll_ctl for each request, and a close by the robot is seen while the connection is idle, so that
 the next request opens a new one instead of failing. A request is never sent twice.

@@ -36,7 +36,7 @@ def test_plain_locust_calls_everything_over_both_interfaces(toy, tmp_path):
 def test_plain_locust_moves_nothing_unasked_and_says_when_it_cannot_begin(toy, tmp_path):
     robot = toy()
     run = subprocess.run(
-        [*LOCUST, "--headless", "-u", "4", "-r", "4", "-t", "3s", "--rest", robot.url, "--json"],
+        [*LOCUST, "--headless", "-u", "16", "-r", "16", "-t", "4s", "--rest", robot.url, "--json"],
         capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path,
     )  # fmt: skip
     assert "pose rest" in run.stdout
