@@ -2,8 +2,8 @@
 
 A mission goes source → destination → depot, each leg a NavigateToPose goal. It waits while navigation
 has somebody else's goal. A leg that is refused fails its mission, and the next one begins; a leg that is
-cancelled or displaced from outside fails its mission and drops the queue, because an operator who stops
-the robot wants it to stay stopped.
+cancelled or displaced from outside fails its mission and drops the queue, and so does cancelling somebody
+else's goal while missions wait: an operator who stops the robot wants it to stay stopped.
 """
 
 import json
@@ -16,7 +16,7 @@ from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header, String
 
 from reference_robot.names import RosNames
@@ -29,6 +29,11 @@ _RETRY_PERIOD_S: Final = 0.2  # while navigation's action server is not there
 # Reliable, so that no request is lost in ordinary use. The short history is the bound under a flood:
 # the oldest unread request gives way, and a publisher never waits for us.
 _REQUESTS: Final = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+
+# Latched as its publisher's, but deep enough that a goal's canceling is not overwritten by its end.
+_CURRENT_GOALS: Final = QoSProfile(
+    depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
 
 
 class Delivery:
@@ -52,7 +57,7 @@ class Delivery:
         self._begin_later = node.create_timer(_RETRY_PERIOD_S, self._begin)
         self._begin_later.cancel()
         self._navigate = ActionClient(node, NavigateToPose, names.actions.navigate_to_pose)
-        node.create_subscription(String, names.topics.current_goal, self._note_current_goal, LATCHED)
+        node.create_subscription(String, names.topics.current_goal, self._note_current_goal, _CURRENT_GOALS)
         node.create_subscription(DeliveryRequestMsg, names.topics.delivery, self._take, _REQUESTS)
 
     def _take(self, message: DeliveryRequestMsg) -> None:
@@ -78,6 +83,11 @@ class Delivery:
 
     def _note_current_goal(self, message: String) -> None:
         self._navigation_is_busy = bool(message.data)
+        is_canceling = message.data and json.loads(message.data)["status"] == GoalStatus.STATUS_CANCELING
+        # A leg of ours that is cancelled drops the queue when it ends.
+        if is_canceling and self._missions.active is None:
+            self._missions.abandon()
+            self._changed()
         self._begin()
 
     def _begin(self) -> None:

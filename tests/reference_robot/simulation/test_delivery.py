@@ -85,3 +85,14 @@ def test_a_goal_that_displaces_a_mission_drops_the_queue(robot, statuses):
     handle = robot.send(pose(67.0, 38.7))
     until(lambda: robot.states == ["failed", "dropped"])
     assert robot.end_of(handle) == statuses.STATUS_SUCCEEDED
+
+
+def test_cancelling_somebody_elses_goal_drops_the_missions_that_wait(robot, statuses):
+    handle = robot.send(pose(60.5, 38.7))
+    until(lambda: robot.current_goal)
+    robot.request(*NEAR)
+    until(lambda: robot.states == ["queued"])
+    assert len(robot.cancel_all().goals_canceling) == 1
+    assert robot.end_of(handle) == statuses.STATUS_CANCELED
+    until(lambda: robot.states == ["dropped"])
+    until(lambda: robot.rests and robot.current_goal is None)
