@@ -120,7 +120,11 @@ def test_order_of_faults(roaas: Session, judge: Judge, effort: Effort) -> None:
         good = quiet_example(service)
         message = good[1] if good else _UNKNOWN
         broken = replace(message, children=(*message.children, Node("no_such_element", "x")))
-        for payload, what in ((_UNKNOWN, "an unknown operation"), (broken, "an invalid message"), (None, "no Body")):
+        for payload, what in (
+            (_UNKNOWN, "an unknown operation"),
+            (broken, "an invalid message"),
+            (None, "an empty Body"),
+        ):
             body = [payload] if payload is not None else []
             for space in (_OTHER_VERSION,) * rounds(effort, 3):
                 old = envelope(body, (_block("1", space=space),), space=space)

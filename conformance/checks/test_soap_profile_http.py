@@ -62,7 +62,7 @@ def _malformed(message: Node) -> list[tuple[str, bytes]]:
         ("text after the end", good + b"<"),
         ("no XML at all", b"delivery please"),
         ("JSON", b'{"Envelope": {"Body": {}}}'),
-        ("a prefix that is not bound", good.replace(b"xmlns:n0", b"xmlns:other", 1)),
+        ("a prefix that is not bound", good.replace(b"xmlns:soap", b"xmlns:other", 1)),
         ("an entity that is not declared", good.replace(b"</", b"&nothing;</", 1)),
         ("a bare ampersand", good.replace(b"</", b" & </", 1)),
         ("an attribute twice", good.replace(b" xmlns", b" a='1' a='2' xmlns", 1)),

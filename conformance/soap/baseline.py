@@ -104,5 +104,5 @@ def typed(message: Node, declared: Element, payload: Node) -> bytes:
         made = replace(payload, attributes=((clark(XSI, "type"), f"tns:{payload.name}"),))
     body = message.children[-1]
     whole = replace(message, children=(*message.children[:-1], replace(body, children=(made,))))
-    bindings = f' xmlns:xs="{XSD}" xmlns:tns="{namespace(payload.tag)}" xmlns:n0='.encode()
-    return whole.written().replace(b" xmlns:n0=", bindings, 1)
+    bindings = f' xmlns:xs="{XSD}" xmlns:tns="{namespace(payload.tag)}" xmlns:'.encode()
+    return whole.written().replace(b" xmlns:", bindings, 1)

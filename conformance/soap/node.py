@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 from xml.sax.saxutils import escape, quoteattr
 
-from conformance.soap.names import local, namespace
+from conformance.soap.names import ADDRESSING, ENVELOPE, XSI, local, namespace
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+
+_USUAL: Final = {ENVELOPE: "soap", XSI: "xsi", ADDRESSING: "wsa"}
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,8 @@ class Node:
     def written(self) -> bytes:
         """The document in plain UTF-8, each namespace bound to a prefix at the root."""
         spaces = sorted(self._namespaces())
-        prefixes = {space: f"n{number}" for number, space in enumerate(spaces)}
+        # The usual prefixes where there are any: findings are read by people.
+        prefixes = {space: _USUAL.get(space, f"n{number}") for number, space in enumerate(spaces)}
         bindings = "".join(f" xmlns:{prefix}={quoteattr(space)}" for space, prefix in prefixes.items())
         return self._text(prefixes, bindings).encode()
 
