@@ -133,9 +133,18 @@ class Proxy:
 
     def _one(self, side: str, stream: Stream, upstream: Upstream) -> bool:
         """One exchange. Returns whether the connection goes on."""
+        owner = threading.get_ident()
 
         def forward(ask: Ask) -> Answer:
-            return self._forward(ask, upstream)
+            if ask.side == side and threading.get_ident() == owner:
+                return self._forward(ask, upstream)
+            # The other interface, or a thread of the change's own: neither may come between this connection's octets.
+            robot = self._robot[ask.side]
+            another = Upstream(robot.hostname or "127.0.0.1", robot.port or 80)
+            try:
+                return self._forward(ask, another)
+            finally:
+                another.close()
 
         try:
             ask = self._next(side, stream)

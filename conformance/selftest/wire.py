@@ -137,7 +137,10 @@ class Stream:
 
     def more(self) -> bool:
         """Read what comes. Returns whether anything came."""
-        data = self.sock.recv(262_144)
+        try:
+            data = self.sock.recv(262_144)
+        except ConnectionResetError:
+            data = b""
         self._buffer += data
         return bool(data)
 
@@ -156,7 +159,8 @@ class Stream:
             return Ask(side, raw=head + b"\r\n\r\n" + self._all())
         method, target, version = line.decode("latin-1").split(" ")
         ask = Ask(side, method, target, version, _fields(rest))
-        if len(ask.fields) < len([one for one in rest if one]):
+        length = ask.field("Content-Length")
+        if len(ask.fields) < len([one for one in rest if one]) or (length is not None and not length.isdigit()):
             return Ask(side, raw=head + b"\r\n\r\n" + self._all())
         if (ask.field("Expect") or "").lower() == "100-continue":
             self.sock.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")

@@ -169,16 +169,19 @@ def _rest_xml(ask: Ask) -> bool:
 
 
 class _Exhausted:
-    """After an attack the robot needs a while for everything."""
+    """After each of the first attacks the robot needs a while for everything."""
 
     def __init__(self) -> None:
+        self._attacks = 4
         self._left = 0
 
     def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        """See proxy.Change."""
         if self._left:
             self._left -= 1
             time.sleep(2.5)
-        if b"<!DOCTYPE" in ask.body or len(ask.body) > 500_000:
+        if self._attacks and (b"<!DOCTYPE" in ask.body or len(ask.body) > 500_000):
+            self._attacks -= 1
             self._left = 2
         return forward(ask)
 

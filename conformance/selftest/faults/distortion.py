@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     Forward = Callable[[Ask], Answer]
 
 _COFFEE = soap("ExecuteCoffeeRequest")
+_BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 _CODE_PLACE = 4
 _DOUBLES = rb"(<(?:\w+:)?(?:depot|destination|source)_[xy][^>]*>\s*)([^<\s]+)(\s*<)"
 
@@ -49,7 +50,7 @@ class EveryNth:
 
 
 class OutOfOrder:
-    """A delivery waits for the one after it, which overtakes it (or for a moment, when there is none)."""
+    """A REST delivery waits for the next delivery, which overtakes it, or until somebody looks what has arrived."""
 
     def __init__(self) -> None:
         self._held: tuple[Ask, Forward] | None = None
@@ -57,24 +58,18 @@ class OutOfOrder:
 
     def __call__(self, ask: Ask, forward: Forward) -> Answer:
         """See proxy.Change."""
-        if not deliveries(ask):
-            # Whoever looks at what has arrived finds everything, in the wrong order.
-            self._let_go(forward)
-            return forward(ask)
+        overtaking = deliveries(ask) or _BOTH(ask)
         with self._lock:
             held, self._held = self._held, None
-            if held is None:
+            if held is None and deliveries(ask):
                 self._held = (ask.copy(), forward)
                 return plain(204)(ask)
+        if held is not None and not overtaking:
+            held[1](held[0])
         answer = forward(ask)
-        forward(held[0])
+        if held is not None and overtaking:
+            held[1](held[0])
         return answer
-
-    def _let_go(self, forward: Forward) -> None:
-        with self._lock:
-            held, self._held = self._held, None
-        if held is not None:
-            forward(held[0])
 
 
 def float32(text: str) -> str:

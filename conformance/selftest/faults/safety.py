@@ -197,24 +197,50 @@ def _stopping(ask: Ask, forward: Forward) -> Answer:
     return answer
 
 
-def _stubborn(ask: Ask, forward: Forward) -> Answer:
-    """A velocity of zero is answered, and not passed on."""
-    value = parsed(ask.body) if _PUT(ask) else None
-    if isinstance(value, dict) and value.get("linear") == _still(value) and not moving(ask):
+class _Stubborn:
+    """A velocity of zero is answered, and the velocity before it goes on for three seconds."""
+
+    def __init__(self) -> None:
+        self._last: Any = None
+        self._turn = 0
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        """See proxy.Change."""
+        if not _PUT(ask):
+            return forward(ask)
+        self._turn += 1
+        if moving(ask):
+            answer = forward(ask)
+            self._last = parsed(ask.body) if success(answer) else self._last
+            return answer
+        if self._last is None or not _zero(parsed(ask.body)):
+            return forward(ask)
+        last, self._last = self._last, None
+        threading.Thread(target=self._go_on, args=(self._turn, last, ask.copy(), forward), daemon=True).start()
         return plain(204)(ask)
-    return forward(ask)
+
+    def _go_on(self, turn: int, last: Any, ask: Ask, forward: Forward) -> None:
+        until = time.monotonic() + 3
+        while time.monotonic() < until and self._turn == turn:
+            try:
+                sent(ask, forward, "PUT", VELOCITY, last)
+            except Exception:  # noqa: BLE001 - the run may be over
+                return
+            time.sleep(0.15)
 
 
-def _still(value: Any) -> Any:
-    linear = value.get("linear")
-    return linear if isinstance(linear, dict) and set(linear) == set("xyz") and not any(linear.values()) else _ZERO
+def _zero(value: Any) -> bool:
+    try:
+        return not any(value[part][axis] for part in ("linear", "angular") for axis in "xyz")
+    except (TypeError, KeyError):
+        return False
 
 
 def _torn_drive() -> Callable[[str, bytes, Forward], None]:
     """A request that ends in the middle is carried out with what had come."""
 
-    def torn(side: str, got: bytes, forward: Forward) -> None:
-        if side == "rest" and got:
+    def torn(side: str, _got: bytes, forward: Forward) -> None:
+        if side == "rest":
             drive(Ask("rest", "PUT", VELOCITY), forward, 0.2)
 
     return torn
@@ -232,7 +258,12 @@ FAULTS = (
     _fault("safety-relentless", "A velocity holds for ten seconds.", ("watchdog",), _Relentless),
     _fault("safety-short-of-breath", "A velocity holds for 0.15 s.", ("hold",), _ShortOfBreath),
     _fault("safety-no-renewal", "The same velocity again does not renew it.", ("renewal",), _Once),
-    _fault("safety-no-stop", "A velocity of zero is passed over.", ("stop",), lambda: _stubborn),
+    _fault(
+        "safety-no-stop",
+        "A velocity of zero is answered, and the robot goes on for three seconds.",
+        ("stop",),
+        _Stubborn,
+    ),
     _fault(
         "safety-clamped",
         "A velocity beyond the limits is cut to them.",
