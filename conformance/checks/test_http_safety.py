@@ -9,7 +9,7 @@ import pytest
 
 from conformance.http.calls import JSON, Call, example_call
 from conformance.http.effects import reader_of, settles_at
-from conformance.http.stability import changed, leaves, snapshot
+from conformance.http.stability import changed, changes_by_itself, leaves, snapshot
 from conformance.http.targets import few, need, reads
 from conformance.target.stillness import bring_to_rest
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.needs("rest")
 _TURNS = 3
+# How long a suspect is left alone to see whether it changes by itself, s.
+_ALONE_S = 0.6
 # How long what was put is watched, s: longer than a cancelled goal takes to end.
 _WATCHED_S = 0.15
 
@@ -104,24 +106,32 @@ def _judge_safe(session: Session, judge: Judge) -> None:
     A robot that changes by itself changes in some turns; one whose safe methods have effects changes in every turn.
     """
     calls = few(session, reads(session), 3)
-    suspects: dict[str, tuple[Exchange, str]] = {}
+    suspects: dict[tuple[str, str], Exchange] = {}
     for turn in range(_TURNS):
         before = snapshot(session, calls)
         for call in calls:
             for method in ("HEAD", "OPTIONS", "GET"):
                 call.send(session, method=method)
-        found: dict[str, tuple[Exchange, str]] = {}
+        found: dict[tuple[str, str], Exchange] = {}
+        told: dict[tuple[str, str], str] = {}
         for call in calls:
             id_ = call.operation.id
             exchange = call.send(session, ("Accept", JSON))
             for place, (old, new) in changed(before[id_][0], leaves(exchange)).items():
-                found.setdefault(f"{id_} {place}", (exchange, f"{place} of {id_} was {old!r} before, and is {new!r}"))
+                found[id_, place] = exchange
+                told[id_, place] = f"{place} of {id_} was {old!r} before, and is {new!r}"
         suspects = found if turn == 0 else {key: item for key, item in found.items() if key in suspects}
         if not suspects:
             break
-    for exchange, told in list(suspects.values())[:3]:
-        judge.that("http/safe", False, exchange, "the same after GET, HEAD and OPTIONS of everything", found=told)
-    if not suspects:
+    by_id = {call.operation.id: call for call in calls}
+    guilty = {
+        key: exchange
+        for key, exchange in list(suspects.items())[:5]
+        if not changes_by_itself(session, by_id[key[0]], key[1], _ALONE_S)
+    }
+    for key, exchange in guilty.items():
+        judge.that("http/safe", False, exchange, "the same after GET, HEAD and OPTIONS of everything", found=told[key])
+    if not guilty:
         judge.that("http/safe", True, None, "the same after GET, HEAD and OPTIONS of everything")
 
 
@@ -190,28 +200,33 @@ def test_delete_twice(roaas: Session, judge: Judge) -> None:
     wanted = need(roaas, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "is a DELETE")
     by_path = {call.operation.template: call for call in reads(roaas)}
     for operation in wanted:
-        call = example_call(roaas, operation)
-        call.send(roaas)
-        read = by_path.get(operation.template)
-        before = _after_a_while(roaas, read)
-        exchange = call.send(roaas)
-        status = exchange.response.status if exchange.response else 0
-        judge.that(
-            "http/delete-idempotent",
-            200 <= status < 300 or status == 404,
-            exchange,
-            "2xx or 404 for a second DELETE",
-            found=f"status {status}",
-            cause=f"{status}",
-        )
-        after = _after_a_while(roaas, read)
-        judge.that(
-            "http/delete-idempotent",
-            before == after,
-            exchange,
-            "the same after the second DELETE as after the first",
-            found=f"GET is answered {after} after the second DELETE, and {before} after the first",
-        )
+        for attempt in (1, 2):
+            bring_to_rest(roaas)
+            call = example_call(roaas, operation)
+            call.send(roaas)
+            read = by_path.get(operation.template)
+            before = _after_a_while(roaas, read)
+            exchange = call.send(roaas)
+            status = exchange.response.status if exchange.response else 0
+            judge.that(
+                "http/delete-idempotent",
+                200 <= status < 300 or status == 404,
+                exchange,
+                "2xx or 404 for a second DELETE",
+                found=f"status {status}",
+                cause=f"{status}",
+            )
+            after = _after_a_while(roaas, read)
+            # A robot with a mission waiting may have begun it in between: that is no effect of the DELETE.
+            if before == after or attempt == 2:
+                judge.that(
+                    "http/delete-idempotent",
+                    before == after,
+                    exchange,
+                    "the same after the second DELETE as after the first",
+                    found=f"GET is answered {after} after the second DELETE, and {before} after the first",
+                )
+                break
 
 
 def _after_a_while(session: Session, read: Call | None) -> int:

@@ -78,8 +78,8 @@ def test_path_parameters(roaas: Session, judge: Judge) -> None:
             continue
         wrong = [item for parameter in operation.parameter("path") for item in wrong_texts(parameter)]
         for item in _chosen(roaas, wrong, 120, operation):
-            if not item.text and operation.template.endswith(f"{{{item.name}}}"):
-                continue  # nothing behind the last slash is another path
+            if not item.text:
+                continue  # two slashes in a row are another path, which servers may shorten
             _try(roaas, call, item, _PATH)
         if operation.motion:
             bring_to_rest(roaas)

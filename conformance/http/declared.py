@@ -128,7 +128,7 @@ def _judge_negotiation(session: Session, exchange: Exchange, answer: Response, s
             found=f"{answer.status} with {media_type}",
             cause="not acceptable",
         )
-    if len(operation.formats) > 1:
+    if len(operation.formats) > 1 and not sent.is_head:
         vary = (answer.header("vary") or "").lower()
         session.judge.that(
             "rest-formats/vary",

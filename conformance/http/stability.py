@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Any
 
 from conformance.http.jsontext import read_json
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from conformance.target.exchange import Exchange
 
 Picture = dict[str, Any]
+_READINGS = 3
+_PAUSE_S = 0.04
 
 
 def leaves(exchange: Exchange) -> Picture:
@@ -41,10 +44,15 @@ def steady(pictures: Iterable[Picture]) -> Picture:
     }
 
 
-def snapshot(session: Session, calls: Iterable[Call], times: int = 3) -> dict[str, tuple[Picture, Exchange]]:
-    """What is steady over some readings of each operation, by its id, with the last reading."""
+def snapshot(session: Session, calls: Iterable[Call]) -> dict[str, tuple[Picture, Exchange]]:
+    """What is steady over some readings of each operation, by its id, with the last reading.
+
+    With a pause between the readings: a robot's sensors speak tens of times a second, and a client asks faster.
+    """
     taken: dict[str, list[Exchange]] = {}
-    for _ in range(times):
+    for turn in range(_READINGS):
+        if turn:
+            time.sleep(_PAUSE_S)
         for call in calls:
             exchange = call.send(session, ("Accept", "application/json"))
             taken.setdefault(call.operation.id, []).append(exchange)
@@ -56,3 +64,14 @@ def changed(before: Picture, after: Picture) -> dict[str, tuple[Any, Any]]:
     if before.get("status") != after.get("status"):
         return {"status": (before.get("status"), after.get("status"))} if "status" in before else {}
     return {place: (value, after.get(place, "nothing")) for place, value in before.items() if after.get(place) != value}
+
+
+def changes_by_itself(session: Session, call: Call, place: str, seconds: float) -> bool:
+    """Whether one value of a resource changes within a time in which nothing else is asked of the robot."""
+    until = time.monotonic() + seconds
+    first = leaves(call.send(session, ("Accept", "application/json")))
+    while time.monotonic() < until:
+        time.sleep(_PAUSE_S)
+        if leaves(call.send(session, ("Accept", "application/json"))).get(place) != first.get(place):
+            return True
+    return False
