@@ -41,7 +41,7 @@ def publishers(roaas: Session) -> SoapService:
 def _answered(judge: Judge, id_: str, operation: str, answer: Answer, what: str) -> bool:
     """Judge that a valid request was taken, and that the answer is what the XSD says."""
     taken = judge.that(id_, answer.taken, answer.exchange, f"2xx for {what}", found=answer.told)
-    return taken and _valid(judge, operation, answer)
+    return _valid(judge, operation, answer) and taken if answer.succeeded else taken
 
 
 def _valid(judge: Judge, operation: str, answer: Answer) -> bool:
@@ -75,7 +75,7 @@ def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> No
                 f"2xx with {operation}Response for code {code}",
                 found=answer.told,
             )
-            if answer.taken:
+            if answer.succeeded:
                 _valid(judge, operation, answer)
 
 

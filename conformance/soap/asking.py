@@ -45,11 +45,14 @@ class Answer:
         return self.fault.standard if self.fault else ""
 
     @property
+    def succeeded(self) -> bool:
+        """Whether the answer says that all is well: 2xx, and no fault."""
+        return 200 <= self.status < 300 and self.fault is None  # noqa: PLR2004 - RFC 9110 15.3
+
+    @property
     def taken(self) -> bool:
-        """Whether the request was accepted: 2xx with a message that is no fault. A page in its place is none."""
-        # RFC 9110 15.3
-        in_order = 200 <= self.status < 300  # noqa: PLR2004 - as above
-        return in_order and self.envelope is not None and self.fault is None
+        """Whether the request was accepted: success, told by a message. A page in its place is none."""
+        return self.succeeded and self.envelope is not None
 
     @property
     def refused(self) -> bool:

@@ -12,6 +12,12 @@ from conformance.checks import test_soap_interop as interop
 
 CASES = [
     (
+        "a response of SOAP 1.2",
+        to_response(renamed(rb"http://schemas.xmlsoap.org/soap/envelope/", b"http://www.w3.org/2003/05/soap-envelope")),
+        delivery.test_operations,
+        "soap-delivery/response-valid",
+    ),
+    (
         "response of the other operation",
         to_response(renamed(b"DeliveryRequestResponse", b"CoffeeRequestResponse")),
         delivery.test_operations,
