@@ -172,17 +172,17 @@ class _Exhausted:
     """After each of the first attacks the robot needs a while for everything."""
 
     def __init__(self) -> None:
-        self._attacks = 4
+        self._attacks = 6
         self._left = 0
 
     def __call__(self, ask: Ask, forward: Forward) -> Answer:
         """See proxy.Change."""
         if self._left:
             self._left -= 1
-            time.sleep(2.5)
+            time.sleep(1.6)
         if self._attacks and (b"<!DOCTYPE" in ask.body or len(ask.body) > 500_000):
             self._attacks -= 1
-            self._left = 2
+            self._left = 4
         return forward(ask)
 
 
@@ -265,5 +265,5 @@ FAULTS = (
         instead(_rest_xml, plain(204)),
         "rest",
     ),
-    _fault("attack-exhausted", "After an attack everything takes 2.5 s.", "responsive", _Exhausted, "both"),
+    _fault("attack-exhausted", "After an attack everything takes 1.6 s.", "responsive", _Exhausted, "both"),
 )

@@ -109,7 +109,7 @@ FAULTS = (
     _fault(
         "same-rest-narrow",
         "REST deliveries go through 32-bit floats.",
-        ("delivery-rest",),
+        ("delivery-same",),
         rewritten(deliveries, segments(narrow)),
         "rest",
         observer=True,

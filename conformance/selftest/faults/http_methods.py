@@ -85,11 +85,11 @@ def _missing_slash(ask: Ask) -> bool:
 
 
 class _Meddling:
-    """Reading the sensors sets the robot in motion."""
+    """HEAD of the sensors sets the robot in motion."""
 
     def __call__(self, ask: Ask, forward: Forward) -> Answer:
         answer = forward(ask)
-        if _GET(ask) and ask.path == SENSORS:
+        if _HEAD(ask) and ask.path == SENSORS:
             vector = {"x": 0.0, "y": 0.0, "z": 0.0}
             twist = json.dumps({"linear": {**vector, "x": 0.15}, "angular": vector}).encode()
             fields = [("Host", "robot"), ("Content-Type", JSON)]
@@ -263,7 +263,7 @@ FAULTS = (
         "charset",
         instead(_charset, problem(415, "Content-Type: parameters are not taken")),
     ),
-    _fault("http-unsafe-get", "Reading the sensors moves the robot.", "safe", remembering(_Meddling)),
+    _fault("http-unsafe-sensors", "HEAD of the sensors moves the robot.", "safe", remembering(_Meddling)),
     _fault("http-unsafe-head", "HEAD and OPTIONS of the goal cancel it.", "safe", lambda: _cancelling),
     _fault(
         "http-put-once",

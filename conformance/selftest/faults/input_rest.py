@@ -182,9 +182,24 @@ def _numbers(given: dict[str, str]) -> None:
             given[name] = "0"
 
 
-def _complete(given: dict[str, str]) -> None:
-    for name in ("x", "y"):
-        given.setdefault(name, "0")
+class _Remembered:
+    """A missing x or y is the one of the query before."""
+
+    def __init__(self) -> None:
+        self._last = {"x": "0", "y": "0"}
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        """See proxy.Change."""
+        if not rest("GET", PLAN)(ask):
+            return forward(ask)
+        ask = ask.copy()
+        _query(lambda given: given.update({name: value for name, value in self._last.items() if name not in given}))(
+            ask
+        )
+        answer = forward(ask)
+        if success(answer):
+            self._last = {name: text for name, text in parse_qsl(ask.query) if name in self._last}
+        return answer
 
 
 def _path(ask: Ask) -> None:
@@ -237,9 +252,9 @@ FAULTS = (
     ),
     _fault(
         "input-query-complete",
-        "A missing x or y counts as 0.",
+        "A missing x or y is the one of the query before.",
         "query-missing",
-        rewritten(rest("GET", PLAN), _query(_complete)),
+        _Remembered,
     ),
     _fault("input-xml-fine", "XML of the wrong shape is answered 204.", "xml-body", _swallowed(_xml)),
     _fault(
