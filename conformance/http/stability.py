@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Picture = dict[str, Any]
 _READINGS = 3
 _PAUSE_S = 0.04
+# As many times a suspect is given to come to rest.
+_WINDOWS = 12
 
 
 def leaves(exchange: Exchange) -> Picture:
@@ -67,7 +69,15 @@ def changed(before: Picture, after: Picture) -> dict[str, tuple[Any, Any]]:
 
 
 def changes_by_itself(session: Session, call: Call, place: str, seconds: float) -> bool:
-    """Whether one value of a resource changes within a time in which nothing else is asked of the robot."""
+    """Whether one value of a resource goes on changing while nothing else is asked of the robot.
+
+    What has set it going may take a while to end (a robot that was set in motion): only a value that does not come
+    to rest in any of several such times changes by itself.
+    """
+    return all(_changes(session, call, place, seconds) for _ in range(_WINDOWS))
+
+
+def _changes(session: Session, call: Call, place: str, seconds: float) -> bool:
     until = time.monotonic() + seconds
     first = leaves(call.send(session, ("Accept", "application/json")))
     while time.monotonic() < until:
