@@ -38,10 +38,21 @@ def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
             pytest.skip("the robot has no plan to any pose around it")
     for part in range(1, count):
         if len(goals) < count:
-            share = 1 - part / (count + 1)
-            x, y = (one + share * (other - one) for one, other in zip(here[:2], goals[0][:2], strict=True))
-            goals.append(Pose(x, y, goals[0].yaw))
+            goals.append(_on_the_way(robot, here, goals[0], 1 - part / (count + 1)) or _turned(goals[0], part))
     return goals
+
+
+def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | None:
+    """The pose at a share of the straight way to a goal, where the robot has a plan to it."""
+    x, y = (one + share * (other - one) for one, other in zip(here[:2], goal[:2], strict=True))
+    pose = Pose(x, y, goal.yaw)
+    _, plan, _ = ask(robot, pose)
+    return pose if plan is not None else None
+
+
+def _turned(goal: Pose, part: int) -> Pose:
+    """The place of a goal with another heading: another pose, and as reachable."""
+    return Pose(goal.x, goal.y, math.remainder(goal.yaw + part, math.tau))
 
 
 def make_room(robot: Robot) -> None:
