@@ -20,14 +20,12 @@ from conformance.domain.goal import (
     status_fault,
 )
 from conformance.domain.goals import choose_goals
-from conformance.domain.plan import ask, judge_start
 from conformance.domain.robot import STILL, Robot, Velocity
 from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
     from typing import Any
 
-    from conformance.domain.geometry import Pose
     from conformance.session import Session
     from conformance.target.exchange import Exchange
     from conformance.verdict.judge import Judge
@@ -36,10 +34,6 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
 _ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
 # For so long after a cancelled goal the robot has to stay where it is: longer than second thoughts take, s.
 _STAYS_S: Final = 1.3
-# A robot that comes no nearer for so long does not drive, s; and how long one that does is waited for, by effort.
-_NO_PROGRESS_S: Final = 5.0
-_LONGEST_S: Final = {"quick": 12.0}
-_LONGEST_DEFAULT_S: Final = 30.0
 
 
 @pytest.fixture
@@ -109,7 +103,10 @@ def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge) -> None:
     _judge_none(robot, judge)
     there, back = choose_goals(robot, 1.5, 2)
     frame = robot.statement.motion.frame
+    # With all that may be left out; the second goal leaves it out.
     first = goal_body(there, frame, _ID)
+    first["header"] = {"stamp": {"sec": 12, "nanosec": 34}, "frame_id": frame}
+    first["goal_id"]["stamp"] = {"sec": 56, "nanosec": 78}
     if not _judge_new(robot, judge, put_goal(robot, first), first, "rest-resources/goal-id"):
         return
     _repeat(robot, judge, first, goal_body(back, frame, _ID))
@@ -156,11 +153,15 @@ def _judge_none(robot: Robot, judge: Judge) -> None:
 
 def _repeat(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, Any]) -> None:
     """The same goal again changes nothing; another pose under its id is refused."""
+    stamps = [goal["goal_id"]["stamp"] for goal in (robot.goal()[0], robot.goal()[0]) if goal is not None]
     for _ in range(3):
         exchange = put_goal(robot, body)
         status = exchange.response.status if exchange.response else 0
         goal, shown = robot.goal()
         changed = shown.came if goal is None else difference(goal, body)
+        # A robot that shows one stamp as long as nothing is asked of it shows another one for another goal.
+        if not changed and stamps[1:] == stamps[:1] != [goal["goal_id"]["stamp"]]:
+            changed = f"goal_id.stamp {goal['goal_id']['stamp']} for {stamps[0]}"
         judge.that(
             "rest-resources/goal-repeat",
             status in REPEATED and not changed,
@@ -216,83 +217,3 @@ def _stays(robot: Robot, judge: Judge) -> None:
             cause="does not stay",
         )
         time.sleep(0.02)
-
-
-@pytest.mark.requirement(
-    "rest-resources/goal-put",
-    "rest-resources/goal-drives",
-    "rest-resources/goal-ended",
-    "rest-resources/goal-id-again",
-    "rest-resources/plan-start",
-    "rest-resources/velocity-odometry",
-    "rest-resources/pose-motion",
-)
-def test_goal_until_it_is_reached(robot: Robot, judge: Judge, roaas: Session) -> None:
-    """A goal nearby is driven to and is then no longer current; its id can be used again."""
-    here = robot.map_pose()
-    if here is None:
-        pytest.skip("the robot's pose cannot be read")
-    (there,) = choose_goals(robot, 0.6 if robot.watchfulness == 1 else 0.55, 1)
-    body = goal_body(there, robot.statement.motion.frame, "reached")
-    exchange = put_goal(robot, body)
-    status = exchange.response.status if exchange.response else 0
-    if not judge.that("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal"):
-        return
-    if not _drive_to(robot, judge, there, here, _LONGEST_S.get(roaas.effort.name, _LONGEST_DEFAULT_S)):
-        return
-    # Away from where it was at first: a plan that always starts there is seen now.
-    before = robot.map_pose()
-    _, plan, asked = ask(robot, here)
-    if plan is not None and before is not None:
-        judge_start(robot, plan, before, asked)
-    again = put_goal(robot, body)
-    status = again.response.status if again.response else 0
-    judge.that(
-        "rest-resources/goal-id-again",
-        status in NEW,
-        again,
-        "201 or 202 for a goal whose id has ended before",
-    )
-    await_none(robot, 0.1)
-    robot.delete_goal()
-
-
-def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: float) -> bool:
-    """Watch until the goal has ended; judge that the robot drove and where it is."""
-    drive = Drive(robot)
-    began = progress = time.monotonic()
-    nearest, yaw, here = start.distance(there), start.yaw, start
-    exchange: Exchange | None = None
-    while True:
-        drive.look()
-        goal, exchange = robot.goal()
-        if drive.trace:
-            here = robot.in_map(drive.trace[-1].pose)
-        now = time.monotonic()
-        if here.distance(there) < nearest - 0.02 or abs(here.yaw - yaw) > 0.05:
-            progress, nearest, yaw = now, min(nearest, here.distance(there)), here.yaw
-        if goal is None or now > progress + _NO_PROGRESS_S or now > began + longest_s:
-            break
-    drive.judge_motion()
-    left = here.distance(there)
-    # A robot may take a goal for reached a quarter of a metre before it.
-    moved = 0.15 if start.distance(there) > 0.5 else 0.0
-    ended = goal is None
-    if not ended and left > 0.35 and now <= progress + _NO_PROGRESS_S:
-        return False  # slow, but on its way: nothing to be said against it
-    drove = judge.that(
-        "rest-resources/goal-drives",
-        left < 0.4 and start.distance(here) > moved,
-        exchange,
-        f"the robot at ({there.x:.2f}, {there.y:.2f}), where its goal was",
-        found=f"it is {left:.2f} m away, having moved {start.distance(here):.2f} m",
-        cause="not driven" if start.distance(here) <= moved else "not reached",
-    )
-    judge.that(
-        "rest-resources/goal-ended",
-        ended and exchange is not None and exchange.response is not None and exchange.response.status == 404,
-        exchange,
-        "404 when the goal has been reached",
-        found="" if ended else "the goal is still current",
-    )
-    return ended and drove

@@ -32,6 +32,7 @@ _KNOWN: Final = (
     "<id>]]>&amp;\"'",
     "\u6771\u4eac \U0001f916",
     "null",
+    " with spaces ",
     "A",
 )
 
@@ -46,10 +47,11 @@ def test_goal_ids(roaas: Session, judge: Judge, explore: Explorer) -> None:
     goals = itertools.cycle(choose_goals(robot, 1.5, 2))
     frame = robot.statement.motion.frame
     used: list[str] = []
+    strange: list[str] = []
 
     def try_id(id_: str) -> None:
-        if id_ in used[-1:]:
-            return  # the same id with another pose is a conflict
+        if strange or id_ in used[-1:]:
+            return  # waiting for the right goal again and again shows no more; an id with another pose is a conflict
         pose = next(goals)
         body = goal_body(pose, frame, id_)
         exchange = put_goal(robot, body)
@@ -66,6 +68,8 @@ def test_goal_ids(roaas: Session, judge: Judge, explore: Explorer) -> None:
         goal, problem, read = await_goal(robot, body)
         if goal is None and arrived(robot, pose):
             return
+        if problem:
+            strange.append(problem)
         for name in ("goal-id", "goal-preempt", "goal-get"):
             judge.that(
                 f"rest-resources/{name}",
@@ -90,8 +94,11 @@ def test_the_goal_shown_is_the_goal_put(roaas: Session, judge: Judge, explore: E
     robot = Robot(roaas)
     goals = choose_goals(robot, 1.5, 2)
     numbers = itertools.count()
+    strange: list[str] = []
 
     def try_pose(case: tuple[int, float, float, float]) -> None:
+        if strange:
+            return
         which, shift, yaw, length = case
         pose = goals[which]._replace(x=goals[which].x + shift, yaw=yaw)
         body = goal_body(pose, robot.statement.motion.frame, f"pose {next(numbers)}", length=length)
@@ -99,6 +106,8 @@ def test_the_goal_shown_is_the_goal_put(roaas: Session, judge: Judge, explore: E
         if exchange.response and 400 <= exchange.response.status < 500:
             return  # what stands there need not be known to a planner of another tolerance
         goal, problem, read = await_goal(robot, body)
+        if problem:
+            strange.append(problem)
         for _ in range(3):
             if goal is None and arrived(robot, pose):
                 return

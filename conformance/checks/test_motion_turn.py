@@ -151,9 +151,16 @@ def _judge_renewed(judge: Judge, turning: Velocity, velocity: Velocity | None, e
 def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started: float) -> None:
     """No more renewal: the velocity holds for its time, and then ends by itself."""
     limits = robot.limits
+    if robot.actuated(0):
+        # A small circle: either part has to end. The linear part is commanded last, and ends as well.
+        turning = turning._replace(linear_x=0.2 * limits.linear_m_s)
+        drive.refresh(turning)
     if not drive.command(turning):
         return
-    holds_until = drive.sent + (0.95 * limits.hold_s - 0.02 if limits.hold_s is not None else 0.0)
+    full = drive.sent
+    if robot.actuated(0) and limits.hold_s is not None:
+        drive.command_linear(turning)
+    holds_until = full + (0.95 * limits.hold_s - 0.02 if limits.hold_s is not None else 0.0)
     ends_by = drive.answered + (1.1 * limits.hold_s + robot.settle_s if limits.hold_s is not None else _ENDS_S)
     calm = 0
     if limits.hold_s is None:

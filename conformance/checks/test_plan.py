@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import strategies as st
 
-from conformance.domain.geometry import Pose, wrapped
+from conformance.domain.geometry import Pose, pose_of, wrapped
 from conformance.domain.plan import START_OFF, Plan, ask, judge_start, plan_of, query, reachable
 from conformance.domain.robot import POSE, Robot
 from conformance.domain.shapes import GET_PLAN, ODOMETRY, read_as
@@ -184,21 +184,22 @@ def _judge_defaults(robot: Robot, judge: Judge, start: Pose, goal: Pose) -> None
 
 
 @pytest.mark.requirement("rest-resources/plan-frame")
-def test_plan_in_the_frame_of_the_odometry(robot: Robot, here: Pose, judge: Judge) -> None:
+def test_plan_in_other_frames(robot: Robot, here: Pose, judge: Judge) -> None:
     """A plan asked for in another frame is in that frame, or refused."""
     odometry, _ = robot.read(POSE, ODOMETRY)
     if odometry is None:
         pytest.skip("the robot's pose cannot be read")
-    frame = odometry["header"]["frame_id"]
-    reading = robot.odometry()
-    pose = reading.pose if reading else here
-    exchange = robot.get(query(x=pose.x + 0.3, y=pose.y, frame_id=frame))
-    message, problem = read_as(exchange.response, GET_PLAN)
-    if exchange.response and 400 <= exchange.response.status < 500:
-        problem = ""
-    elif not problem and plan_of(message).frames != {frame}:
-        problem = f"frames {sorted(plan_of(message).frames)}"
-    judge.that("rest-resources/plan-frame", not problem, exchange, f"path and poses in {frame}, or 4xx", found=problem)
+    # In a frame that nobody knows there is no plan; a path in another one than was asked for is none either.
+    for frame, there in ((odometry["header"]["frame_id"], pose_of(odometry["pose"]["pose"])), ("no_such_frame", here)):
+        exchange = robot.get(query(x=there.x + 0.3, y=there.y, frame_id=frame))
+        message, problem = read_as(exchange.response, GET_PLAN)
+        if exchange.response and 400 <= exchange.response.status < 500:
+            problem = ""
+        elif not problem and plan_of(message).frames != {frame}:
+            problem = f"frames {sorted(plan_of(message).frames)}"
+        judge.that(
+            "rest-resources/plan-frame", not problem, exchange, f"path and poses in {frame!r}, or 4xx", found=problem
+        )
 
 
 @pytest.mark.requirement("rest-resources/plan-none")
