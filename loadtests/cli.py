@@ -32,14 +32,14 @@ from loadtests.thresholds import read_file as read_thresholds
 if TYPE_CHECKING:
     from types import FrameType
 
-DEFAULT_OUT = "roaas-load"
+DEFAULT_OUT = "out"  # as `roaas certify` does
 #: NumPy's linear algebra: its threads wait for one another by spinning, ten times as long on a busy machine.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _FILE = click.Path(path_type=Path)
 
 
-def run_load(settings: Settings) -> tuple[int, Path]:
-    """Carry out a run in a process of its own; returns its exit code and the folder of its result.
+def run_load(settings: Settings) -> int:
+    """Carry out a run in a process of its own; returns its exit code.
 
     The process has its own session, so that Ctrl-C comes to it through us, once: it then writes what it has.
     """
@@ -65,7 +65,7 @@ def run_load(settings: Settings) -> tuple[int, Path]:
             signal.signal(number, handler)
     if code < 0:  # ended by a signal: before it could take Ctrl-C as a wish, or by force
         code = exits.INTERRUPTED if -code in earlier else exits.INCONCLUSIVE
-    return code, Path(settings.out)
+    return code
 
 
 def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[float, ...]:
@@ -130,11 +130,7 @@ def load(ctx: click.Context, /, statement: Path | None, **options: Any) -> None:
     except (StatementError, ThresholdsError, SettingsError) as error:
         click.echo(f"roaas load: {error}", err=True)
         ctx.exit(exits.USAGE)
-    code, folder = run_load(settings)
-    after = (ctx.obj or {}).get("after_load") if isinstance(ctx.obj, dict) else None
-    if after is not None and (folder / "latency.json").exists():
-        after(folder)
-    ctx.exit(code)
+    ctx.exit(run_load(settings))
 
 
 def _wishes(options: dict[str, Any], limits: list[Any]) -> Wishes:

@@ -164,7 +164,6 @@ def settle(wishes: Wishes, statement: Statement) -> Settings:
     operations = _operations(wishes)
     _check_numbers(wishes)
     rate, duration_s = _bounded(wishes, statement, operations)
-    ceiling = _ceiling(statement, operations)[0]
     return Settings(
         **(addresses | descriptions),
         ca_file=ca_file,
@@ -179,7 +178,7 @@ def settle(wishes: Wishes, statement: Statement) -> Settings:
         warmup_s=DEFAULT_WARMUP_S if wishes.warmup_s is None else wishes.warmup_s,
         arrivals=wishes.arrivals,
         seed=wishes.seed,
-        max_rate=ceiling,
+        max_rate=_ceiling(statement, operations)[0],
         max_duration_s=_longest(statement, operations)[0],
         processes=wishes.processes,
         expect=max(wishes.expect, wishes.processes if wishes.processes > 1 else 0),
@@ -188,7 +187,7 @@ def settle(wishes: Wishes, statement: Statement) -> Settings:
         web_host=wishes.web_host,
         web_port=wishes.web_port,
         metrics_port=wishes.metrics_port,
-        step_rates=_step_rates(wishes, ceiling),
+        step_rates=_step_rates(wishes, statement, operations),
         step_s=wishes.step_s,
         thresholds=tuple(wishes.thresholds or statement.thresholds),
         about=statement.robot,
@@ -268,8 +267,10 @@ def _bounded(wishes: Wishes, statement: Statement, operations: tuple[str, ...]) 
     return rate, duration_s
 
 
-def _step_rates(wishes: Wishes, ceiling: float | None) -> tuple[float, ...]:
-    """The rates of the stepped load; empty when it was not asked for."""
+def _step_rates(wishes: Wishes, statement: Statement, operations: tuple[str, ...]) -> tuple[float, ...]:
+    """The rates of the stepped load, which is one of reads where there is one; empty when it was not asked for."""
+    reads = tuple(name for name in operations if name not in MOVES)
+    ceiling = _ceiling(statement, reads or operations)[0]
     if wishes.step_rates:
         above = [rate for rate in wishes.step_rates if ceiling is not None and rate > ceiling]
         if above:
@@ -279,8 +280,7 @@ def _step_rates(wishes: Wishes, ceiling: float | None) -> tuple[float, ...]:
         return tuple(sorted(set(wishes.step_rates)))
     if not wishes.steps:
         return ()
-    rates = [rate for rate in DEFAULT_RATES if ceiling is None or rate <= ceiling]
-    return tuple(rates) if rates else (float(ceiling or DEFAULT_RATES[0]),)
+    return tuple(rate for rate in DEFAULT_RATES if ceiling is None or rate <= ceiling) or (ceiling or DEFAULT_RATES[0],)
 
 
 def _token(path: str | None) -> str | None:

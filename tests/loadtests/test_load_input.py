@@ -55,7 +55,10 @@ def test_options_win_over_the_statement_and_defaults_fill_the_rest():
         (Wishes(**REST, warmup_s=-1.0), "--warmup -1 is out of range"),
         (Wishes(**REST, rate=501.0, allow_motion=True), "exceeds 500 requests/s (the default limit"),
         (Wishes(**REST, duration_s=121.0, allow_motion=True), "exceeds 120 s (the default limit"),
-        (Wishes(**REST, step_rates=(100.0, 600.0), allow_motion=True), "--step-rates 600 exceeds 500"),
+        (
+            Wishes(**REST, step_rates=(100.0, 600.0), allow_motion=True, operations=("delivery",)),
+            "--step-rates 600 exceeds 500",
+        ),
         (Wishes(**REST, token_file="/nonexistent"), "token file '/nonexistent': No such file"),  # noqa: S106 - a path
         (Wishes(**REST, ca_file="/nonexistent"), "ca_file '/nonexistent'"),
         (Wishes(**REST, interfaces=("soap",)), "--interface soap needs"),
@@ -78,6 +81,9 @@ def test_the_statements_limits_hold_and_lift():
     found = settle(Wishes(**REST, rate=1500.0, duration_s=600.0, allow_motion=True), lifted)
     assert (found.rate, found.max_rate) == (1500.0, 2000.0)
     assert settle(Wishes(**REST, rate=9000.0, duration_s=600.0), Statement()).rate == 9000.0, "reads are not bounded"
+    assert settle(Wishes(**REST, step_rates=(6000.0,), allow_motion=True), Statement()).step_rates == (6000.0,), (
+        "of reads"
+    )
     assert settle(Wishes(**REST, users=4, allow_motion=True), Statement()).max_rate == settings.MOTION_RATE
 
 
