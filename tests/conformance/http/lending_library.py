@@ -39,9 +39,11 @@ class Library:
         self.books: dict[int, Any] = {9780141439600: _FIRST}
         self.fault = fault
         self.asked = 0
+        self.log: list[tuple[str, str]] = []
 
     def answer(self, method: str, target: str, headers: Message, body: bytes) -> Answer:
         self.asked += 1
+        self.log.append((method, target))
         accept = ", ".join(headers.get_all("Accept") or []) or None
         try:
             answer = self._answer(method, target, headers, body, accept)
@@ -204,10 +206,10 @@ def _fault(code: str, text: str) -> Answer:
     return _enveloped(500, f"<s:Fault>{fields}</s:Fault>")
 
 
-def open_library(fault: str = "") -> tuple[str, str, Callable[[], None]]:
+def open_library(library: Library) -> tuple[str, str, Callable[[], None]]:
     """Serve a library on loopback. Returns its REST base URL, its WSDL's URL and what closes it."""
     lending = Lending()
-    rest, stop_rest = start(Library(fault), 0)
+    rest, stop_rest = start(library, 0)
     lending.base, stop_soap = start(lending, 0)
 
     def close() -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING
 
 import pytest
 from click.testing import CliRunner
-from lending_library import CONTRACT, open_library
+from lending_library import CONTRACT, Library, open_library
 
 from roaas import main
 
@@ -16,11 +17,11 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def certified(tmp_path) -> Iterator[Callable[[str], tuple[int, dict[str, tuple[str, str]], dict[str, str]]]]:
+def certified(tmp_path) -> Iterator[Callable[..., tuple[int, dict[str, tuple[str, str]], dict[str, str]]]]:
     closing = []
 
-    def run(fault: str, *options: str):
-        rest, wsdl, close = open_library(fault)
+    def run(library: Library, *options: str):
+        rest, wsdl, close = open_library(library)
         closing.append(close)
         arguments = ["certify", "--contract", str(CONTRACT), "--rest", rest, "--publishers-wsdl", wsdl]
         result = CliRunner().invoke(main, [*arguments, "--effort", "quick", "--out", str(tmp_path), *options])
@@ -35,7 +36,7 @@ def certified(tmp_path) -> Iterator[Callable[[str], tuple[int, dict[str, tuple[s
 
 
 def test_a_good_library_conforms(certified):
-    code, found, classes = certified("", "--allow-motion")
+    code, found, classes = certified(Library(), "--allow-motion")
     assert {id_: told for id_, told in found.items() if told[0] in {"fail", "error", "skip", "warn"}} == {}
     assert code == 0
     assert classes["http"] == classes["rest-formats"] == classes["strict-input"] == classes["describe"] == "pass"
@@ -53,6 +54,15 @@ def test_a_good_library_conforms(certified):
 )
 def test_a_broken_library_does_not(certified, fault, expected):
     class_ = expected.split("/", 1)[0]
-    code, found, _ = certified(fault, "--class", class_)
+    code, found, _ = certified(Library(fault), "--class", class_)
     assert found[expected][0] == "fail"
     assert code == 1
+
+
+def test_nothing_is_taken_out_without_permission(certified):
+    library = Library()
+    _, found, _ = certified(library, "--class", "http", "--class", "strict-input")
+    assert not [asked for asked in library.log if asked[0] == "DELETE" and re.fullmatch(r"/books/\d+", asked[1])]
+    assert library.books
+    assert found["http/delete-idempotent"][0] == "skip"
+    assert found["strict-input/json-unknown"][0] == "pass"

@@ -1,0 +1,117 @@
+"""What the suite makes of answers of a live service: what is steady, what agrees, what may be sent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from lending_library import CONTRACT, Library, open_library
+
+from conformance.contract.files import Contract
+from conformance.effort import Effort
+from conformance.http.calls import example_call
+from conformance.http.effects import reader_of, settles_at
+from conformance.http.formats import disagreements
+from conformance.http.harmless import Harmless
+from conformance.http.operations import operations_of
+from conformance.http.refusals import refuses
+from conformance.http.stability import changed, changes_by_itself, leaves, snapshot, steady
+from conformance.http.targets import answered, few, need, readable, reads, sampled
+from conformance.http.thesis import Made, targets
+from conformance.session import Session
+from conformance.statement import Endpoints, Statement
+
+
+@pytest.fixture
+def library():
+    return Library()
+
+
+@pytest.fixture
+def session(library):
+    rest, _, close = open_library(library)
+    session = Session(Statement(endpoints=Endpoints(rest=rest)), Contract.load(CONTRACT), ("http",))
+    session.connect()
+    yield session
+    close()
+
+
+def _operation(session, id_):
+    return next(item for item in operations_of(session.contract) if item.id == id_)
+
+
+def test_requests_are_made_from_examples(session):
+    put = example_call(session, _operation(session, "putBook"))
+    assert put.path == "/books/9780141439600"
+    assert put.send(session).response.status == 204
+    assert example_call(session, _operation(session, "listBooks")).path == "/books/?limit=10"
+    assert put.having("isbn", "a/b %").path == "/books/a%2Fb%20%25"
+
+
+def test_reads_and_what_is_answered(session, library):
+    assert [call.operation.id for call in reads(session)] == ["listBooks", "getBook", "getHours"]
+    library.books.clear()
+    assert [call.operation.id for call in answered(session)] == ["listBooks", "getHours"]
+    assert readable(session, _operation(session, "listBooks")).send(session).response.status == 200
+
+
+def test_what_was_put_is_got(session, library):
+    call = example_call(session, _operation(session, "putBook"))
+    assert reader_of(session, call).path == call.path
+    assert settles_at(session, call).startswith("title is 'Emma'")
+    call.send(session)
+    assert settles_at(session, call) == ""
+    library.books.clear()
+    assert settles_at(session, call) is None
+
+
+def test_formats_disagree_only_where_they_do(session, library):
+    call = readable(session, _operation(session, "getBook"))
+    library.books[9780141439600] = {"title": "Emma", "year": 1, "price": 0.1 + 0.2, "shelf": {"room": "A", "row": 3}}
+    assert disagreements(session, call, ["application/xml", "text/plain"])[0] == []
+    library.fault = "xml-rounds"
+    (found,) = disagreements(session, call, ["application/xml", "text/plain"])[0]
+    assert (found.place, found.told) == ("price", "price is 0.0 in application/xml and 0.30000000000000004 in JSON")
+
+
+def test_what_changes_is_told_from_what_is_steady(session, library):
+    call = readable(session, _operation(session, "getBook"))
+    before = snapshot(session, [call])["getBook"][0]
+    assert before["price"] == 7.25
+    library.books[9780141439600] = dict(library.books[9780141439600], price=8.0)
+    assert changed(before, leaves(call.send(session))) == {"price": (7.25, 8.0)}
+    assert not changes_by_itself(session, call, "price", 0.05)
+    assert steady([{"a": 1, "b": 2}, {"a": 1, "b": 3}]) == {"a": 1}
+
+
+def test_a_slow_robot_is_asked_less(session):
+    assert few(session, range(10), 3) == list(range(10))
+    session.effort = Effort("standard", usual_ms=300)
+    assert few(session, range(10), 3) == [0, 3, 6]
+    assert len(sampled(session, range(100), 50, "name")) == 3
+    assert sampled(session, range(100), 50, "name") == sampled(session, range(100), 50, "name")
+
+
+def test_what_moves_needs_permission(session):
+    with pytest.raises(pytest.skip.Exception, match="allow-motion"):
+        need(session, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "deletes")
+    with pytest.raises(pytest.skip.Exception, match="no operation"):
+        need(session, ["http/safe"], lambda item: item.method == "PATCH", "patches")
+    assert session.judge.evidence["http/safe"].unclaimed
+    wanted = Made("DELETE", "/books/5", "", b"")
+    assert Harmless(session).made(wanted) is None
+    assert Harmless(replace(session, allow_motion=True)).made(wanted) == wanted
+
+
+def test_schemathesis_makes_the_same_requests_again(session):
+    made = [[*target.examples(), *target.coverage()] for target in targets(session.contract)]
+    again = [[*target.examples(), *target.coverage()] for target in targets.__wrapped__(session.contract)]
+    assert sum(map(len, made)) > 100
+    assert [item.body for group in made for item in group] == [item.body for group in again for item in group]
+    assert {item.method for group in made for item in group} > {"GET", "PUT", "DELETE"}
+
+
+@pytest.mark.parametrize(("status", "expected"), [(400, True), (422, True), (404, True), (204, False), (500, False)])
+def test_refusals(status, expected):
+    assert refuses(status) is expected
+    assert not refuses(401)
