@@ -4,7 +4,6 @@ import json
 import re
 import signal
 import socket
-import time
 import urllib.request
 from pathlib import Path
 
@@ -183,18 +182,18 @@ def test_a_worker_that_is_killed_is_missed_and_named(toy, load):
         child for child in psutil.Process(process.pid).children(recursive=True) if "loadtests.worker" in child.cmdline()
     ]
     assert len(workers) == 2
-    time.sleep(0.5)
+    for _ in range(2):  # time for both to have reported
+        wait_for(process, "requests answered")
     workers[0].kill()
     run = finish()
     result = well_formed(run)
     lost = next(worker for worker in result["workers"] if worker["state"] == "lost")
     assert lost["pid"] == workers[0].pid
-    assert lost["requests"] > 0
-    assert lost["arrivals_lost"] > 0
+    assert 0 < lost["arrivals_lost"] <= 216
     kept = next(worker for worker in result["workers"] if worker["state"] == "finished")
     warmed = round(80 * 5.4)
     assert kept["requests"] == warmed // 2
-    assert kept["requests"] + lost["requests"] + lost["arrivals_lost"] == warmed
+    assert lost["requests"] + lost["arrivals_lost"] == warmed // 2, "nothing is lost without being missed"
     assert any("was lost" in note for note in result["notes"])
     assert run.code == 4
     assert any("accounted for" in reason for reason in result["invalid_because"])
