@@ -169,8 +169,6 @@ class Report:
             }
             lines.append(
                 f"Of {len(self.compared)} faults of REST, the plain Schemathesis command line caught {len(theirs)}, "
-                f"this suite {len(ours)}; of the good robot it reports {len(self.good)} findings, this suite none"
-                if not self.blamed
-                else f"Of {len(self.compared)} faults of REST, the plain Schemathesis command line caught {len(theirs)}"
+                f"this suite {len(ours)}; of the good robot it reports {len(self.good)} findings"
             )
         return "\n".join([*lines, *self.notes])
