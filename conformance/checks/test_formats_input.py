@@ -10,9 +10,8 @@ from conformance.http.calls import XML, Call, example_call, root_name
 from conformance.http.effects import reader_of, settles_at
 from conformance.http.formats import disagreements
 from conformance.http.representation import UnreadableError, flattened, local_name, parse_xml, read
-from conformance.http.targets import need
+from conformance.http.targets import calm, need
 from conformance.http.writing import xml_bytes
-from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -21,16 +20,15 @@ if TYPE_CHECKING:
     from conformance.target.exchange import Exchange
     from conformance.verdict.judge import Judge
 
-pytestmark = [pytest.mark.phase("input"), pytest.mark.motion, pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
 _ID = "rest-formats/xml-input"
 
 
 @pytest.mark.requirement("rest-formats/same-values", "rest-formats/xml-root")
 def test_formats_of_what_was_put(roaas: Session, judge: Judge) -> None:
     """A resource that is there only when something was put (a goal) has the same values in all formats as well."""
-    ids = ("rest-formats/same-values",)
-    for operation in need(roaas, ids, lambda item: item.method == "PUT" and bool(item.bodies), "puts something"):
-        bring_to_rest(roaas)
+    for operation in need(roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts something"):
+        calm(roaas)
         call = example_call(roaas, operation)
         reader = reader_of(roaas, call)
         if reader is None or _is_there(reader.send(roaas)):
@@ -60,7 +58,7 @@ def test_formats_of_what_was_put(roaas: Session, judge: Judge) -> None:
                 "a root named after the type",
                 found=f"the root element is {local_name(form)!r} and not {wanted!r}",
             )
-    bring_to_rest(roaas)
+    calm(roaas)
 
 
 def _is_there(exchange: Exchange) -> bool:
@@ -71,13 +69,13 @@ def _is_there(exchange: Exchange) -> bool:
 def test_xml_is_taken(roaas: Session, judge: Judge) -> None:
     """A valid value as XML is accepted, and has the effect that it has as JSON."""
     for operation in need(roaas, [_ID], lambda item: XML in item.bodies, "takes XML"):
-        bring_to_rest(roaas)
+        calm(roaas)
         call = example_call(roaas, operation, XML)
         plain = example_call(roaas, operation).send(roaas)
         if plain.response is None or not (plain.response.ok or plain.response.status == 409):
             judge.note(_ID, f"a valid {operation.id} as JSON is answered {plain.came}, so it was not tried as XML")
             continue
-        bring_to_rest(roaas)
+        calm(roaas)
         like = _sent_form(roaas, call)
         body = xml_bytes(call.value, root_name(operation.bodies[XML].schema) or "value", like)
         for accept in ("application/json", XML):
@@ -106,7 +104,7 @@ def test_xml_is_taken(roaas: Session, judge: Judge) -> None:
                     found=other,
                     cause=f"{operation.id} effect",
                 )
-    bring_to_rest(roaas)
+    calm(roaas)
 
 
 def _sent_form(session: Session, call: Call) -> etree._Element | None:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.http.calls import JSON, Call, example_call
-from conformance.http.targets import few, need
+from conformance.http.targets import calm, few, need
 from conformance.target.http import NoAnswerError
-from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -46,7 +45,7 @@ def _valid(session: Session, judge: Judge, ids: tuple[str, ...]) -> Iterator[Cal
     """A valid request for each operation that takes JSON and is answered as one should be."""
     tried = 0
     for operation in need(session, ids, _takes_json, "takes JSON"):
-        bring_to_rest(session)
+        calm(session)
         call = example_call(session, operation)
         exchange = call.send(session)
         if _accepted(exchange):
@@ -55,7 +54,7 @@ def _valid(session: Session, judge: Judge, ids: tuple[str, ...]) -> Iterator[Cal
         else:
             for id_ in ids:
                 judge.note(id_, f"a valid {operation.id} is answered {exchange.came}, so it was not tried")
-    bring_to_rest(session)
+    calm(session)
 
 
 @pytest.mark.requirement("http/unsupported-media-type")

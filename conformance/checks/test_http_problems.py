@@ -12,8 +12,7 @@ from conformance.http.mutations import mutations
 from conformance.http.operations import operations_of
 from conformance.http.refusals import judge_refusal
 from conformance.http.schemas import kind_of
-from conformance.http.targets import few, need, reads
-from conformance.target.stillness import bring_to_rest
+from conformance.http.targets import calm, few, need, reads
 
 if TYPE_CHECKING:
     from conformance.session import Session
@@ -52,12 +51,11 @@ def test_problem_of_a_query(roaas: Session, judge: Judge) -> None:
 
 
 @pytest.mark.phase("input")
-@pytest.mark.motion
 @pytest.mark.requirement(*_IDS, "strict-input/json-missing", "strict-input/json-type")
 def test_problem_of_a_body(roaas: Session) -> None:
     """A field that is missing or of another type is named in the problem."""
-    bring_to_rest(roaas)
-    for operation in need(roaas, _IDS[:2], lambda item: JSON in item.bodies, "takes JSON"):
+    calm(roaas)
+    for operation in need(roaas, (), lambda item: JSON in item.bodies, "takes JSON"):
         call = example_call(roaas, operation)
         made = [
             item
@@ -74,4 +72,4 @@ def test_problem_of_a_body(roaas: Session) -> None:
                 shown=item.shown,
                 malformed=item.malformed,
             )
-    bring_to_rest(roaas)
+    calm(roaas)

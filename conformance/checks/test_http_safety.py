@@ -10,8 +10,7 @@ import pytest
 from conformance.http.calls import JSON, Call, example_call
 from conformance.http.effects import reader_of, settles_at
 from conformance.http.stability import changed, changes_by_itself, leaves, snapshot
-from conformance.http.targets import few, need, reads
-from conformance.target.stillness import bring_to_rest
+from conformance.http.targets import calm, few, need, reads
 
 if TYPE_CHECKING:
     from conformance.session import Session
@@ -34,16 +33,15 @@ def test_reading_changes_nothing(roaas: Session, judge: Judge) -> None:
 
 
 @pytest.mark.phase("input")
-@pytest.mark.motion
 @pytest.mark.requirement("http/safe")
 def test_reading_changes_nothing_after_input(roaas: Session, judge: Judge) -> None:
     """The same when the robot has something to lose: a list that is not empty, a value that was set."""
-    bring_to_rest(roaas)
-    _judge_safe(roaas, judge)
+    if roaas.allow_motion:
+        calm(roaas)
+        _judge_safe(roaas, judge)
 
 
 @pytest.mark.phase("input")
-@pytest.mark.motion
 @pytest.mark.requirement("http/safe")
 def test_reading_leaves_what_was_put(roaas: Session, judge: Judge) -> None:
     """What a PUT has made (an active goal) is still there after HEAD and OPTIONS of everything.
@@ -52,8 +50,8 @@ def test_reading_leaves_what_was_put(roaas: Session, judge: Judge) -> None:
     """
     calls = [Call(call.operation, call.values) for call in reads(roaas)]
     others = few(roaas, calls, 1)
-    for operation in need(roaas, ["http/safe"], lambda item: item.method == "PUT" and bool(item.bodies), "puts"):
-        bring_to_rest(roaas)
+    for operation in need(roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts"):
+        calm(roaas)
         call = example_call(roaas, operation)
         reader = reader_of(roaas, call)
         if reader is None or _is_there(reader.send(roaas)):
@@ -71,7 +69,7 @@ def test_reading_leaves_what_was_put(roaas: Session, judge: Judge) -> None:
             "what was put still there after HEAD and OPTIONS",
             found=f"{operation.template} is answered {exchange.came} after HEAD and OPTIONS, and 200 before",
         )
-    bring_to_rest(roaas)
+    calm(roaas)
 
 
 def _put_and_watch(
@@ -82,7 +80,7 @@ def _put_and_watch(
     Returns:
         Whether it does, the last reading, and how long all of it took, s.
     """
-    bring_to_rest(session)
+    calm(session)
     call.send(session)
     started = time.monotonic()
     exchange = reader.send(session)
@@ -136,18 +134,17 @@ def _judge_safe(session: Session, judge: Judge) -> None:
 
 
 @pytest.mark.phase("input")
-@pytest.mark.motion
 @pytest.mark.requirement("http/put-idempotent")
 def test_put_twice(roaas: Session, judge: Judge) -> None:
     """The same PUT twice succeeds twice, and leaves the resource as PUT once does."""
     wanted = need(roaas, ["http/put-idempotent"], lambda item: item.method == "PUT", "is a PUT")
     for operation in wanted:
-        bring_to_rest(roaas)
+        calm(roaas)
         call = example_call(roaas, operation)
         first, once, second = _pair(roaas, call)
         if second.response is not None and second.response.status == 409:
             # A goal of the robot's own may have begun in between: once more from the start.
-            bring_to_rest(roaas)
+            calm(roaas)
             first, once, second = _pair(roaas, call)
         if not _accepted(judge, "http/put-idempotent", operation.id, first):
             continue
@@ -163,7 +160,7 @@ def test_put_twice(roaas: Session, judge: Judge) -> None:
         )
         # What a single PUT reaches is judged elsewhere; here, that two do not add up.
         if fine and once:
-            bring_to_rest(roaas)
+            calm(roaas)
             call.send(roaas)
             judge.that(
                 "http/put-idempotent",
@@ -173,7 +170,7 @@ def test_put_twice(roaas: Session, judge: Judge) -> None:
                 found=f"after the second {operation.id}, {once}",
                 cause=f"{operation.id} effect",
             )
-    bring_to_rest(roaas)
+    calm(roaas)
 
 
 def _pair(session: Session, call: Call) -> tuple[Exchange, str | None, Exchange]:
@@ -193,7 +190,6 @@ def _accepted(judge: Judge, requirement: str, id_: str, exchange: Exchange) -> b
 
 
 @pytest.mark.phase("input")
-@pytest.mark.motion
 @pytest.mark.requirement("http/delete-idempotent")
 def test_delete_twice(roaas: Session, judge: Judge) -> None:
     """After one DELETE another one is answered 2xx or 404, and the resource stays as it is."""
@@ -201,7 +197,7 @@ def test_delete_twice(roaas: Session, judge: Judge) -> None:
     by_path = {call.operation.template: call for call in reads(roaas)}
     for operation in wanted:
         for attempt in (1, 2):
-            bring_to_rest(roaas)
+            calm(roaas)
             call = example_call(roaas, operation)
             call.send(roaas)
             read = by_path.get(operation.template)

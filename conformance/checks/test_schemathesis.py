@@ -13,9 +13,8 @@ from hypothesis.errors import Unsatisfiable
 
 from conformance.http.harmless import Harmless
 from conformance.http.refusals import judge_refusal
-from conformance.http.targets import allowed, few, is_slow, sampled
+from conformance.http.targets import allowed, calm, few, is_slow, sampled
 from conformance.http.validity import INVALID, VALID, validity
-from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
     from conformance.explore import Explorer
@@ -81,15 +80,14 @@ def test_reading_operations(roaas: Session, judge: Judge, explore: Explorer) -> 
 
 
 @pytest.mark.phase("input")
-@pytest.mark.motion
 @pytest.mark.requirement(*_IDS, *_STRICT)
 def test_moving_operations(roaas: Session, judge: Judge, explore: Explorer) -> None:
     """What may move the robot: invalid requests, and a few valid ones made fit for it."""
     harmless = Harmless(roaas)
-    bring_to_rest(roaas)
+    calm(roaas)
     for target in _targets(roaas, moving=True):
         _run(roaas, judge, explore, harmless, target)
-        bring_to_rest(roaas)
+        calm(roaas)
 
 
 def _run(session: Session, judge: Judge, explore: Explorer, harmless: Harmless, target: Target) -> None:
@@ -144,7 +142,6 @@ def _judge_made(session: Session, judge: Judge, harmless: Harmless, item: Made) 
 
 
 @pytest.mark.phase("input")
-@pytest.mark.motion
 @pytest.mark.requirement("http/no-server-error")
 def test_walk_along_the_links(roaas: Session, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
     """A few short walks from operation to operation, as the contract's links lead."""
@@ -173,6 +170,6 @@ def test_walk_along_the_links(roaas: Session, rest: HttpClient, judge: Judge, ex
         def validate_response(self, *_: Any, **__: Any) -> None:
             """The observers have judged it."""
 
-    bring_to_rest(roaas)
+    calm(roaas)
     explore.machine(Walk, cases=4, steps=5)
-    bring_to_rest(roaas)
+    calm(roaas)

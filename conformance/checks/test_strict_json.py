@@ -10,8 +10,7 @@ import pytest
 from conformance.http.calls import JSON, example_call
 from conformance.http.mutations import Mutation, mutations
 from conformance.http.refusals import judge_refusal
-from conformance.http.targets import few, need, sampled
-from conformance.target.stillness import bring_to_rest
+from conformance.http.targets import calm, few, need, sampled
 
 if TYPE_CHECKING:
     from conformance.effort import Effort
@@ -48,7 +47,7 @@ def test_mutations_are_refused(roaas: Session, judge: Judge, effort: Effort) -> 
     """Each named mutation of a valid body is refused with 4xx, and the next valid one is taken as before."""
     tried = dict.fromkeys(_NAMES, 0)
     for operation in need(roaas, (*_IDS, *_STATUSES), lambda item: JSON in item.bodies, "takes JSON"):
-        bring_to_rest(roaas)
+        calm(roaas)
         call = example_call(roaas, operation)
         first = call.send(roaas)
         if not _accepted(first.response.status if first.response else 0):
@@ -58,7 +57,7 @@ def test_mutations_are_refused(roaas: Session, judge: Judge, effort: Effort) -> 
             for item in few(roaas, sampled(roaas, made, _count(effort, name), f"{operation.id} {name}"), 1):
                 tried[name] += 1
                 _try(roaas, judge, call, item)
-        bring_to_rest(roaas)
+        calm(roaas)
         again = call.send(roaas)
         judge.that(
             "http/no-server-error",
@@ -67,7 +66,7 @@ def test_mutations_are_refused(roaas: Session, judge: Judge, effort: Effort) -> 
             f"a valid {operation.id} taken after all that was refused",
             found=again.came,
         )
-    bring_to_rest(roaas)
+    calm(roaas)
     for name, count in tried.items():
         if not count and any(tried.values()):
             judge.unclaimed(f"strict-input/{name}", "no body of the contract can be wrong in this way")
@@ -110,4 +109,4 @@ def _try(session: Session, judge: Judge, call: Call, item: Mutation) -> None:
         closing=item.requirement == "json-depth",
     )
     if not refused:
-        bring_to_rest(session)
+        calm(session)

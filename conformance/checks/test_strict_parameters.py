@@ -10,8 +10,7 @@ import pytest
 from conformance.http.calls import Call, example_call
 from conformance.http.parameters import Wrong, wrong_texts
 from conformance.http.refusals import judge_refusal
-from conformance.http.targets import few, is_slow, need, readable, sampled
-from conformance.target.stillness import bring_to_rest
+from conformance.http.targets import calm, few, is_slow, need, readable, sampled
 
 if TYPE_CHECKING:
     from conformance.http.operations import Operation
@@ -82,7 +81,7 @@ def test_path_parameters(roaas: Session, judge: Judge) -> None:
                 continue  # two slashes in a row are another path, which servers may shorten
             _try(roaas, call, item, _PATH)
         if operation.motion:
-            bring_to_rest(roaas)
+            calm(roaas)
 
 
 def _valid_call(session: Session, operation: Operation) -> Call:
@@ -123,4 +122,4 @@ def _try(session: Session, call: Call, item: Wrong, requirement: str) -> None:
         json=False,
     )
     if not refused and call.operation.motion:
-        bring_to_rest(session)
+        calm(session)

@@ -9,9 +9,8 @@ import pytest
 
 from conformance.http.calls import XML, example_call, root_name
 from conformance.http.refusals import judge_refusal
-from conformance.http.targets import few, need, sampled
+from conformance.http.targets import calm, few, need, sampled
 from conformance.http.xml_mutations import xml_mutations
-from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
     from conformance.session import Session
@@ -28,7 +27,7 @@ def test_xml_mutations_are_refused(roaas: Session, judge: Judge) -> None:
     taken = 0
     operations = need(roaas, [_ID], lambda item: XML in item.bodies, "takes XML")
     for operation in operations:
-        bring_to_rest(roaas)
+        calm(roaas)
         call = example_call(roaas, operation, XML)
         exchange = call.send(roaas)
         answer = exchange.response
@@ -41,7 +40,7 @@ def test_xml_mutations_are_refused(roaas: Session, judge: Judge) -> None:
         for name, body in few(roaas, sampled(roaas, made, _EACH, operation.id), 3):
             wrong = call.carrying(body)
             if not judge_refusal(roaas, partial(wrong.send, roaas), _ID, name, json=False):
-                bring_to_rest(roaas)
-    bring_to_rest(roaas)
+                calm(roaas)
+    calm(roaas)
     if not taken and "rest-formats" not in roaas.claims:
         judge.unclaimed(_ID, "the robot takes no XML")

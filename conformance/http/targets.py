@@ -6,11 +6,10 @@ import random
 import zlib
 from typing import TYPE_CHECKING, TypeVar
 
-import pytest
-
 from conformance.http.calls import Call, example_call
 from conformance.http.operations import operations_of
 from conformance.http.schemas import kind_of
+from conformance.target.stillness import bring_to_rest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -79,23 +78,29 @@ def allowed(session: Session, operation: Operation) -> bool:
 def need(session: Session, ids: Sequence[str], wanted: Callable[[Operation], bool], what: str) -> list[Operation]:
     """The operations that a check is about.
 
-    Where the contract has none, its requirements do not apply; where none may be sent, the check is skipped.
+    Where the contract has none, its requirements do not apply; where none may be sent, they are skipped. Requirements
+    that other checks judge as well are left as they are.
 
     Args:
         session: the run.
-        ids: of the requirements.
+        ids: of the requirements that depend on it.
         wanted: picks the operations.
         what: says what they are: "takes JSON".
     """
     found = [item for item in operations_of(session.contract) if wanted(item)]
-    if not found:
-        for id_ in ids:
-            session.judge.unclaimed(id_, f"the contract has no operation that {what}")
-        pytest.skip(f"the contract has no operation that {what}")
     usable = [item for item in found if allowed(session, item)]
-    if not usable:
-        pytest.skip(NO_MOTION)
+    for id_ in ids if not usable else ():
+        if found:
+            session.judge.skip(id_, NO_MOTION)
+        else:
+            session.judge.unclaimed(id_, f"the contract has no operation that {what}")
     return usable
+
+
+def calm(session: Session) -> None:
+    """Bring the robot to rest, where it may have been moved."""
+    if session.allow_motion:
+        bring_to_rest(session)
 
 
 def is_slow(session: Session) -> bool:
