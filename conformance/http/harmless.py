@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from conformance.http.calls import JSON, example_call
 from conformance.http.jsontext import read_json
 from conformance.http.targets import allowed
-from conformance.http.validity import VALID, Validity, validity
+from conformance.http.validity import INVALID, VALID, Validity, validity
 from conformance.http.writing import json_text
 
 if TYPE_CHECKING:
@@ -46,7 +46,10 @@ class Harmless:
             return item
         if said.verdict == VALID:
             return self._fitted(item, operation)
-        return self._slow(item) if self._session.contract.own else item
+        if not self._session.contract.own:
+            return item
+        # What may be taken with whatever values are in it is not sent to a robot; what must be refused is sent slow.
+        return self._slow(item) if said.verdict == INVALID else None
 
     def sent(self, item: Made, *, accepted: bool) -> None:
         """Count what was accepted."""
@@ -84,4 +87,6 @@ def _slowed(value: Any) -> Any:
         return [_slowed(item) for item in value]
     if isinstance(value, float) and abs(value) > _SLOW:
         return _SLOW
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 1:
+        return 1
     return value

@@ -114,3 +114,13 @@ def test_schemathesis_makes_the_same_requests_again(session):
 def test_refusals(status, expected):
     assert refuses(status) is expected
     assert not refuses(401)
+
+
+def test_what_a_robot_might_take_of_random_requests_is_slow_or_not_sent():
+    harmless = Harmless(Session(allow_motion=True))
+    wild = Made("PUT", "/robot/velocity/", "application/json", b'{"linear": {"x": 900.5, "y": -7, "z": true}}')
+    assert harmless.made(wild).body == b'{"linear": {"x": 0.1, "y": 1, "z": true}}'
+    vector = b"<Vector3><x>0.6</x><y>0</y><z>0</z></Vector3>"
+    assert harmless.made(Made("PUT", "/robot/velocity/linear/", "application/xml", vector)) is None
+    assert harmless.made(Made("PUT", "/robot/velocity/", "text/plain", wild.body)) is None
+    assert harmless.made(Made("GET", "/robot/pose/", "", b"")) is not None
