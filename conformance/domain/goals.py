@@ -9,7 +9,7 @@ import pytest
 
 from conformance.domain.geometry import Pose
 from conformance.domain.goal import await_none, goal_body, put_goal
-from conformance.domain.plan import ask, reachable
+from conformance.domain.plan import EXACT, ask, reachable
 
 if TYPE_CHECKING:
     from conformance.domain.robot import Robot
@@ -47,7 +47,7 @@ def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | No
     x, y = (one + share * (other - one) for one, other in zip(here[:2], goal[:2], strict=True))
     pose = Pose(x, y, goal.yaw)
     _, plan, _ = ask(robot, pose)
-    return pose if plan is not None else None
+    return pose if plan is not None and plan.poses[-1].distance(pose) < EXACT else None
 
 
 def _turned(goal: Pose, part: int) -> Pose:

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
 # A way so much longer than the distance goes around something: not what a short drive is for.
 _DETOUR: Final = 1.3
-_EXACT: Final = 0.005
+# Where a plan ends at the pose itself, and not only within its tolerance, m.
+EXACT: Final = 0.005
 # How far from the robot, or from the given start, a path may begin: a planner's grid is not finer, m.
 START_OFF: Final = 0.25
 
@@ -104,7 +105,7 @@ def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list
             _, plan, _ = ask(robot, goal)
             if plan is not None:
                 # A plan may end beside a goal that is too near to something, within its tolerance; a goal may not.
-                exact = plan.poses[-1].distance(goal) < _EXACT
+                exact = plan.poses[-1].distance(goal) < EXACT
                 plain = exact and plan.length <= _DETOUR * here.distance(goal) + 0.1
                 (found if plain else round_about).append(goal)
     # Where no way is plain, any way will do: what is odd about the plans is for others to judge.
