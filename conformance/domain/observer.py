@@ -48,7 +48,9 @@ class Observer:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        base = session.rest.base_url if session.rest else ""
+        rest = session.rest
+        # As HttpClient writes the URLs of its requests.
+        base = f"{rest.scheme}://{rest.authority}{rest.prefix}" if rest else ""
         self._readings = {base + path: (path, *reading) for path, reading in _READINGS.items()}
         self._last_stamp: tuple[int, int] | None = None
         self._last_received = 0.0
