@@ -159,8 +159,10 @@ class Stream:
             return Ask(side, raw=head + b"\r\n\r\n" + self._all())
         method, target, version = line.decode("latin-1").split(" ")
         ask = Ask(side, method, target, version, _fields(rest))
-        length = ask.field("Content-Length")
-        if len(ask.fields) < len([one for one in rest if one]) or (length is not None and not length.isdigit()):
+        lengths = {value for key, value in ask.fields if key.lower() == "content-length"}
+        # Where a message ends is not clear: the robot is to say so, and at once.
+        unclear = len(lengths) > 1 or not all(length.isdigit() for length in lengths)
+        if len(ask.fields) < len([one for one in rest if one]) or unclear:
             return Ask(side, raw=head + b"\r\n\r\n" + self._all())
         if (ask.field("Expect") or "").lower() == "100-continue":
             self.sock.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")

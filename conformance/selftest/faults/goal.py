@@ -129,10 +129,10 @@ def _beside(ask: Ask, forward: Forward) -> Answer:
         return forward(ask)
     if _PUT(ask):
         ask = ask.copy()
-        inputs(_guarded(_shift(0.4)))(ask)
+        inputs(_guarded(_shift(0.8)))(ask)
     answer = forward(ask)
     if success(answer):
-        values(_guarded(_shift(-0.4)))(answer)
+        values(_guarded(_shift(-0.8)))(answer)
     return answer
 
 
@@ -255,7 +255,7 @@ FAULTS = (
     _fault("goal-abandoned", "The robot gives up on its way.", "goal-drives", remembering(Abandoned)),
     _fault(
         "goal-beside",
-        "The robot stops 40 cm beside the goal, and shows the goal that it was given.",
+        "The robot stops 80 cm beside the goal, and shows the goal that it was given.",
         "goal-drives",
         lambda: _beside,
     ),

@@ -88,10 +88,13 @@ def _hosts(count: int) -> Callable[[Ask, Forward], Answer]:
 
 
 def _first_length(ask: Ask, forward: Forward) -> Answer:
-    """Of several Content-Length fields the first one counts."""
-    if ask.raw is None and sum(name.lower() == "content-length" for name, _ in ask.fields) > 1:
-        ask = ask.copy()
-        ask.put("Content-Length", str(len(ask.body)))
+    """Of several Content-Length fields the first one counts, for what there is."""
+    if ask.side == "rest" and ask.raw is not None and ask.raw.lower().count(b"content-length:") > 1:
+        head, _, body = ask.raw.partition(b"\r\n\r\n")
+        line, *fields = head.split(b"\r\n")
+        kept = [field for field in fields if not field.lower().startswith(b"content-length:")]
+        kept += [b"Content-Length: %d" % len(body), b"Connection: close"]
+        return forward(ask.copy(raw=b"\r\n".join([line, *kept, b"", b""]) + body))
     return forward(ask)
 
 

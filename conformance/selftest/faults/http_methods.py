@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 from conformance.selftest.faults.changing import (
@@ -84,19 +83,6 @@ def _missing_slash(ask: Ask) -> bool:
     return ask.side == "rest" and not ask.path.endswith("/") and f"{ask.path}/" in RESOURCES
 
 
-class _Meddling:
-    """HEAD of the sensors sets the robot in motion."""
-
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        answer = forward(ask)
-        if _HEAD(ask) and ask.path == SENSORS:
-            vector = {"x": 0.0, "y": 0.0, "z": 0.0}
-            twist = json.dumps({"linear": {**vector, "x": 0.15}, "angular": vector}).encode()
-            fields = [("Host", "robot"), ("Content-Type", JSON)]
-            forward(ask.copy(method="PUT", target=VELOCITY, body=twist).copy(fields=fields))
-        return answer
-
-
 def _cancelling(ask: Ask, forward: Forward) -> Answer:
     """HEAD and OPTIONS of the goal cancel it."""
     answer = forward(ask)
@@ -119,7 +105,7 @@ class _SecondTime:
         if ask.method == self._method and now == before:
             return self._answer(ask)
         answer = forward(ask)
-        self._last = now if success(answer) else None
+        self._last = now if success(answer) or answer.status == 404 else None
         return answer
 
 
@@ -263,7 +249,6 @@ FAULTS = (
         "charset",
         instead(_charset, problem(415, "Content-Type: parameters are not taken")),
     ),
-    _fault("http-unsafe-sensors", "HEAD of the sensors moves the robot.", "safe", remembering(_Meddling)),
     _fault("http-unsafe-head", "HEAD and OPTIONS of the goal cancel it.", "safe", lambda: _cancelling),
     _fault(
         "http-put-once",
