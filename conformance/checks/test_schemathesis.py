@@ -99,7 +99,7 @@ def _run(session: Session, judge: Judge, explore: Explorer, harmless: Harmless, 
         if session.effort.name == "quick"
         else sampled(session, list(target.coverage()), _COVERAGE, f"coverage {target.label}")
     )
-    for item in [*target.examples(), *few(session, coverage, 2)]:
+    for item in few(session, [*target.examples(), *coverage], 1):
         _judge_made(session, judge, harmless, item)
 
     def fuzz(item: Made | None) -> None:

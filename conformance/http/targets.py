@@ -94,7 +94,7 @@ def need(session: Session, ids: Sequence[str], wanted: Callable[[Operation], boo
             session.judge.skip(id_, NO_MOTION)
         else:
             session.judge.unclaimed(id_, f"the contract has no operation that {what}")
-    return usable
+    return few(session, usable, 2)
 
 
 def calm(session: Session) -> None:
