@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 # A robot that comes no nearer for so long does not drive, s; and how long one that does is waited for, by effort.
 _NO_PROGRESS_S: Final = 5.0
+# A robot may take a goal for reached a quarter of a metre before it (Nav2 does, unless told otherwise), m.
+_REACHED_M: Final = 0.3
 _LONGEST_S: Final = {"quick": 12.0}
 _LONGEST_DEFAULT_S: Final = 30.0
 
@@ -93,14 +95,13 @@ def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: f
             break
     drive.judge_motion()
     left = here.distance(there)
-    # A robot may take a goal for reached a quarter of a metre before it.
     moved = 0.15 if start.distance(there) > 0.5 else 0.0
     ended = goal is None
-    if not ended and left > 0.35 and now <= progress + _NO_PROGRESS_S:
+    if not ended and left > _REACHED_M and now <= progress + _NO_PROGRESS_S:
         return False  # slow, but on its way: nothing to be said against it
     drove = judge.that(
         "rest-resources/goal-drives",
-        left < 0.4 and start.distance(here) > moved,
+        left < _REACHED_M and start.distance(here) > moved,
         exchange,
         f"the robot at ({there.x:.2f}, {there.y:.2f}), where its goal was",
         found=f"it is {left:.2f} m away, having moved {start.distance(here):.2f} m",
