@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -112,9 +111,11 @@ class Target:
         return strategy.map(made)
 
 
-@lru_cache(maxsize=2)
 def targets(contract: Contract) -> tuple[Target, ...]:
-    """The operations of a contract; those that Schemathesis cannot read are left out."""
+    """The operations of a contract; those that Schemathesis cannot read are left out.
+
+    Read anew each time: Schemathesis keeps in its schema which cases it has made, and makes some only once.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         schema = schemathesis.openapi.from_dict(contract.openapi)
