@@ -47,7 +47,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "needs(*interfaces): rest, publishers, subscribers")
     given = config.pluginmanager.get_plugin("roaas-session")
     if given is not None:
-        config.stash[SESSION] = given.session  # type: ignore[attr-defined] # certification.py's own holder
+        config.stash[SESSION] = given.session
 
 
 def ids_of(item: pytest.Item) -> tuple[str, ...]:
