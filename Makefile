@@ -64,7 +64,7 @@ selftest: install
 	$(BIN)/roaas selftest --out $(OUT)/selftest
 
 coverage-page: install
-	$(BIN)/roaas contract coverage > docs/coverage.md
+	$(BIN)/roaas contract coverage --out docs/coverage.md
 
 bench: install
 	$(BIN)/python benchmarks/robot.py
