@@ -102,6 +102,7 @@ def _try(case: Case, effort: str, domain: int) -> Acquittal:
             effort=effort,
             seed=case.seed,
             timeout_s=_TIMEOUT_S,
+            domain_id=robot.domain_id,
         )
         if case.variant is None:
             return Acquittal(case.robot, "", case.seed, judge(job))

@@ -8,6 +8,7 @@ import re
 import selectors
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 _HERE = Path(__file__).parent
 _READY = re.compile(r"ready rest=(\S+) soap=(\S+)")
 _START_S, _STOP_S = 40.0, 10.0
+# Ids up to 101 leave DDS's ports below Linux's ephemeral range.
+_DOMAINS = 102
 STRANGERS = ("plain", "baroque", "legacy")
 REFERENCE = "reference"
 
@@ -69,12 +72,43 @@ def running(kind: str, domain_id: int) -> Iterator[Robot]:
 
     Args:
         kind: "reference" or a stranger's name.
-        domain_id: ROS domain of the reference robot.
+        domain_id: first ROS domain to try for the reference robot.
 
     Raises:
         RobotError: it does not start.
     """
     check_available(kind)
+    if kind == REFERENCE:
+        with _own_domain(domain_id) as own, _started(kind, own) as robot:
+            yield robot
+    else:
+        with _started(kind, domain_id) as robot:
+            yield robot
+
+
+@contextlib.contextmanager
+def _own_domain(first: int) -> Iterator[int]:
+    """A ROS domain that no other run on this machine holds, from ``first`` on.
+
+    Raises:
+        RobotError: all are taken.
+    """
+    # Only where there is ROS, and so never on Windows, which lacks it.
+    import fcntl  # noqa: PLC0415
+
+    for domain in range(first, _DOMAINS):
+        with Path(tempfile.gettempdir(), f"roaas-domain-{domain}.lock").open("w", encoding="utf-8") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            yield domain
+            return
+    raise RobotError(f"all ROS domains from {first} to {_DOMAINS - 1} are taken; --domain-id names another first one")
+
+
+@contextlib.contextmanager
+def _started(kind: str, domain_id: int) -> Iterator[Robot]:
     ports = ["--rest-port", "0", "--soap-port", "0"]
     if kind == REFERENCE:
         command = [sys.executable, "-m", "roaas", "robot", *ports, "--domain-id", str(domain_id)]

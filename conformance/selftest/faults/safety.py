@@ -54,7 +54,7 @@ class _Relentless:
         self._turn = 0
 
     def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        if _PUTS(ask) or rest("PUT", GOAL)(ask):
+        if _PUT(ask) or rest("PUT", GOAL)(ask):
             self._turn += 1
         answer = forward(ask)
         if _PUT(ask) and success(answer) and moving(ask):
