@@ -196,7 +196,7 @@ def _simple(value: Any, type_: str, path: str) -> Any:
             raise RefusedError(422, f"{path}: {value!r} is not finite")
         return number
     low, high = (-_INT32, _INT32) if type_ == "int32" else (0, 2 * _INT32)
-    if value != int(value) or not low <= value < high:
+    if not low <= value < high or value != int(value):
         raise wrong
     return int(value)
 
