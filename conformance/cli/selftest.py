@@ -143,7 +143,7 @@ def _acquit(report: Report, options: dict[str, Any], teller: _Teller) -> None:
     cases: list[Case] = []
     if options["variants"]:
         # The slow one first, so that it does not keep all others waiting in the end.
-        cases += [Case("baroque", variant, 0) for variant in VARIANTS]
+        cases += [Case(variant.robot, variant, 0) for variant in VARIANTS]
     cases += [Case(kind, None, seed) for seed in range(options["seeds"]) for kind in kinds]
     teller.total = len(cases)
     report.acquittals = acquit(

@@ -35,6 +35,7 @@ class Variant:
 
     Attributes:
         name: its name; says: what it is, in a few words.
+        robot: the good robot in it.
         make: makes the change.
         host: where the proxy listens; prefix: its path; tls: whether it speaks TLS.
         token: bearer token to send.
@@ -49,6 +50,7 @@ class Variant:
     tls: bool = False
     token: str = ""
     endpoints: dict[str, Any] = field(default_factory=dict)
+    robot: str = "baroque"
 
 
 class CertificateError(Exception):
@@ -127,7 +129,8 @@ class _Ceiling:
 
 
 VARIANTS = (
-    Variant("slow", "every answer takes 300 ms more", lambda: _slow),
+    # Whose velocities hold long enough to be read at such a pace.
+    Variant("slow", "every answer takes 300 ms more", lambda: _slow, robot="plain"),
     Variant("prefix", f"everything is under {_PREFIX}", lambda: _prefixed, prefix=_PREFIX),
     Variant("close", "HTTP/1.0, and every connection is closed", lambda: _closing),
     Variant("tls", "HTTPS with a certificate of the robot's own", tls=True),
