@@ -12,7 +12,7 @@ import json
 import sys
 from typing import Any, Final
 
-_DISCOVERY_S: Final = 5.0
+_DISCOVERY_S: Final = 10.0
 
 
 def main() -> int:
