@@ -1,4 +1,4 @@
-"""What goes along with every check: the observers, which judge each exchange whoever has it."""
+"""What goes along with every check: the observers, which judge each exchange whoever has it, and the ROS probe."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.http.observers import watch
+from conformance.probe.client import start_probe
 
 if TYPE_CHECKING:
     from conformance.session import Session
@@ -16,3 +17,9 @@ if TYPE_CHECKING:
 def _watched(roaas: Session) -> None:
     """Have every exchange over REST judged from the first check on."""
     watch(roaas)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _probed(roaas: Session) -> None:
+    """Start the ROS probe before it is needed."""
+    start_probe(roaas)

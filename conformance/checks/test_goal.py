@@ -203,7 +203,7 @@ def _await_motion(robot: Robot) -> None:
 
 def _stays(robot: Robot, judge: Judge) -> None:
     """No motion and no goal come back."""
-    until = time.monotonic() + _STAYS_S
+    until = time.monotonic() + _STAYS_S * robot.watchfulness
     while time.monotonic() < until:
         velocity, exchange = robot.velocity()
         goal, shown = robot.goal()

@@ -52,7 +52,7 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, roaas: Session) ->
     here = robot.map_pose()
     if here is None:
         pytest.skip("the robot's pose cannot be read")
-    (there,) = choose_goals(robot, 0.6 if robot.watchfulness == 1 else 0.55, 1)
+    (there,) = choose_goals(robot, 0.6 if robot.watchfulness == 1 else 0.4, 1)
     body = goal_body(there, robot.statement.motion.frame, "reached")
     exchange = put_goal(robot, body)
     status = exchange.response.status if exchange.response else 0
@@ -95,7 +95,7 @@ def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: f
             break
     drive.judge_motion()
     left = here.distance(there)
-    moved = 0.15 if start.distance(there) > 0.5 else 0.0
+    moved = 0.15 if start.distance(there) > 0.35 else 0.0
     ended = goal is None
     if not ended and left > _REACHED_M and now <= progress + _NO_PROGRESS_S:
         return False  # slow, but on its way: nothing to be said against it

@@ -31,13 +31,13 @@ class ProbeError(Exception):
 
 
 class Probe:
-    """A running probe.
+    """A probe that has been started; await_robot() before anything else.
 
     Args:
         ros: the robot's ROS side.
 
     Raises:
-        ProbeError: it does not start, for want of ROS or of the message package, or sees no robot.
+        ProbeError: no process can be started.
     """
 
     def __init__(self, ros: Ros) -> None:
@@ -63,6 +63,14 @@ class Probe:
         self._lines: queue.Queue[str] = queue.Queue(_LINES_KEPT)
         threading.Thread(target=self._listen, daemon=True, name="probe").start()
         atexit.register(self.close)
+        self.nodes = 0
+
+    def await_robot(self) -> None:
+        """Wait until the probe sees the robot.
+
+        Raises:
+            ProbeError: it does not start, for want of ROS or of the message package, or sees no robot.
+        """
         try:
             self.nodes = int(self._answer(_START_S)["nodes"])
         except ProbeError:
@@ -128,8 +136,19 @@ class Probe:
         return answer
 
 
-# One probe for each run, started when it is first asked for: by the session's identity, which is kept with it.
+# One probe for each run, by the session's identity, which is kept with it; and why it cannot be used, once that is known.
 _PROBES: dict[int, tuple[Session, Probe | ProbeError]] = {}
+_SEEING: set[int] = set()
+
+
+def start_probe(session: Session) -> None:
+    """Start the run's probe, where a domain is given, without waiting for it: finding a robot may take seconds."""
+    if session.statement.ros.domain_id is None or id(session) in _PROBES:
+        return
+    try:
+        _PROBES[id(session)] = (session, Probe(session.statement.ros))
+    except ProbeError as error:
+        _PROBES[id(session)] = (session, error)
 
 
 def probe_of(session: Session) -> Probe:
@@ -140,13 +159,15 @@ def probe_of(session: Session) -> Probe:
     """
     if session.statement.ros.domain_id is None:
         raise ProbeError("no ROS domain is given (--ros-domain-id)")
-    known = _PROBES.get(id(session))
-    if known is None:
+    start_probe(session)
+    _, probe = _PROBES[id(session)]
+    if isinstance(probe, ProbeError):
+        raise probe
+    if id(session) not in _SEEING:
         try:
-            known = (session, Probe(session.statement.ros))
+            probe.await_robot()
         except ProbeError as error:
-            known = (session, error)
-        _PROBES[id(session)] = known
-    if isinstance(known[1], ProbeError):
-        raise known[1]
-    return known[1]
+            _PROBES[id(session)] = (session, error)
+            raise
+        _SEEING.add(id(session))
+    return probe

@@ -37,7 +37,7 @@ def probe(roaas: Session) -> Probe:
         pytest.skip(str(error))
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("motion")
 @pytest.mark.requirement("equivalence/sensors-graph")
 def test_sensors_are_on_the_graph(roaas: Session, probe: Probe, judge: Judge) -> None:
     """Every entry is a topic that is published, with its type; and no plain sensor is left out."""
