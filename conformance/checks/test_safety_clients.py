@@ -50,7 +50,7 @@ def test_client_vanished(roaas: Session, rest: HttpClient, judge: Judge) -> None
         partial = PartialRequest(rest, "PUT", path, sent=sent, promised=promised)
         time.sleep(_READ_S)
         partial.vanish(reset=reset)
-        until = time.monotonic() + _WATCH_S / 5 * robot.watchfulness
+        until = time.monotonic() + _WATCH_S / 5 * robot.watchfulness**2
         while True:
             velocity, exchange = drive.look()
             moves = velocity is not None and not robot.near(velocity, STILL, 2)

@@ -136,7 +136,7 @@ class Probe:
         return answer
 
 
-# One probe for each run, by the session's identity, which is kept with it; and why it cannot be used, once that is known.
+# One probe for each run, by the identity of its session, which is kept with it; or why it cannot be used.
 _PROBES: dict[int, tuple[Session, Probe | ProbeError]] = {}
 _SEEING: set[int] = set()
 
