@@ -67,8 +67,9 @@ def test_pose(roaas: Session, judge: Judge, effort: Effort) -> None:
 )
 def test_velocity_and_odometry(roaas: Session, effort: Effort) -> None:
     """Velocity, its linear part and the odometry agree; observer and drive judge each reading."""
-    drive = Drive(Robot(roaas))
-    until = time.monotonic() + 0.4
+    robot = Robot(roaas)
+    drive = Drive(robot)
+    until = time.monotonic() + 0.4 * robot.watchfulness
     readings = 0
     # Two readings agree where the odometry has been steady for a while: so look for that long at least.
     while readings < effort.cases(60) or time.monotonic() < until:
