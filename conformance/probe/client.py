@@ -46,7 +46,9 @@ class Probe:
         # A robot that only looks on its own machine hears no multicast: without a word to it directly, the probe would
         # wait seconds for its next announcement. Robots elsewhere are found as ever.
         peers = ";".join(filter(None, [os.environ.get("ROS_STATIC_PEERS"), "127.0.0.1"]))
-        environment = os.environ | {"ROS_DOMAIN_ID": str(ros.domain_id), "ROS_STATIC_PEERS": peers}
+        # Shared memory that killed processes left behind, or that a container does not share, swallows messages.
+        environment = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"} | os.environ
+        environment |= {"ROS_DOMAIN_ID": str(ros.domain_id), "ROS_STATIC_PEERS": peers}
         try:
             # In a session of its own: Ctrl-C is for the suite, which then ends the probe.
             self._process = subprocess.Popen(  # noqa: S603 - our own program

@@ -48,7 +48,8 @@ class ProbeNode:
         """Wait for the robot's publishers, then listen.
 
         Returns:
-            How many nodes there are beside this one; with none, the domain is not the robot's.
+            How many nodes and publishers there are beside this one; with none, the domain is not the robot's. Publishers
+            count as well, because they may be known before the names of their nodes are.
         """
         topics = (self._delivery_topic, self._cmd_vel_topic)
         until = time.monotonic() + seconds
@@ -57,7 +58,8 @@ class ProbeNode:
         self._listen()
         # A subscription is of use when both ends know of it.
         time.sleep(4 * _STEP_S)
-        return sum(name != _NAME for name in self._node.get_node_names())
+        nodes = sum(name != _NAME for name in self._node.get_node_names())
+        return nodes + sum(self._node.count_publishers(topic) for topic in topics)
 
     def deliveries(self) -> dict[str, Any]:
         """What came on the delivery topic since this was asked last."""
