@@ -48,7 +48,7 @@ class ProbeNode:
         """Wait for the robot's publishers, then listen.
 
         Returns:
-            How many nodes and publishers there are beside this one; with none, the domain is not the robot's. Publishers
+            How many nodes and publishers there are; with none, the domain is not the robot's. Publishers
             count as well, because they may be known before the names of their nodes are.
         """
         topics = (self._delivery_topic, self._cmd_vel_topic)
