@@ -9,7 +9,7 @@ from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
-from rclpy.qos import QoSProfile
+from rclpy.qos import HistoryPolicy, QoSProfile
 from unique_identifier_msgs.msg import UUID
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 COURIER_DELIVERY_MESSAGE_CODE: Final = 3
 COFFEE_DELIVERY_MESSAGE_CODE: Final = 4
 
-# Each accepted request is exactly one message (contract, ROS side): deep enough for a burst that outruns the reader.
-_DELIVERY_QOS: Final = QoSProfile(depth=1000)
-_VELOCITY_QOS: Final = QoSProfile(depth=10)
+# Each accepted request is exactly one message (contract, ROS side): nothing gives way before it is acknowledged.
+_DELIVERY_QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+_VELOCITY_QOS: Final = QoSProfile(depth=100)
 _VELOCITY_TYPES: Final[dict[str, Any]] = {
     "geometry_msgs/msg/Twist": Twist,
     "geometry_msgs/msg/TwistStamped": TwistStamped,
