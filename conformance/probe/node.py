@@ -59,8 +59,8 @@ class ProbeNode:
         # A subscription is of use when both ends know of it.
         time.sleep(4 * _STEP_S)
         nodes = sum(name != _NAME for name in self._node.get_node_names())
-        publishers: int = sum(self._node.count_publishers(topic) for topic in topics)
-        return nodes + publishers
+        found: int = nodes + sum(self._node.count_publishers(topic) for topic in topics)
+        return found
 
     def deliveries(self) -> dict[str, Any]:
         """What came on the delivery topic since this was asked last."""
