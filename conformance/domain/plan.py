@@ -21,6 +21,8 @@ _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130
 _DETOUR: Final = 1.3
 # Where a plan ends at the pose itself, and not only within its tolerance, m.
 EXACT: Final = 0.005
+# A plan that ends farther away than this was not made for the place that was asked for, m.
+_BESIDE: Final = 0.3
 # How far from the robot, or from the given start, a path may begin: a planner's grid is not finer, m.
 START_OFF: Final = 0.25
 
@@ -104,9 +106,12 @@ def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list
                 continue
             _, plan, _ = ask(robot, goal)
             if plan is not None:
-                # A plan may end beside a goal that is too near to something, within its tolerance; a goal may not.
-                exact = plan.poses[-1].distance(goal) < EXACT
-                plain = exact and plan.length <= _DETOUR * here.distance(goal) + 0.1
+                # A plan may end beside a place that is too near to something, within its tolerance; a goal may not be
+                # put there. Where the plan ends, it may.
+                end = plan.poses[-1]
+                beside = EXACT <= end.distance(goal) < _BESIDE and robot.in_arena(end)
+                goal = Pose(end.x, end.y, goal.yaw) if beside else goal
+                plain = not beside and plan.length <= _DETOUR * here.distance(goal) + 0.1
                 (found if plain else round_about).append(goal)
     # Where no way is plain, any way will do: what is odd about the plans is for others to judge.
     return [*found, *round_about][:count]
