@@ -40,17 +40,7 @@ def main() -> int:
         _say("2/3", f"certifying it: REST {rest}, SOAP {soap}")
         certified = _roaas("certify", *common, "--profile", "full", "--ros-domain-id", str(domain))
         _say("3/3", "measuring SOAP against REST")
-        loaded = _roaas(
-            "load",
-            *common,
-            "--operation",
-            "delivery",
-            "--operation",
-            "pose",
-            "--steps",
-            "--duration",
-            f"{options.duration:g}",
-        )
+        loaded = _roaas("load", *common, "--operation", "delivery", "--duration", f"{options.duration:g}")
     _summary(options.out, time.monotonic() - started)
     return certified or loaded
 
