@@ -20,7 +20,7 @@ _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130
 # A way so much longer than the distance goes around something: not what a short drive is for.
 _DETOUR: Final = 1.3
 # Where a plan ends at the pose itself, and not only within its tolerance, m.
-EXACT: Final = 0.005
+EXACT: Final = 1e-6
 # A plan that ends farther away than this was not made for the place that was asked for, m.
 _BESIDE: Final = 0.3
 # How far from the robot, or from the given start, a path may begin: a planner's grid is not finer, m.
