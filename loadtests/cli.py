@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from loadtests import exits
-from loadtests.plan import CLIENTS, INTERFACES, OPERATIONS
+from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
 from loadtests.settings import (
     DEFAULT_DURATION_S,
     DEFAULT_RATE,
@@ -25,9 +25,9 @@ from loadtests.settings import (
 )
 from loadtests.statement import Statement, StatementError
 from loadtests.statement import read as read_statement
-from loadtests.steps import STEP_S
-from loadtests.thresholds import ThresholdsError
-from loadtests.thresholds import read_file as read_thresholds
+from loadtests.statistics.steps import STEP_S
+from loadtests.statistics.thresholds import ThresholdsError
+from loadtests.statistics.thresholds import read_file as read_thresholds
 
 if TYPE_CHECKING:
     from types import FrameType

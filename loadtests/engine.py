@@ -16,21 +16,21 @@ from typing import Any
 
 import gevent
 
-from loadtests.climb import climb
-from loadtests.crew import Crew, LocalCrew, busiest
-from loadtests.document import Gone, Outcome, compose
+from loadtests.measuring.step_load import climb
+from loadtests.measuring.executor import Crew, LocalCrew, busiest
+from loadtests.result.document import Gone, Outcome, compose
 from loadtests.exits import INCONCLUSIVE, INTERRUPTED, UNREACHABLE, USAGE
-from loadtests.failures import CallError, CrewError
-from loadtests.leader import LedCrew
-from loadtests.metrics import Collector, serve
-from loadtests.plan import Plan
-from loadtests.preflight import preflight
-from loadtests.recorder import Recorder
-from loadtests.result import write
-from loadtests.robot import Robot
+from loadtests.clients.failures import CallError, CrewError
+from loadtests.measuring.distributed_executor import LedCrew
+from loadtests.measuring.metrics import Collector, serve
+from loadtests.schedule.plan import Plan
+from loadtests.measuring.preflight import preflight
+from loadtests.measuring.recorder import Recorder
+from loadtests.result.files import write
+from loadtests.clients.robot import Robot
 from loadtests.settings import Settings
-from loadtests.terminal import final_words
-from loadtests.wsdl import WsdlError, address_in, fetch
+from loadtests.result.terminal import final_words
+from loadtests.clients.wsdl import WsdlError, address_in, fetch
 
 _DEAD_S = 3.0
 _DEAD_REQUESTS = 10

@@ -13,16 +13,16 @@ import locust.stats
 from locust import User, constant_throughput, events, tag, task
 from locust.exception import StopTest
 
-from loadtests.callers import Caller, Workload
-from loadtests.endpoint import EndpointError
-from loadtests.failures import CallError
-from loadtests.ordinary import read_document
-from loadtests.payloads import CATALOGUE, VARIANTS
-from loadtests.robot import Robot
+from loadtests.clients.callers import Caller, Workload
+from loadtests.clients.endpoint import EndpointError
+from loadtests.clients.failures import CallError
+from loadtests.clients.library import read_document
+from loadtests.clients.payloads import CATALOGUE, VARIANTS
+from loadtests.clients.robot import Robot
+from loadtests.clients.wire import now_ns
+from loadtests.clients.wsdl import WsdlError, address_in, fetch
 from loadtests.settings import Settings, SettingsError, Wishes, settle
 from loadtests.statement import Statement
-from loadtests.wire import now_ns
-from loadtests.wsdl import WsdlError, address_in, fetch
 
 OPERATIONS = tuple(CATALOGUE)
 _TEXTS = ("rest", "publishers-wsdl", "subscribers-wsdl", "publishers-endpoint", "subscribers-endpoint")

@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loadtests.endpoint import Endpoint, EndpointError, tls_context
-from loadtests.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS
-from loadtests.steps import DEFAULT_RATES, STEP_S
-from loadtests.thresholds import Threshold
+from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
+from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS
+from loadtests.statistics.steps import DEFAULT_RATES, STEP_S
+from loadtests.statistics.thresholds import Threshold
 
 if TYPE_CHECKING:
     from loadtests.statement import Statement

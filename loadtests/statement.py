@@ -11,7 +11,7 @@ import tomllib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from loadtests.thresholds import Threshold, ThresholdsError, read_tables
+from loadtests.statistics.thresholds import Threshold, ThresholdsError, read_tables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.http.observers import watch
-from conformance.probe.client import start_probe
+from conformance.rest.observers import watch
+from conformance.robot.probe.client import start_probe
 
 if TYPE_CHECKING:
-    from conformance.session import Session
+    from conformance.engine.session import Session
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conformance.cli.summary import print_summary
+from conformance.contract.exit_codes import INTERRUPTED, UNREACHABLE
 from conformance.contract.files import CONTRACT_DIR, Contract, ContractError
 from conformance.contract.ledger import CLASSES, PROFILES
-from conformance.effort import EFFORTS, Effort
-from conformance.statement import Statement, StatementError, load_statement
-from conformance.verdict.exit_codes import INTERRUPTED, UNREACHABLE
+from conformance.contract.statement import Statement, StatementError, load_statement
+from conformance.verdict.effort import EFFORTS, Effort
 
 if TYPE_CHECKING:
-    from conformance.certification import Certification
-    from conformance.session import Session
+    from conformance.engine.certification import Certification
+    from conformance.engine.session import Session
 
 _ENDPOINTS = (
     "rest",
@@ -143,7 +143,7 @@ def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
 
 
 def _init(path: Path | None, chosen: Statement, *, force: bool) -> None:
-    from conformance.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
+    from conformance.engine.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
 
     if path is None:
         raise click.UsageError("--init writes a statement: name the file, as in `roaas certify --init robot.toml`")
@@ -158,9 +158,9 @@ def _init(path: Path | None, chosen: Statement, *, force: bool) -> None:
 
 def _certify(chosen: Statement, options: dict[str, Any]) -> Certification:
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
-    from conformance.certification import certify as run  # noqa: PLC0415
-    from conformance.session import Session  # noqa: PLC0415
-    from conformance.standalone import connection_of  # noqa: PLC0415
+    from conformance.engine.certification import certify as run  # noqa: PLC0415
+    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415
+    from conformance.engine.session import Session  # noqa: PLC0415
     from conformance.verdict.baseline import BaselineError, load_baseline  # noqa: PLC0415
 
     contract = Contract.load(options["contract"])

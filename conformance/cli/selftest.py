@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conformance.verdict.exit_codes import EXIT_CODES, INTERRUPTED, UNREACHABLE
+from conformance.contract.exit_codes import EXIT_CODES, INTERRUPTED, UNREACHABLE
 
 if TYPE_CHECKING:
     from conformance.selftest.comparison import Seen
-    from conformance.selftest.faults.fault import Fault
-    from conformance.selftest.hunting import Catch
-    from conformance.selftest.innocents import Acquittal, Case
+    from conformance.selftest.controls import Acquittal, Case
+    from conformance.selftest.mutant_run import Catch
+    from conformance.selftest.mutants.mutant import Fault
     from conformance.selftest.report import Report
 
 # A dozen and some different ones, for a check in less than a minute; the longest first.
@@ -68,7 +68,7 @@ def selftest(**options: Any) -> None:
     Each faulty robot is a good one behind a proxy with one named change. Exit code: 0 all caught and nobody blamed;
     1 otherwise; 2 usage; 3 a robot does not start; 130 interrupted.
     """
-    from conformance.selftest.faults import FAULTS  # noqa: PLC0415 - lxml and the like cost what --help need not pay
+    from conformance.selftest.mutants import FAULTS  # noqa: PLC0415 - lxml and the like cost what --help need not pay
     from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see above
 
     if options["short"]:
@@ -98,7 +98,7 @@ def selftest(**options: Any) -> None:
 
 
 def _run(chosen: list[Fault], options: dict[str, Any]) -> Report:
-    from conformance.selftest.hunting import Bench, hunt, without_fault  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.mutant_run import Bench, hunt, without_fault  # noqa: PLC0415 - see selftest()
     from conformance.selftest.report import Report  # noqa: PLC0415 - see selftest()
 
     started = time.monotonic()
@@ -134,7 +134,7 @@ def _compare(report: Report, bench: Any, chosen: list[Fault], teller: _Teller) -
 
 def _acquit(report: Report, options: dict[str, Any], teller: _Teller) -> None:
     from conformance.selftest import robots  # noqa: PLC0415 - see selftest()
-    from conformance.selftest.innocents import Case, acquit  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.controls import Case, acquit  # noqa: PLC0415 - see selftest()
     from conformance.selftest.variants import VARIANTS  # noqa: PLC0415 - see selftest()
 
     kinds = [*robots.STRANGERS, robots.REFERENCE]

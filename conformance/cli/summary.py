@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conformance.verdict.exit_codes import UNREACHABLE
+from conformance.contract.exit_codes import UNREACHABLE
 
 if TYPE_CHECKING:
-    from conformance.certification import Certification
+    from conformance.engine.certification import Certification
 
 _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-claimed": "not claimed"}
 _SHOWN_CURL = 1000

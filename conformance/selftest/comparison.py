@@ -25,8 +25,8 @@ from conformance.selftest.proxy import unchanged
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from conformance.selftest.faults.fault import Fault
-    from conformance.selftest.hunting import Bench
+    from conformance.selftest.mutant_run import Bench
+    from conformance.selftest.mutants.mutant import Fault
     from conformance.selftest.proxy import Proxy
 
 EXAMPLES, LIMIT_S = 3, 40.0

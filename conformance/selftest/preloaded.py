@@ -5,12 +5,12 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
-import conformance.certification
 import conformance.checks
-import conformance.session
-import conformance.standalone
+import conformance.engine.certification
+import conformance.engine.pytest_run
+import conformance.engine.session
 
 __all__ = ["conformance"]
 
-for _module in pkgutil.iter_modules(conformance.checks.__path__, "conformance.checks."):
+for _module in pkgutil.walk_packages(conformance.checks.__path__, "conformance.checks."):
     importlib.import_module(_module.name)

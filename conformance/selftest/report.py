@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from conformance.selftest.comparison import Seen
-    from conformance.selftest.hunting import Catch
-    from conformance.selftest.innocents import Acquittal
+    from conformance.selftest.controls import Acquittal
+    from conformance.selftest.mutant_run import Catch
 
 
 @dataclass

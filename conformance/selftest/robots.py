@@ -50,7 +50,7 @@ class Robot:
 
 def statement_of(kind: str) -> Path:
     """The implementation conformance statement of a robot."""
-    return _HERE / "reference.toml" if kind == REFERENCE else _HERE / "strangers" / kind / f"{kind}.toml"
+    return _HERE / "reference.toml" if kind == REFERENCE else _HERE / "independent_robots" / kind / f"{kind}.toml"
 
 
 def check_available(kind: str) -> None:
@@ -113,7 +113,7 @@ def _started(kind: str, domain_id: int) -> Iterator[Robot]:
     if kind == REFERENCE:
         command = [sys.executable, "-m", "roaas", "robot", *ports, "--domain-id", str(domain_id)]
     else:
-        command = [sys.executable, "-m", "conformance.selftest.strangers", kind, *ports]
+        command = [sys.executable, "-m", "conformance.selftest.independent_robots", kind, *ports]
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     # The command is this interpreter with arguments made above.
     process = subprocess.Popen(  # noqa: S603

@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from conformance.selftest.faults.changing import parsed, problem
+from conformance.selftest.mutants.changes import parsed, problem
 from conformance.selftest.proxy import unchanged
 
 if TYPE_CHECKING:

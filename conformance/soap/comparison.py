@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from conformance.soap.description import DescriptionError, name
-from conformance.soap.names import WSDL, WSDL_SOAP, clark, local
-from conformance.soap.schema import SchemaError
-from conformance.soap.shapes import Complex, Element, Group, Simple
+from conformance.documents.wsdl import DescriptionError, name
+from conformance.documents.xml_names import WSDL, WSDL_SOAP, clark, local
+from conformance.documents.xsd import SchemaError
+from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from conformance.soap.description import Description, Operation
+    from conformance.documents.wsdl import Description, Operation
 
 
 def names(contract: Description, robot: Description) -> Iterator[str]:

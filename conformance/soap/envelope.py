@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 from lxml import etree
 
-from conformance.soap.names import ENVELOPE, clark, local
-from conformance.soap.node import Node
+from conformance.documents.xml_names import ENVELOPE, clark, local
+from conformance.documents.xml_node import Node
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from conformance.target.exchange import Exchange
+    from conformance.transport.exchange import Exchange
 
 
 class NotXmlError(ValueError):

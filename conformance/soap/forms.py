@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 from hypothesis import strategies as st
 
-from conformance.soap.lexical import FLOATS, INTEGERS, STRINGS, bounds, plain
+from conformance.documents.xsd_lexical import FLOATS, INTEGERS, STRINGS, bounds, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hypothesis.strategies import SearchStrategy
 
-    from conformance.soap.shapes import Simple
+    from conformance.documents.xsd_shapes import Simple
 
 # XML Schema 1.0 Part 2, 4.3.6: white space around a value is collapsed before it is read.
 _SPACES: Final = ("", " ", "\n\t ", "  ")

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from hypothesis import strategies as st
 
-from conformance.soap import forms, lexical
-from conformance.soap.node import Node
-from conformance.soap.shapes import Complex, Element, Group, Simple
+from conformance.documents import xsd_lexical as lexical
+from conformance.documents.xml_node import Node
+from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
+from conformance.soap import forms
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy

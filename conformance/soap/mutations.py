@@ -8,17 +8,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
-from conformance.soap import lexical
+from conformance.documents import xsd_lexical as lexical
+from conformance.documents.xml_names import XSI, clark, local, namespace
+from conformance.documents.xml_node import Node
 from conformance.soap.envelope import parse
 from conformance.soap.messages import declarations, sequences, simple_leaves, with_text
-from conformance.soap.names import XSI, clark, local, namespace
-from conformance.soap.node import Node
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from conformance.soap.schema import Types
-    from conformance.soap.shapes import Element
+    from conformance.documents.xsd import Types
+    from conformance.documents.xsd_shapes import Element
 
 STRANGE: Final = "urn:example:strange"
 _NOBODY: Final = "no_such_element"

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Final
 
 from lxml import etree
 
+from conformance.documents.xml_names import ENVELOPE, clark, local, namespace
 from conformance.soap.envelope import Envelope, Fault, NotSoapError, NotXmlError, elements, parse, read_root
-from conformance.soap.names import ENVELOPE, clark, local, namespace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
-    from conformance.target.exchange import Exchange, Response
-    from conformance.verdict.judge import Judge
+    from conformance.transport.exchange import Exchange, Response
+    from conformance.verdict.evidence import Judge
 
 # BP 1.1 4.1.? R1012; ASCII is a part of UTF-8.
 _ENCODINGS: Final = frozenset({"", "utf-8", "utf8", "utf-16", "utf-16le", "utf-16be", "us-ascii", "ascii"})
@@ -197,13 +197,13 @@ class SoapObserver:
     def _that(
         self,
         name: str,
-        holds: bool,  # noqa: FBT001 - as Judge.that()
+        holds: bool,  # noqa: FBT001 - as Judge.check()
         exchange: Exchange,
         expected: str,
         found: Callable[[], str] | None = None,
     ) -> None:
         text = found() if found is not None and not holds else ""
-        self._judge.that(f"soap-basic-profile/{name}", holds, exchange, expected, found=text)
+        self._judge.check(f"soap-basic-profile/{name}", holds, exchange, expected, found=text)
 
 
 def _encoding(response: Response) -> str:

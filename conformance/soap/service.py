@@ -11,17 +11,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from conformance.soap.description import Description, DescriptionError, describe, faults, read_file
+from conformance.contract.statement import StatementError
+from conformance.documents.wsdl import Description, DescriptionError, describe, faults, read_file
+from conformance.documents.xml_names import WSDL_SOAP, clark
 from conformance.soap.envelope import NotXmlError, parse
-from conformance.soap.names import WSDL_SOAP, clark
-from conformance.statement import StatementError
-from conformance.target.http import Connection, HttpClient, NoAnswerError
+from conformance.transport.client import Connection, HttpClient, NoAnswerError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from conformance.soap.node import Node
-    from conformance.target.exchange import Exchange
+    from conformance.documents.xml_node import Node
+    from conformance.transport.exchange import Exchange
 
 MEDIA_TYPE = "text/xml; charset=utf-8"
 # How long the address in a WSDL is given to answer before the WSDL's own is taken instead, s.

@@ -14,12 +14,12 @@ from zeep import Client, Settings
 from zeep.exceptions import Fault as ZeepFault
 from zeep.transports import Transport
 
-from conformance.soap.description import name
-from conformance.target.http import NoAnswerError
+from conformance.documents.wsdl import name
+from conformance.transport.client import NoAnswerError
 
 if TYPE_CHECKING:
     from conformance.soap.service import SoapService
-    from conformance.target.exchange import Exchange
+    from conformance.transport.exchange import Exchange
 
 _OK = 200
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from conformance.contract.ledger import Requirement
-    from conformance.verdict.judge import Evidence
+    from conformance.verdict.evidence import Evidence
 
 
 @dataclass(frozen=True)

@@ -179,7 +179,9 @@ def test_a_worker_that_is_killed_is_missed_and_named(toy, load):
     )
     wait_for(process, r"[1-9]\d* requests answered")
     workers = [
-        child for child in psutil.Process(process.pid).children(recursive=True) if "loadtests.worker" in child.cmdline()
+        child
+        for child in psutil.Process(process.pid).children(recursive=True)
+        if "loadtests.measuring.worker" in child.cmdline()
     ]
     assert len(workers) == 2
     for _ in range(2):  # time for both to have reported

@@ -3,8 +3,8 @@ from hdrh.histogram import HdrHistogram
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loadtests.histogram import BINS, HIGHEST_US, Histogram, bins_of, edges_us
-from loadtests.recorder import Recorder
+from loadtests.measuring.recorder import Recorder
+from loadtests.statistics.histogram import BINS, HIGHEST_US, Histogram, bins_of, edges_us
 
 durations = st.lists(st.integers(0, 2 * HIGHEST_US * 1000), max_size=60)
 

@@ -6,15 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from loadtests import settings, statement, thresholds, wsdl
-from loadtests.endpoint import Endpoint
-from loadtests.payloads import CATALOGUE, differences, rest_request, soap_request, variants
-from loadtests.robot import Robot
+from loadtests import settings, statement
+from loadtests.clients import wsdl
+from loadtests.clients.endpoint import Endpoint
+from loadtests.clients.payloads import CATALOGUE, differences, rest_request, soap_request, variants
+from loadtests.clients.robot import Robot
+from loadtests.clients.wire import Request
+from loadtests.clients.wsdl import WsdlError
 from loadtests.settings import Settings, SettingsError, Wishes, settle
 from loadtests.statement import Statement, StatementError
-from loadtests.thresholds import Threshold, ThresholdsError
-from loadtests.wire import Request
-from loadtests.wsdl import WsdlError
+from loadtests.statistics import thresholds
+from loadtests.statistics.thresholds import Threshold, ThresholdsError
 
 CONTRACT = Path(__file__).parents[2] / "conformance" / "contract"
 REST = {"rest": "http://robot:7003"}

@@ -62,8 +62,8 @@ def test_a_worker_from_elsewhere_joins_the_master(toy, load, tmp_path):
     )  # fmt: skip
     port = next(found[1] for line in process.stderr if (found := re.search(r"master on 127\.0\.0\.1:(\d+)", line)))
     worker = subprocess.Popen(
-        [sys.executable, "-m", "loadtests.node", "--worker", "--master-host", "127.0.0.1", f"--master-port={port}",
-         "--token-file", token, "--rate", "60"],
+        [sys.executable, "-m", "loadtests.measuring.node", "--worker", "--master-host", "127.0.0.1",
+         f"--master-port={port}", "--token-file", token, "--rate", "60"],
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     run = finish()
@@ -116,7 +116,7 @@ def test_the_kubernetes_manifest_gives_options_that_there_are():
 
 def test_the_master_lingers_for_its_result_to_be_fetched():
     run = subprocess.run(
-        [sys.executable, "-m", "loadtests.node", "--master", "--expect-workers", "1"],
+        [sys.executable, "-m", "loadtests.measuring.node", "--master", "--expect-workers", "1"],
         capture_output=True, text=True, timeout=30, check=False, env=os.environ | {"ROAAS_LINGER_S": "0.1"},
     )  # fmt: skip
     assert run.returncode == 2
@@ -133,7 +133,11 @@ def free_port():
 @pytest.mark.parametrize("words", [["--worker"], ["--worker", "--master-port", "1"]])
 def test_a_worker_has_to_know_its_master(words):
     run = subprocess.run(
-        [sys.executable, "-m", "loadtests.node", *words], capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, "-m", "loadtests.measuring.node", *words],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
     )
     assert run.returncode == 1
     assert "--master-host" in run.stderr

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loadtests.arrivals import Schedule
-from loadtests.pacer import Pacer
-from loadtests.plan import CLIENTS, INTERFACES, Plan
-from loadtests.wire import now_ns
+from loadtests.clients.wire import now_ns
+from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.pacer import Pacer
+from loadtests.schedule.plan import CLIENTS, INTERFACES, Plan
 
 PLAN = Plan(
     operations=("delivery", "pose"), interfaces=INTERFACES, clients=CLIENTS, rate=100.0, users=None, duration_s=20.0,

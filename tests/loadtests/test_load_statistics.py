@@ -3,14 +3,20 @@
 import numpy as np
 import pytest
 
-from loadtests.arrivals import Schedule
-from loadtests.histogram import Histogram
-from loadtests.plan import Plan
-from loadtests.recorder import Recorder
-from loadtests.resampling import compare, interval_ms, order_interval_ms, samples_for_interval, samples_for_point
-from loadtests.summary import Measured, quantiles, series, time_series
-from loadtests.thresholds import Threshold
-from loadtests.verdict import judge
+from loadtests.measuring.recorder import Recorder
+from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.plan import Plan
+from loadtests.statistics.histogram import Histogram
+from loadtests.statistics.resampling import (
+    compare,
+    interval_ms,
+    order_interval_ms,
+    samples_for_interval,
+    samples_for_point,
+)
+from loadtests.statistics.summary import Measured, quantiles, series, time_series
+from loadtests.statistics.thresholds import Threshold
+from loadtests.statistics.verdict import judge
 
 
 def block(values_ms):

@@ -9,12 +9,12 @@ import pytest
 import requests
 from urllib3 import Retry
 
-from loadtests.endpoint import Endpoint, EndpointError, tls_context
-from loadtests.failures import CallError
-from loadtests.ordinary import OrdinaryRest, Sent, new_session
-from loadtests.payloads import rest_request
-from loadtests.robot import Robot
-from loadtests.wire import Connection, Request
+from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
+from loadtests.clients.failures import CallError
+from loadtests.clients.library import OrdinaryRest, Sent, new_session
+from loadtests.clients.payloads import rest_request
+from loadtests.clients.robot import Robot
+from loadtests.clients.wire import Connection, Request
 
 
 def get(endpoint, path="/robot/pose/"):

@@ -6,9 +6,9 @@ import pytest
 from openapi_spec_validator import OpenAPIV31SpecValidator
 
 from conformance.contract.files import Contract
-from conformance.http.operations import operations_of
-from conformance.http.representation import from_element, parse_xml
-from conformance.http.schemas import shape_of
+from conformance.documents.json_schema import shape_of
+from conformance.documents.openapi import operations_of
+from conformance.documents.representation import from_element, parse_xml
 
 CONTRACT = Contract.load()
 TAKING = [item for item in operations_of(CONTRACT) if item.bodies]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from conformance.contract.files import Contract
-from conformance.http.described import Described, described_by_wadl, differences
-from conformance.http.operations import operations_of
+from conformance.documents.openapi import operations_of
+from conformance.documents.rest_description import Described, described_by_wadl, differences
 
 CONTRACT = Contract.load()
 

@@ -11,9 +11,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from conformance.selftest.faults.changing import altered, becomes, header, instead, plain, rest, rewritten, values
+from conformance.selftest.independent_robots.plain import serve as plain_robot
+from conformance.selftest.mutants.changes import altered, becomes, header, instead, plain, rest, rewritten, values
 from conformance.selftest.proxy import HangUpError, Proxy
-from conformance.selftest.strangers.plain import serve as plain_robot
 from conformance.selftest.variants import VARIANTS, certificate
 from conformance.selftest.wire import Answer, Ask
 

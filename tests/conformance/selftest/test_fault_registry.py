@@ -7,7 +7,7 @@ import pytest
 from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import load_ledger
 from conformance.selftest import coverage
-from conformance.selftest.faults import FAULTS
+from conformance.selftest.mutants import FAULTS
 
 ROOT = Path(coverage.__file__).parents[2]
 

@@ -8,10 +8,10 @@ from click.testing import CliRunner
 from conformance.cli.contract import contract
 from conformance.cli.selftest import selftest
 from conformance.contract.files import CONTRACT_FILES
-from conformance.selftest.faults import FAULTS
-from conformance.selftest.hunting import Catch
-from conformance.selftest.innocents import Acquittal
-from conformance.selftest.judging import Outcome
+from conformance.selftest.certifying import Outcome
+from conformance.selftest.controls import Acquittal
+from conformance.selftest.mutant_run import Catch
+from conformance.selftest.mutants import FAULTS
 from conformance.selftest.report import Report
 
 

@@ -15,13 +15,13 @@ from spoiling import Ask, Reply
 
 from conformance.contract.files import Contract
 from conformance.contract.ledger import CLASSES
-from conformance.effort import Effort
-from conformance.explore import Explorer
-from conformance.outcome import settle
-from conformance.selftest.strangers import plain
-from conformance.session import Session
-from conformance.statement import Endpoints, Statement
-from conformance.target.http import Connection, NoAnswerError
+from conformance.contract.statement import Endpoints, Statement
+from conformance.engine.outcome import settle
+from conformance.engine.session import Session
+from conformance.selftest.independent_robots import plain
+from conformance.transport.client import Connection, NoAnswerError
+from conformance.verdict.effort import Effort
+from conformance.verdict.explorer import Explorer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

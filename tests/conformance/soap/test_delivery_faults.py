@@ -7,8 +7,8 @@ import re
 import pytest
 from spoiling import cleaned, one_in, renamed, to_response, unreadable
 
-from conformance.checks import test_soap_delivery as delivery
-from conformance.checks import test_soap_interop as interop
+from conformance.checks.soap_delivery import test_soap_delivery as delivery
+from conformance.checks.soap_delivery import test_soap_interop as interop
 
 CASES = [
     (

@@ -7,9 +7,9 @@ import re
 import pytest
 
 from conformance.contract.files import CONTRACT_DIR
+from conformance.documents.wsdl import DescriptionError, describe, faults, read_file
+from conformance.documents.xml_names import clark
 from conformance.soap import comparison
-from conformance.soap.description import DescriptionError, describe, faults, read_file
-from conformance.soap.names import clark
 from conformance.soap.wsdl_rules import RULES
 
 CONTRACT = read_file(CONTRACT_DIR / "publishers.wsdl")

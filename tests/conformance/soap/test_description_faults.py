@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from spoiling import described
 
-from conformance.checks import test_wsdl as wsdl
+from conformance.checks.describe import test_wsdl as wsdl
 
 CASES = [
     ("no WSDL", lambda a, f: f(a).having(status=404) if a.method == "GET" else f(a), "describe/wsdl"),

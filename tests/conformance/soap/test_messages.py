@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from conformance.contract.files import CONTRACT_DIR
-from conformance.soap.description import read_file
+from conformance.documents.wsdl import read_file
+from conformance.documents.xml_names import clark
+from conformance.documents.xsd import SchemaDocument, Types
+from conformance.documents.xsd_lexical import plain, unreadable
+from conformance.documents.xsd_shapes import shape
 from conformance.soap.envelope import envelope, parse, read
 from conformance.soap.forms import written_float, written_integer
-from conformance.soap.lexical import plain, unreadable
 from conformance.soap.messages import ordinary, simple_leaves, variants, with_text
 from conformance.soap.mutations import invalid_ones, mutants
-from conformance.soap.names import clark
-from conformance.soap.schema import SchemaDocument, Types
-from conformance.soap.shapes import shape
-from conformance.soap.syntax import Syntax, single_changes, spell, syntaxes
+from conformance.soap.xml_style import Syntax, single_changes, spell, syntaxes
 
 XSD = b"""<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:t="urn:t" targetNamespace="urn:t"
                      elementFormDefault="qualified">

@@ -6,18 +6,18 @@ from importlib import import_module
 
 import pytest
 
-from conformance.checks import test_soap_delivery as delivery
-from conformance.checks import test_soap_interop as interop
-from conformance.checks import test_soap_observed as observed
-from conformance.checks import test_soap_plan as plan
-from conformance.checks import test_soap_profile_headers as headers
-from conformance.checks import test_soap_profile_http as over_http
-from conformance.checks import test_soap_profile_messages as messages
-from conformance.checks import test_soap_strict as strict
-from conformance.checks import test_soap_subscribers as subscribers
-from conformance.checks import test_wsdl as wsdl
-from conformance.checks import test_xml_security_rest as security_rest
-from conformance.checks import test_xml_security_soap as security
+from conformance.checks.describe import test_wsdl as wsdl
+from conformance.checks.soap_basic_profile import test_soap_observed as observed
+from conformance.checks.soap_basic_profile import test_soap_profile_headers as headers
+from conformance.checks.soap_basic_profile import test_soap_profile_http as over_http
+from conformance.checks.soap_basic_profile import test_soap_profile_messages as messages
+from conformance.checks.soap_delivery import test_soap_delivery as delivery
+from conformance.checks.soap_delivery import test_soap_interop as interop
+from conformance.checks.soap_subscribers import test_soap_plan as plan
+from conformance.checks.soap_subscribers import test_soap_subscribers as subscribers
+from conformance.checks.strict_input import test_soap_strict as strict
+from conformance.checks.xml_security import test_xml_security_rest as security_rest
+from conformance.checks.xml_security import test_xml_security_soap as security
 
 PUBLISHERS = (
     delivery.test_operations,
@@ -61,7 +61,7 @@ REST_OF_THEM = (
 
 @pytest.mark.parametrize(("name", "seed"), [("plain", 1), ("baroque", 2)])
 def test_conforming_strangers(connected, run, name, seed):
-    rest, wsdl_url, stop = import_module(f"conformance.selftest.strangers.{name}").serve(0, 0)
+    rest, wsdl_url, stop = import_module(f"conformance.selftest.independent_robots.{name}").serve(0, 0)
     try:
         session = connected(rest, wsdl_url.rsplit("/", 1)[0], effort="quick")
         session.seed = seed
@@ -75,7 +75,7 @@ def test_conforming_strangers(connected, run, name, seed):
 
 
 def test_a_legacy_robot_may_be_lax(connected, run):
-    rest, wsdl_url, stop = import_module("conformance.selftest.strangers.legacy").serve(0, 0)
+    rest, wsdl_url, stop = import_module("conformance.selftest.independent_robots.legacy").serve(0, 0)
     try:
         session = connected(rest, wsdl_url.rsplit("/", 1)[0], effort="quick")
         session.subscribers = None

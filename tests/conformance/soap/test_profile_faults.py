@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 from spoiling import BP, answer, asked, cleaned, done, instead, renamed, to_fault, to_response, unreadable
 
-from conformance.checks import test_soap_profile_headers as headers
-from conformance.checks import test_soap_profile_http as over_http
-from conformance.checks import test_soap_profile_messages as messages
+from conformance.checks.soap_basic_profile import test_soap_profile_headers as headers
+from conformance.checks.soap_basic_profile import test_soap_profile_http as over_http
+from conformance.checks.soap_basic_profile import test_soap_profile_messages as messages
 
 CASES = [
     (

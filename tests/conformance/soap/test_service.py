@@ -7,9 +7,9 @@ import time
 import pytest
 
 from conformance.contract.files import CONTRACT_DIR
+from conformance.contract.statement import StatementError
 from conformance.soap.service import open_service
-from conformance.statement import StatementError
-from conformance.target.http import Connection
+from conformance.transport.client import Connection
 
 WSDL = (CONTRACT_DIR / "publishers.wsdl").read_bytes()
 PATH = CONTRACT_DIR / "publishers.wsdl"

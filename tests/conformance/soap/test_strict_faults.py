@@ -11,8 +11,8 @@ from dataclasses import replace
 import pytest
 from spoiling import asked, cleaned, done, instead, to_fault
 
-from conformance.checks import test_soap_strict as strict
-from conformance.checks import test_xml_security_soap as security
+from conformance.checks.strict_input import test_soap_strict as strict
+from conformance.checks.xml_security import test_xml_security_soap as security
 
 STRICT = [
     ("unknown", rb"<[\w:]*no_such_element[^>]*>1</[\w:]*no_such_element>", b""),

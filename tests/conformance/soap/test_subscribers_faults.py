@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 from spoiling import cleaned, instead, renamed, to_response
 
-from conformance.checks import test_soap_interop as interop
-from conformance.checks import test_soap_plan as plan
-from conformance.checks import test_soap_subscribers as subscribers
+from conformance.checks.soap_delivery import test_soap_interop as interop
+from conformance.checks.soap_subscribers import test_soap_plan as plan
+from conformance.checks.soap_subscribers import test_soap_subscribers as subscribers
 
 CASES = [
     (

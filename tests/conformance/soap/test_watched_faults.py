@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from spoiling import BP, answer, one_in, renamed, to_fault, to_response
 
-from conformance.checks import test_soap_observed as observed
-from conformance.checks import test_soap_profile_messages as messages
+from conformance.checks.soap_basic_profile import test_soap_observed as observed
+from conformance.checks.soap_basic_profile import test_soap_profile_messages as messages
 
 CASES = [
     ("fault with status 200", to_fault(lambda r: r.having(status=200)), "R1126"),

@@ -1,0 +1,96 @@
+"""/openapi.json: served, valid, the contract's operations in it, and all of them there (contract, describe)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import operations_of
+from conformance.documents.rest_description import Described, described_by_openapi, differences, openapi_fault
+from conformance.rest.applicable import allowed
+from conformance.rest.calls import Call, example_call
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.transport.client import HttpClient
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("describe"), pytest.mark.needs("rest")]
+_PATH = "/openapi.json"
+
+
+def _document(rest: HttpClient) -> tuple[Any, Exchange, str]:
+    """The description, the exchange that brought it, and what is wrong with it."""
+    exchange = rest.send("GET", _PATH, headers=[("Accept", "application/json")])
+    answer = exchange.response
+    if answer is None or answer.status != 200:
+        return None, exchange, exchange.came
+    if "json" not in answer.media_type:
+        return None, exchange, f"it is sent as {answer.media_type or 'no media type'}"
+    text = read_json(answer.body)
+    return text.value, exchange, text.problem or openapi_fault(text.value)
+
+
+@pytest.mark.requirement("describe/openapi")
+def test_openapi_is_served(rest: HttpClient, judge: Judge) -> None:
+    """It is there, it is JSON, and it is a valid description by the schema of its version."""
+    _, exchange, fault = _document(rest)
+    judge.check("describe/openapi", not fault, exchange, "200 with a valid OpenAPI 3 description", found=fault)
+
+
+@pytest.mark.requirement("describe/openapi-operations")
+def test_openapi_has_the_operations(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """It names the paths, methods and parameters of the contract; more is allowed, optional ones may be missing."""
+    document, exchange, fault = _document(rest)
+    found = [] if document is None else described_by_openapi(document, rest.base_url)
+    missing = [fault] if document is None else differences(operations_of(roaas.contract), found)
+    judge.check(
+        "describe/openapi-operations",
+        not missing,
+        exchange,
+        "the paths, methods and parameters of the contract",
+        found="; ".join(missing[:3]),
+    )
+
+
+@pytest.mark.requirement("describe/openapi-behaviour")
+def test_what_is_described_is_there(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """A request made from each operation of the description, and of the contract, is not answered 404 or 405."""
+    for operation in operations_of(roaas.contract):
+        if not operation.optional:
+            _judge_there(roaas, judge, example_call(roaas, operation))
+    document, _, _ = _document(rest)
+    found = [] if document is None else described_by_openapi(document, rest.base_url)
+    # A robot may serve the contract's own description, with an extension in it that it does not have.
+    known = {(item.method, item.shape) for item in map(Described.of, operations_of(roaas.contract))}
+    for item in found:
+        if (item.method, item.shape) not in known and item.operation is not None:
+            _judge_there(roaas, judge, example_call(roaas, item.operation))
+
+
+def _judge_there(session: Session, judge: Judge, call: Call) -> None:
+    """Judge by the request itself where it may be sent and needs nothing, else by what OPTIONS says of its path."""
+    operation = call.operation
+    asked = operation.safe and allowed(session, operation)
+    exchange = call.send(session) if asked else Call(operation, call.values).send(session, method="OPTIONS")
+    status = exchange.response.status if exchange.response else 0
+    if asked and status == 404 and operation.declared(404) is not None:
+        # The resource may well be there with nothing in it: its methods tell.
+        exchange = call.send(session, method="OPTIONS")
+        status = exchange.response.status if exchange.response else 0
+        asked = False
+    there = status not in {0, 404, 405, 501}
+    if there and not asked:
+        allow = (exchange.response.header("allow") or "") if exchange.response else ""
+        there = not allow or operation.method in {name.strip() for name in allow.split(",")}
+    judge.check(
+        "describe/openapi-behaviour",
+        there,
+        exchange,
+        f"{operation.label} to be there",
+        found=f"status {status}" if status not in {200, 204} else "Allow does not name it",
+        cause=operation.label,
+    )

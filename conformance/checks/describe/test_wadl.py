@@ -1,0 +1,70 @@
+"""/application.wadl: served, well-formed, and with the contract's resources (paper, REST; contract, describe)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.documents.openapi import operations_of
+from conformance.documents.representation import UnreadableError
+from conformance.documents.rest_description import Described, described_by_wadl, differences
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.transport.client import HttpClient
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("describe"), pytest.mark.needs("rest")]
+_PATH = "/application.wadl"
+_IDS = ("describe/wadl", "describe/wadl-resources")
+_MEDIA_TYPES = {"application/vnd.sun.wadl+xml", "application/wadl+xml", "application/xml", "text/xml"}
+
+
+def _without(session: Session) -> bool:
+    """Say that nothing is asked of a robot whose contract has no WADL."""
+    if session.contract.wadl_path is not None:
+        return False
+    for id_ in _IDS:
+        session.judge.unclaimed(id_, "the contract has no WADL")
+    return True
+
+
+def _read(rest: HttpClient) -> tuple[list[Described], Exchange, str]:
+    """The operations, the exchange that brought them, and what is wrong."""
+    exchange = rest.send("GET", _PATH)
+    answer = exchange.response
+    if answer is None or answer.status != 200:
+        return [], exchange, exchange.came
+    if answer.media_type not in _MEDIA_TYPES:
+        return [], exchange, f"it is sent as {answer.media_type or 'no media type'}"
+    try:
+        return described_by_wadl(answer.body, rest.base_url), exchange, ""
+    except UnreadableError as error:
+        return [], exchange, str(error)
+
+
+@pytest.mark.requirement("describe/wadl")
+def test_wadl_is_served(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """It is there, and is a WADL application."""
+    if _without(roaas):
+        return
+    _, exchange, fault = _read(rest)
+    judge.check("describe/wadl", not fault, exchange, "200 with a well-formed WADL", found=fault)
+
+
+@pytest.mark.requirement("describe/wadl-resources")
+def test_wadl_has_the_resources(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """It names the resources, methods and parameters of the contract; more is allowed."""
+    if _without(roaas):
+        return
+    found, exchange, fault = _read(rest)
+    missing = [fault] if fault else differences(operations_of(roaas.contract), found)
+    judge.check(
+        "describe/wadl-resources",
+        not missing,
+        exchange,
+        "the resources, methods and parameters of the contract",
+        found="; ".join(missing[:3]),
+    )

@@ -1,0 +1,187 @@
+"""What a robot says of its SOAP services: served with all it refers to, and the same as the contract."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import pytest
+
+from conformance.documents.wsdl import Description, DescriptionError, describe, faults, name
+from conformance.documents.xml_names import WSDL_SOAP, clark
+from conformance.soap import comparison
+from conformance.soap.callable_services import rounds
+from conformance.soap.wsdl_rules import RULES
+from conformance.transport.client import HttpClient, NoAnswerError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from conformance.engine.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.phase("describe")
+_EMPTY = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'
+_COMPARED: dict[str, tuple[Callable[[Description, Description], Iterator[str]], str]] = {
+    "wsdl-names": (comparison.names, "the names of the contract"),
+    "wsdl-operations": (comparison.operations, "the operations of the contract"),
+    "wsdl-types": (comparison.types, "the types of the contract"),
+    "wsdl-action": (comparison.actions, "an action of a form that the contract allows"),
+}
+
+
+@dataclass(frozen=True)
+class _Served:
+    """The description that a robot serves: the request for it, and what is wrong with it."""
+
+    exchange: Exchange | None
+    description: Description | None
+    problem: str
+
+
+def _services(roaas: Session, *ids: str) -> list[SoapService]:
+    """The services with a contract: descriptions are only read, so that of the one that acts is asked for as well."""
+    found = []
+    for service in (roaas.publishers, roaas.subscribers):
+        if service is None or service.contract_wsdl_path is None:
+            continue
+        if service.name in roaas.unreachable:
+            for id_ in ids:
+                roaas.judge.skip(
+                    id_, f"the {service.name} interface does not answer: {roaas.unreachable[service.name]}"
+                )
+            continue
+        found.append(service)
+    if not found:
+        pytest.skip("no SOAP service that answers has an address and a contract")
+    return found
+
+
+def _served(service: SoapService) -> _Served:
+    """Ask for the description, where the statement says it is, else at ?wsdl of the endpoint."""
+    source = service.wsdl_source if service.wsdl_source and "://" in service.wsdl_source else f"{service.endpoint}?wsdl"
+    parts = urlsplit(source)
+    with closing(HttpClient(f"{parts.scheme}://{parts.netloc}", service.client.connection)) as client:
+        exchange = client.send("GET", f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/")
+    answer = exchange.response
+    if answer is None or answer.status != 200:
+        return _Served(exchange, None, exchange.came)
+    if "xml" not in answer.media_type:
+        return _Served(exchange, None, f"{exchange.came}, which is not XML")
+    try:
+        description = describe(answer.body, source, service.fetch)
+    except DescriptionError as error:
+        return _Served(exchange, None, str(error))
+    missing = [(place, why) for place, why in description.missing if urlsplit(place).netloc == parts.netloc]
+    # What lies with somebody else (a public schema) matters only where something that is used comes from it.
+    problem = next((f"it refers to {place}: {why}" for place, why in missing), "") or next(faults(description), "")
+    return _Served(exchange, description, problem)
+
+
+@pytest.mark.requirement("describe/wsdl")
+def test_served(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """GET ?wsdl answers with the description, and everything that it refers to can be had."""
+    for service in _services(roaas, "describe/wsdl"):
+        for _ in range(rounds(effort, 6)):
+            served = _served(service)
+            judge.check(
+                "describe/wsdl",
+                not served.problem,
+                served.exchange,
+                "a WSDL with all it refers to",
+                found=served.problem,
+            )
+
+
+@pytest.mark.requirement(*(f"describe/{name_}" for name_ in _COMPARED))
+def test_same_as_contract(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Names, operations, types and actions are those of the contract."""
+    ids = [f"describe/{name_}" for name_ in _COMPARED]
+    for service in _services(roaas, *ids):
+        for _ in range(rounds(effort, 3)):
+            served = _served(service)
+            broken = served.problem if served.description is None else comparison.broken(served.description)
+            for name_, (compare, expected) in _COMPARED.items():
+                found = (
+                    [broken] if broken or served.description is None else compare(service.contract, served.description)
+                )
+                problem = next(iter(found), "")
+                judge.check(f"describe/{name_}", not problem, served.exchange, expected, found=problem)
+
+
+@pytest.mark.requirement("describe/wsdl-address")
+def test_address(roaas: Session, judge: Judge) -> None:
+    """The service answers at the address that the description names."""
+    for service in _services(roaas, "describe/wsdl-address"):
+        served = _served(service)
+        ports = served.description.all("w:service/w:port[s:address]") if served.description is not None else []
+        located = [(name(port), port.find(clark(WSDL_SOAP, "address"))) for port in ports]
+        if not located:
+            judge.check(
+                "describe/wsdl-address",
+                False,
+                served.exchange,
+                "a soap:address",
+                found=served.problem or "none",
+            )
+        for port, element in located:
+            location = (element.get("location") if element is not None else None) or ""
+            exchange, problem = _answers(service, location)
+            judge.check(
+                "describe/wsdl-address",
+                not problem,
+                exchange or served.exchange,
+                "a service at its soap:address",
+                found=f"port {port}, {location!r}: {problem}",
+            )
+
+
+def _answers(service: SoapService, location: str) -> tuple[Exchange | None, str]:
+    """Ask at an address with an empty Body, which does nothing; what is wrong there."""
+    try:
+        parts = urlsplit(location)
+        usable = parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
+    except ValueError:
+        usable = False
+    if not usable:
+        return None, "no http URL"
+    # The token is for the robot that the statement names.
+    ours = parts.hostname == service.client.host
+    try:
+        with closing(HttpClient(f"{parts.scheme}://{parts.netloc}", service.client.connection)) as client:
+            exchange = client.send(
+                "POST",
+                parts.path or "/",
+                headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
+                body=_EMPTY,
+                authorized=ours,
+            )
+    except NoAnswerError as none:
+        return none.exchange, str(none)
+    status = exchange.response.status if exchange.response else 0
+    return exchange, f"POST is answered {status}" if status in {404, 405, 501} else ""
+
+
+@pytest.mark.requirement(*(f"describe/wsdl-{rule}" for rule in RULES))
+def test_profile(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """The description keeps the rules of the Basic Profile."""
+    for service in _services(roaas, *(f"describe/wsdl-{rule}" for rule in RULES)):
+        for _ in range(rounds(effort, 3)):
+            served = _served(service)
+            for rule, check in RULES.items():
+                found = iter([served.problem]) if served.description is None else _guarded(check, served.description)
+                problem = next(found, "")
+                judge.check(f"describe/wsdl-{rule}", not problem, served.exchange, f"a WSDL by {rule}", found=problem)
+
+
+def _guarded(check: Callable[[Description], Iterator[str]], description: Description) -> Iterator[str]:
+    """A rule's findings; a description too broken for the rule breaks it."""
+    try:
+        yield from check(description)
+    except DescriptionError as error:
+        yield str(error)

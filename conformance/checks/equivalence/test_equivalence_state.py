@@ -1,0 +1,256 @@
+"""One state, read over REST and over SOAP."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any, Final
+
+import pytest
+
+from conformance.robot.agreement import Slack, disagreement, entries_of, stamp_of
+from conformance.robot.drive import BusyError, Drive
+from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
+from conformance.robot.goals import choose_goals, make_room
+from conformance.robot.message_shapes import GET_PLAN, GOAL, ODOMETRY, STATUS, TWIST, Items, Shape, fault_in, pruned
+from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
+from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
+from conformance.robot.plan import plan_of, query, reachable
+from conformance.robot.robot import POSE, SENSORS, SERVICES, STILL, VELOCITY, Robot, Velocity
+from conformance.robot.soap_services import ask, returned, value_of
+from conformance.robot.stopping import bring_to_rest
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.robot.geometry import Pose
+    from conformance.soap.service import SoapService
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.needs("rest", "subscribers")
+_SLACK: Final = Slack()
+_SAME: Final = Slack(0.0, 0.0)
+# More than any tolerance that is asked for here, m.
+_END_OFF: Final = 0.3
+# Beside the goal itself, what it is about to do may change at any time.
+_GOAL_AND_STATUS: Final[Shape] = {**GOAL, "status": STATUS} if isinstance(GOAL, dict) else GOAL
+_STATES: Final[dict[str, tuple[str, str, Shape]]] = {
+    "pose": (POSE, "GetPose", ODOMETRY),
+    "velocity": (VELOCITY, "GetVelocity", TWIST),
+}
+
+
+@pytest.fixture
+def robot(roaas: Session) -> Robot:
+    """The robot."""
+    return Robot(roaas)
+
+
+@pytest.fixture
+def subscribers(roaas: Session) -> SoapService:
+    """The robot's subscribers service."""
+    if roaas.subscribers is None:
+        pytest.skip("the robot's subscribers interface has no address")
+    return roaas.subscribers
+
+
+def _answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
+    """The one value that a response returns."""
+    found, problem = returned(exchange)
+    if problem or len(found) != 1:
+        return None, problem or f"{len(found)} return elements"
+    return value_of(found[0], shape), ""
+
+
+def _compare(robot: Robot, subscribers: SoapService, judge: Judge, name: str) -> None:
+    """Read a state over REST, over SOAP and over REST again: SOAP's must lie between the other two."""
+    path, operation, shape = _STATES[name]
+    before, _ = robot.read(path, shape)
+    exchange = ask(subscribers, operation)
+    between, problem = _answered(exchange, shape)
+    after, _ = robot.read(path, shape)
+    if before is None or after is None:
+        return  # judged by those who observe REST
+    problem = problem or disagreement(before, between, after, _SLACK)
+    if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
+        problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"
+    judge.check(
+        f"equivalence/{name}",
+        not problem,
+        exchange,
+        f"what GET {path} gives just before and after",
+        found=problem,
+        cause=problem.split(" is ")[0].split("[")[0],
+    )
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
+def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """Whatever the robot does just now."""
+    for _ in range(effort.cases(50)):
+        for name in _STATES:
+            _compare(robot, subscribers, judge, name)
+
+
+@pytest.mark.phase("motion")
+@pytest.mark.motion
+@pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
+def test_pose_and_velocity_in_motion(roaas: Session, robot: Robot, subscribers: SoapService, judge: Judge) -> None:
+    """On an arc, where no component of the velocity that a robot has is zero."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    make_room(robot)
+    drive = Drive(robot)
+    arc = Velocity(
+        linear_x=0.3 * robot.limits.linear_m_s if robot.actuated(0) else 0.0,
+        angular_z=-0.4 * robot.limits.angular_rad_s if robot.actuated(5) else 0.0,
+    )
+    try:
+        drive.command(arc)
+        drive.reach(arc)
+        for _ in range(5):
+            drive.command(arc)
+            for name in _STATES:
+                _compare(robot, subscribers, judge, name)
+        drive.command(STILL)
+        drive.reach(STILL)
+    except BusyError as busy:
+        pytest.skip(str(busy))
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("equivalence/sensors", "equivalence/services")
+def test_lists(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """The same entries, in any order."""
+    for _ in range(effort.cases(50)):
+        for name, path, operation, shape in (
+            ("sensors", SENSORS, "GetSensors", SENSORS_SHAPE),
+            ("services", SERVICES, "GetNavigationServices", SERVICES_SHAPE),
+        ):
+            _compare_lists(robot, subscribers, judge, name, path, operation, shape)
+
+
+def _compare_lists(
+    robot: Robot, subscribers: SoapService, judge: Judge, name: str, path: str, operation: str, shape: Shape
+) -> None:
+    entry: Any = shape.shape if isinstance(shape, Items) else shape
+    names = tuple(entry)
+    before, _ = robot.read(path, shape)
+    exchange = ask(subscribers, operation)
+    found, problem = returned(exchange)
+    after, _ = robot.read(path, shape)
+    if before is None or after is None:
+        return
+    listed = entries_of([value_of(item, entry) for item in found], names)
+    wanted = [entries_of(before, names), entries_of(after, names)]
+    if not problem and listed not in wanted:
+        odd = sorted(set(listed) ^ set(wanted[0]))
+        problem = f"{len(listed)} entries for {len(wanted[0])}; in one only: {', '.join(odd[:3])}"
+    judge.check(
+        f"equivalence/{name}",
+        not problem,
+        exchange,
+        f"the entries of GET {path}",
+        found=problem,
+        cause="other entries",
+    )
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("equivalence/plan")
+def test_plan(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """The same question, with all its parameters or with few, has the same answer."""
+    here = robot.map_pose()
+    goals = reachable(robot, here, max(1.0, robot.statement.motion.radius_m), 3) if here else []
+    if not goals:
+        pytest.skip("the robot has no plan to any pose around it")
+    frame = robot.statement.motion.frame
+    for index in range(effort.cases(20)):
+        goal, start = goals[index % len(goals)], goals[(index + 1) % len(goals)]
+        few: dict[str, float | str] = {"x": goal.x, "y": goal.y}
+        if frame != "map":
+            few["frame_id"] = frame
+        full: dict[str, float | str] = {"x": goal.x, "y": goal.y, "yaw": 0.1 * index, "frame_id": frame}
+        full |= {"tolerance": 0.2, "start_x": start.x, "start_y": start.y, "start_yaw": start.yaw}
+        for parameters in (few, full):
+            _compare_plans(robot, subscribers, judge, goal, parameters)
+
+
+def _compare_plans(
+    robot: Robot, subscribers: SoapService, judge: Judge, goal: Pose, parameters: dict[str, float | str]
+) -> None:
+    before, _ = robot.read(query(**parameters), GET_PLAN)
+    exchange = ask(subscribers, "GetPlan", **parameters)
+    between, problem = _answered(exchange, GET_PLAN)
+    after, _ = robot.read(query(**parameters), GET_PLAN)
+    if before is None or after is None:
+        return
+    problem = problem or fault_in(between, GET_PLAN)
+    if not problem and not disagreement(before, after, before, _SAME):
+        problem = disagreement(before, between, after, _SAME)
+    elif not problem and plan_of(between).poses[-1].distance(goal) > _END_OFF:
+        # A planner may answer the same question in another way each time; then only what was asked for is the same.
+        problem = "the end is another one"
+    judge.check(
+        "equivalence/plan",
+        not problem,
+        exchange,
+        f"the plan to ({goal.x:.3f}, {goal.y:.3f}) that REST gives",
+        found=problem,
+        cause=problem.split(" is ")[0].split("[")[0],
+    )
+
+
+@pytest.mark.phase("motion")
+@pytest.mark.motion
+@pytest.mark.requirement("equivalence/goal")
+def test_goal(roaas: Session, robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """The active goal is the same one, and when there is none, both say so."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    _compare_goals(robot, subscribers, judge)
+    goals = choose_goals(robot, 1.5, 2)
+    for index in range(effort.cases(10)):
+        body = goal_body(goals[index % 2], robot.statement.motion.frame, f"equal \u00e9 <&> {index}")
+        put_goal(robot, body)
+        await_goal(robot, body)
+        for _ in range(3):
+            _compare_goals(robot, subscribers, judge)
+    robot.delete_goal()
+    await_none(robot)
+    _compare_goals(robot, subscribers, judge)
+
+
+def _compare_goals(robot: Robot, subscribers: SoapService, judge: Judge) -> None:
+    """Compare the goals that both interfaces show; the two may learn of a change one after the other."""
+    until = time.monotonic() + robot.settle_s
+    while True:
+        problem, exchange = _goal_difference(robot, subscribers)
+        if not problem or time.monotonic() > until:
+            break
+        time.sleep(0.05)
+    if problem is not None:
+        judge.check(
+            "equivalence/goal", not problem, exchange, "the goal that REST gives", found=problem, cause=problem[:20]
+        )
+
+
+def _goal_difference(robot: Robot, subscribers: SoapService) -> tuple[str | None, Exchange]:
+    """In what SOAP's goal is another than REST's; None where REST's has changed meanwhile."""
+    before, first = robot.goal()
+    exchange = ask(subscribers, "GetGoal")
+    found, problem = returned(exchange)
+    after, last = robot.goal()
+    statuses = {one.response.status for one in (first, last) if one.response}
+    if before is not None and after is not None and before["goal_id"]["id"] == after["goal_id"]["id"]:
+        between = value_of(found[0], _GOAL_AND_STATUS) if found else None
+        shown = [pruned(goal, _GOAL_AND_STATUS) for goal in (before, after)]
+        problem = problem or ("no goal" if between is None else disagreement(shown[0], between, shown[1], _SLACK))
+        return problem, exchange
+    if statuses == {404}:
+        # No goal: an empty response, or a fault.
+        return "a goal, where REST says that there is none" if found else "", exchange
+    return None, exchange

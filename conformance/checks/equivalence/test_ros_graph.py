@@ -1,0 +1,114 @@
+"""What only a look at the robot's ROS graph shows."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from conformance.robot.drive import BusyError, Drive
+from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
+from conformance.robot.probe.client import Probe, ProbeError, probe_of
+from conformance.robot.robot import SENSORS, STILL, Robot, Velocity
+from conformance.robot.stopping import bring_to_rest
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.needs("rest")
+# Types that nothing but a sensor publishes; what else is one is for the robot to say.
+_SENSOR_TYPES: Final = frozenset(
+    f"sensor_msgs/msg/{name}" for name in ("LaserScan", "Imu", "Image", "PointCloud2", "Range", "NavSatFix")
+)
+_ARRIVES_S: Final = 2.0
+# A probe learns of a publisher some time after it has joined, on a busy machine seconds.
+_DISCOVERED_S: Final = 10.0
+
+
+@pytest.fixture
+def probe(roaas: Session) -> Probe:
+    """The ROS probe."""
+    try:
+        return probe_of(roaas)
+    except ProbeError as error:
+        pytest.skip(str(error))
+
+
+@pytest.mark.phase("motion")
+@pytest.mark.requirement("equivalence/sensors-graph")
+def test_sensors_are_on_the_graph(roaas: Session, probe: Probe, judge: Judge) -> None:
+    """Every entry is a topic that is published, with its type; and no plain sensor is left out."""
+    entries, exchange = Robot(roaas).read(SENSORS, SENSORS_SHAPE)
+    if entries is None:
+        pytest.skip("the robot's list of sensors cannot be read")
+    listed = {("/" + entry["topic"].lstrip("/"), entry["type"]) for entry in entries}
+    there: set[tuple[str, str]] = set()
+    until = time.monotonic() + _DISCOVERED_S
+    while not listed <= there and time.monotonic() < until:
+        try:
+            topics = probe.topics()
+        except ProbeError as error:
+            pytest.skip(str(error))
+        there = {(name, type_) for name, types in topics.items() for type_ in types}
+        time.sleep(0.05)
+    sensors = {pair for pair in there if pair[1] in _SENSOR_TYPES}
+    for missing, found in ((listed - there, "not on the graph"), (sensors - listed, "not in the list")):
+        judge.check(
+            "equivalence/sensors-graph",
+            not missing,
+            exchange,
+            "the sensors that are published on the ROS graph",
+            found=f"{found}: {', '.join(' '.join(pair) for pair in sorted(missing))}",
+            cause=found,
+        )
+
+
+@pytest.mark.phase("motion")
+@pytest.mark.motion
+@pytest.mark.requirement("equivalence/velocity-message")
+def test_velocity_is_published(roaas: Session, probe: Probe, judge: Judge, effort: Effort) -> None:
+    """A velocity that was accepted is on the velocity topic, with all its digits."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    robot = Robot(roaas)
+    drive = Drive(robot)
+    try:
+        probe.velocities()
+        lost = 0
+        for index in range(effort.cases(12)):
+            share = (-1) ** index / (3 + index)
+            wanted = Velocity(
+                linear_x=share * robot.limits.linear_m_s if robot.actuated(0) else 0.0,
+                angular_z=-share * robot.limits.angular_rad_s if robot.actuated(5) else 0.0,
+            )
+            lost += not _judge_one(robot, probe, judge, wanted)
+            if lost > 1:
+                break
+        drive.command(STILL)
+    except ProbeError as error:
+        pytest.skip(str(error))
+    except BusyError as busy:
+        pytest.skip(str(busy))
+
+
+def _judge_one(robot: Robot, probe: Probe, judge: Judge, wanted: Velocity) -> bool:
+    exchange = robot.put_velocity(wanted)
+    if exchange.response is None or not exchange.response.ok:
+        return True
+    until = time.monotonic() + _ARRIVES_S
+    seen: list[Velocity] = []
+    while wanted not in seen and time.monotonic() < until:
+        seen += probe.velocities()
+        time.sleep(0.005)
+    return judge.check(
+        "equivalence/velocity-message",
+        wanted in seen,
+        exchange,
+        f"a message with {wanted}, bit for bit",
+        found=f"{len(seen)} messages, last {seen[-1]}" if seen else "no message",
+        cause="another message" if seen else "no message",
+    )

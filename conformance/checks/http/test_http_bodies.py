@@ -1,0 +1,128 @@
+"""Bodies: media types that an operation does not take, charset, and sizes (RFC 9110 8.3, 15.5.14, 15.5.16)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.rest.applicable import calm, few, need
+from conformance.rest.calls import JSON, Call, example_call
+from conformance.transport.client import NoAnswerError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conformance.documents.openapi import Operation
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
+_OTHERS = (
+    "text/plain",
+    "application/x-www-form-urlencoded",
+    "multipart/form-data; boundary=x",
+    "image/png",
+    "text/csv",
+)
+_CHARSETS = ("application/json; charset=utf-8", "application/json;charset=UTF-8", 'application/json; charset="utf-8"')
+_TAKEN = 64 * 1024
+_TOO_LARGE = 10 * 1024 * 1024 + 1
+
+
+def _takes_json(operation: Operation) -> bool:
+    return JSON in operation.bodies
+
+
+def _accepted(exchange: Exchange) -> bool:
+    """Whether a valid request was taken, or only put off."""
+    answer = exchange.response
+    return answer is not None and (answer.ok or answer.status == 409)
+
+
+def _valid(session: Session, judge: Judge, ids: tuple[str, ...]) -> Iterator[Call]:
+    """A valid request for each operation that takes JSON and is answered as one should be."""
+    tried = 0
+    for operation in need(session, ids, _takes_json, "takes JSON"):
+        calm(session)
+        call = example_call(session, operation)
+        exchange = call.send(session)
+        if _accepted(exchange):
+            tried += 1
+            yield call
+        else:
+            for id_ in ids:
+                judge.note(id_, f"a valid {operation.id} is answered {exchange.came}, so it was not tried")
+    calm(session)
+
+
+@pytest.mark.requirement("http/unsupported-media-type")
+def test_media_types_that_are_not_taken(roaas: Session, judge: Judge) -> None:
+    """A valid body under another media type, and under none at all, is not looked at."""
+    for operation in need(roaas, ["http/unsupported-media-type"], _takes_json, "takes JSON"):
+        call = example_call(roaas, operation)
+        for media_type in few(roaas, _OTHERS, 2):
+            if media_type in operation.bodies:
+                continue
+            exchange = call.send(roaas, ("Content-Type", media_type))
+            status = exchange.response.status if exchange.response else 0
+            judge.check(
+                "http/unsupported-media-type",
+                status == 415,
+                exchange,
+                f"415 for a body of {media_type}",
+                found=f"status {status}",
+                cause=f"{status}",
+            )
+
+
+@pytest.mark.requirement("http/charset")
+def test_charset_parameter(roaas: Session, judge: Judge) -> None:
+    """application/json is the same with a charset parameter as without."""
+    for call in _valid(roaas, judge, ("http/charset",)):
+        for media_type in few(roaas, _CHARSETS, 1):
+            exchange = call.send(roaas, ("Content-Type", media_type))
+            judge.check(
+                "http/charset",
+                _accepted(exchange),
+                exchange,
+                f"Content-Type: {media_type} taken like {JSON}",
+                cause=media_type,
+            )
+
+
+@pytest.mark.requirement("http/content-too-large", "http/no-server-error")
+def test_sizes(roaas: Session, judge: Judge) -> None:
+    """64 KiB are taken; more than 10 MiB are answered 413, or the connection is closed."""
+    judge.at_risk = ("http/content-too-large",)
+    for call in _valid(roaas, judge, ("http/content-too-large",)):
+        padded = call.carrying(call.body[:1] + b" " * (_TAKEN - len(call.body)) + call.body[1:])
+        exchange = padded.send(roaas)
+        judge.check("http/content-too-large", _accepted(exchange), exchange, "a body of 64 KiB taken")
+        huge = call.carrying(call.body[:1] + b" " * (_TOO_LARGE - len(call.body)) + call.body[1:])
+        for fields in ((), (("Transfer-Encoding", "chunked"),)):
+            _judge_too_large(roaas, judge, huge, fields)
+        exchange = call.send(roaas)
+        judge.check("http/content-too-large", _accepted(exchange), exchange, "the next valid request taken as ever")
+
+
+def _judge_too_large(session: Session, judge: Judge, call: Call, fields: tuple[tuple[str, str], ...]) -> None:
+    try:
+        exchange = call.send(session, *fields, fresh=True)
+    except NoAnswerError as none:
+        if none.kind != "closed":
+            raise
+        judge.check("http/content-too-large", True, none.exchange, "413, or a closed connection")
+        return
+    status = exchange.response.status if exchange.response else 0
+    # A server that takes no chunked bodies at all may say so (RFC 9112 6.3, RFC 9110 15.6.2 for an old one).
+    refused = {413, 411, 400, 501} if fields else {413}
+    judge.check(
+        "http/content-too-large",
+        status in refused,
+        exchange,
+        "413, or a closed connection",
+        found=f"status {status} for a body of {_TOO_LARGE:,} octets",
+        cause=f"{status} {bool(fields)}",
+    )

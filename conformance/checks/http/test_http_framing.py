@@ -1,0 +1,121 @@
+"""Framing, by hand: what a client library would never send, and answers read octet by octet (RFC 9112)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.rest.applicable import is_slow, reads
+from conformance.transport import raw
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.rest.calls import Call
+    from conformance.transport.client import HttpClient
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.needs("rest")
+# How long a robot may think about octets that are no request before it is taken to wait for more of them, s.
+_THINK_S = 3.0
+_IN_ALL = 56
+_GARBAGE = (
+    b"ROBOT\r\n\r\n",
+    b"\x00\x01\x02\x03\xff\xfe\r\n\r\n",
+    b"GET / JUNK/1.1\r\nHost: robot\r\n\r\n",
+    b"GET / HTTP/x.y\r\nHost: robot\r\n\r\n",
+    b"one two three four five\r\nHost: robot\r\n\r\n",
+    b'{"x": 0.1}\r\n\r\n',
+)
+
+
+def _first(session: Session) -> Call:
+    """A read that every robot has, without parameters where there is one."""
+    calls = [call for call in reads(session) if not call.operation.optional] or reads(session)
+    return min(calls, key=lambda call: "?" in call.path)
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("http/framing")
+def test_every_octet_of_an_answer(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """A status line, valid fields, exactly as many octets as are said, and nothing behind them.
+
+    Often enough for a robot that is wrong one time in fifty: client libraries do not see what is behind an answer.
+    """
+    calls = reads(roaas)
+    turns = -(-_IN_ALL // max(1, len(calls))) if not is_slow(roaas) else 1
+    for turn, call in enumerate(calls * turns):
+        for method in ("GET", "OPTIONS") if turn < len(calls) else ("GET",):
+            octets = raw.head(rest, method, call.path, "Accept: application/json", "Connection: close")
+            exchange, surplus = raw.read_one(rest, octets, raw.talk(rest, octets), method)
+            fault = exchange.problem or (
+                f"{len(surplus)} octets behind the answer: {surplus[:40]!r}" if surplus else ""
+            )
+            judge.check("http/framing", not fault, exchange, "one well-framed answer", found=fault)
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("http/framing", "http/head-no-body")
+def test_answers_stay_aligned(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """Of two requests sent at once, the second answer begins where the first one ends; also behind HEAD."""
+    path = _first(roaas).path
+    for method in ("GET", "HEAD", "OPTIONS"):
+        octets = raw.head(rest, method, path) + raw.head(rest, "GET", path, "Connection: close")
+        came = raw.talk(rest, octets)
+        exchange, behind = raw.read_one(rest, octets, came, method)
+        if behind and exchange.response is not None:
+            # Nothing behind is fine: a robot may close after one answer.
+            exchange, behind = raw.read_one(rest, octets, raw.rest_of(came, behind), "GET")
+        fault = exchange.problem or (f"{len(behind)} octets behind the second answer" if behind else "")
+        judge.check("http/framing", not fault, exchange, f"two well-framed answers, to {method} and GET", found=fault)
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement("http/host-missing", "http/host-twice", "http/content-length-conflict")
+def test_fields_that_have_to_be_refused(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """No Host, two of them, and two lengths for one body (RFC 9112 3.2, 6.3)."""
+    path = _first(roaas).path
+    host = f"Host: {rest.authority}"
+    for id_, closing, octets in (
+        ("http/host-missing", False, raw.head(rest, "GET", path, host=False)),
+        ("http/host-twice", False, raw.head(rest, "GET", path, host)),
+        ("http/host-twice", False, raw.head(rest, "GET", path, "Host: another.example")),
+        ("http/content-length-conflict", True, raw.head(rest, "GET", path, "Content-Length: 0", "Content-Length: 5")),
+        ("http/content-length-conflict", True, raw.head(rest, "GET", path, "Content-Length: 5", "Content-Length: 0")),
+    ):
+        judge.at_risk = (id_,)
+        came = raw.talk(rest, octets, timeout_s=_patience(roaas), answers=1)
+        exchange, _ = raw.read_one(rest, octets, came, "GET")
+        status = exchange.response.status if exchange.response else 0
+        judge.check(
+            id_,
+            status == 400 or (closing and came.closed and not came.octets),
+            exchange,
+            "400, or a closed connection" if closing else "400",
+            found=f"status {status}" if status else exchange.problem,
+            cause=f"{status}",
+        )
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement("http/malformed-request")
+def test_octets_that_are_no_request(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """What is no HTTP is refused or cut off, and the robot answers the next request."""
+    judge.at_risk = ("http/malformed-request",)
+    for octets in _GARBAGE:
+        came = raw.talk(rest, octets, timeout_s=_patience(roaas), answers=1)
+        exchange, _ = raw.read_one(rest, octets, came, "GET")
+        status = exchange.response.status if exchange.response else 0
+        judge.check(
+            "http/malformed-request",
+            400 <= status < 500 or status == 505 or (came.closed and not came.octets),
+            exchange,
+            "400, another 4xx, 505, or a closed connection",
+            found=f"status {status} for {octets[:40]!r}" if status else exchange.problem,
+            cause=f"{status} {came.closed}",
+        )
+    _first(roaas).send(roaas)
+
+
+def _patience(session: Session) -> float:
+    return min(session.connection.timeout_s, _THINK_S + 4 * session.effort.usual_ms / 1000)

@@ -1,0 +1,58 @@
+"""What a client will not have is not sent (RFC 9110 12.4.2, 12.5.1, 15.5.7)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.rest.accept import quality
+from conformance.rest.applicable import answered, few, sampled
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+# Nothing that a robot could have beside the formats of the contract.
+_NOTHING = ("image/png", "application/vnd.roaas-nobody-has-this", "audio/*;q=0.5, video/*", "*/*;q=0")
+
+
+@pytest.mark.requirement("http/not-acceptable")
+def test_no_acceptable_format(roaas: Session, judge: Judge) -> None:
+    """Where nothing that the robot has is acceptable, it says so."""
+    cases = [(call, accept) for call in answered(roaas) for accept in _NOTHING]
+    for call, accept in sampled(roaas, cases, 120, "not acceptable"):
+        exchange = call.send(roaas, ("Accept", accept))
+        status = exchange.response.status if exchange.response else 0
+        judge.check(
+            "http/not-acceptable",
+            status == 406,
+            exchange,
+            f"406 for Accept: {accept}",
+            found=f"status {status}",
+            cause=f"{status}",
+        )
+
+
+@pytest.mark.requirement("http/q-zero")
+def test_quality_zero(roaas: Session, judge: Judge) -> None:
+    """A format with q=0 is not sent, whatever else is: another one, or 406."""
+    for call in few(roaas, answered(roaas), 2):
+        first = call.operation.formats[0] if call.operation.formats else "application/json"
+        others = [name for name in call.operation.formats if name != first]
+        refused = [f"{first};q=0", f"{first};q=0.000, */*", f"{first} ; q=0"]
+        refused += [f"{name};q=0, {first};q=0, */*;q=0.5" for name in others[:1]]
+        refused += [f"{name};q=0" for name in others]
+        for accept in sampled(roaas, refused, 20, call.operation.id):
+            exchange = call.send(roaas, ("Accept", accept))
+            answer = exchange.response
+            sent = answer.media_type if answer is not None and answer.ok else ""
+            judge.check(
+                "http/q-zero",
+                not sent or quality(sent, accept) > 0,
+                exchange,
+                f"no format with q=0 in Accept: {accept}",
+                found=f"{sent} is sent",
+                cause=sent,
+            )

@@ -1,0 +1,136 @@
+"""Targets: paths that nobody knows, trailing slashes, targets and fields that are too long."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from urllib.parse import urljoin, urlsplit
+
+import pytest
+
+from conformance.documents.openapi import known_path, resources_of
+from conformance.rest.applicable import few, reads, sampled
+from conformance.rest.calls import example_call
+from conformance.rest.observers import KNOWN_METHODS
+from conformance.transport.client import NoAnswerError
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.transport.client import HttpClient
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+_METHODS = ("GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS", "PATCH", "FOO")
+_STRANGE = "roaas-nobody-has-this"
+# At quick effort; at any other one, all.
+_FEW_PATHS = 4
+_LONG_TARGET = 9_000
+_LONG_FIELD = 128 * 1024
+
+
+def _unknown_paths(session: Session) -> list[str]:
+    """Paths that are near to those of the contract, and match none of them."""
+    literal = [item.template for item in resources_of(session.contract) if "{" not in item.template]
+    near = [f"/{_STRANGE}", f"/{_STRANGE}/"]
+    near += [path.rstrip("/") + f"/{_STRANGE}/" for path in literal[:4]]
+    near += ["/".join([*path.strip("/").split("/")[:-1], _STRANGE]) for path in literal[:2]]
+    paths = [path if path.startswith("/") else f"/{path}" for path in near]
+    return [path for path in dict.fromkeys(paths) if not known_path(session.contract, path)]
+
+
+@pytest.mark.requirement(
+    "http/not-found", "http/problem-type", "http/problem-status", "http/no-traceback", "rest-formats/problem-xml"
+)
+def test_unknown_paths(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """An unknown path is 404 for every method, and its problem is judged by the observers."""
+    paths = _unknown_paths(roaas)
+    for path in sampled(roaas, paths, 10 * _FEW_PATHS, "unknown paths"):
+        for method in few(roaas, _METHODS, 3):
+            exchange = rest.send(method, path)
+            status = exchange.response.status if exchange.response else 0
+            judge.check(
+                "http/not-found",
+                status == 404 or (status == 501 and method not in KNOWN_METHODS),
+                exchange,
+                f"404 for {method} of an unknown path",
+                found=f"status {status}",
+                cause=f"{method} {status}",
+            )
+        rest.send("GET", path, headers=[("Accept", "application/xml")])
+
+
+@pytest.mark.requirement("http/trailing-slash")
+def test_trailing_slash(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """Without its trailing slash a path is unknown, or redirected to the right one."""
+    ending = [item for item in resources_of(roaas.contract) if item.template.endswith("/") and len(item.template) > 1]
+    tried = 0
+    for resource in ending:
+        operation = resource.operations.get("GET")
+        if operation is None or operation.optional:
+            continue
+        path = example_call(roaas, operation).path.split("?", 1)[0]
+        cut = path.rstrip("/")
+        if known_path(roaas.contract, cut):
+            continue
+        tried += 1
+        exchange = rest.send("GET", cut)
+        status = exchange.response.status if exchange.response else 0
+        right = status == 404 or (status in {301, 307, 308} and _leads_to(exchange, rest.prefix + path))
+        location = exchange.response.header("location") if exchange.response else None
+        judge.check(
+            "http/trailing-slash",
+            right,
+            exchange,
+            f"404, or 301, 307 or 308 to {path}",
+            found=f"status {status}" + (f" to {location}" if location else ""),
+            cause=f"{status}",
+        )
+    if not tried:
+        judge.unclaimed("http/trailing-slash", "the contract has no path with a trailing slash to cut")
+
+
+def _leads_to(exchange: Exchange, path: str) -> bool:
+    location = exchange.response.header("location") if exchange.response else None
+    return location is not None and urlsplit(urljoin(exchange.request.url, location)).path == path
+
+
+@pytest.mark.requirement("http/uri-too-long", "http/no-server-error")
+def test_long_targets(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """A target of 9,000 octets is refused."""
+    judge.at_risk = ("http/uri-too-long",)
+    for call in [call for call in reads(roaas) if not call.operation.optional]:
+        mark = "&" if "?" in call.path else "?"
+        for path in (f"{call.path}{mark}roaas={'a' * _LONG_TARGET}",):
+            exchange = rest.send("GET", path, fresh=True)
+            status = exchange.response.status if exchange.response else 0
+            judge.check(
+                "http/uri-too-long",
+                status in {414, 400, 431},
+                exchange,
+                "414, 400 or 431",
+                found=f"status {status} for a target of {len(path):,} octets",
+            )
+
+
+@pytest.mark.requirement("http/header-too-large", "http/no-server-error")
+def test_large_field(roaas: Session, judge: Judge) -> None:
+    """A field of 128 KiB is refused, or the connection closed, or the field ignored; never 5xx."""
+    judge.at_risk = ("http/header-too-large",)
+    for call in [call for call in reads(roaas) if not call.operation.optional][:3]:
+        try:
+            exchange = call.send(roaas, ("X-Roaas", "a" * _LONG_FIELD), fresh=True)
+        except NoAnswerError as none:
+            if none.kind != "closed":
+                raise
+            judge.check(
+                "http/header-too-large", True, none.exchange, "431, 400, 413, a closed connection, or no matter"
+            )
+            continue
+        status = exchange.response.status if exchange.response else 0
+        judge.check(
+            "http/header-too-large",
+            status in {431, 400, 413} or status < 300,
+            exchange,
+            "431, 400, 413, a closed connection, or no matter",
+            found=f"status {status} for a field of {_LONG_FIELD:,} octets",
+        )

@@ -1,0 +1,75 @@
+"""Problems: an error says in words what was wrong, and where (RFC 9457 3.1.4)."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.documents.json_schema import kind_of
+from conformance.documents.openapi import operations_of
+from conformance.rest.applicable import calm, few, need, reads
+from conformance.rest.calls import JSON, example_call
+from conformance.rest.mutations import mutations
+from conformance.rest.refusals import judge_refusal
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.needs("rest")
+_IDS = ("http/problem-detail", "http/problem-value", "http/problem-type", "http/problem-status", "http/no-traceback")
+_TEXT = "roaas-no-number"
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement(*_IDS, "rest-formats/problem-xml", "strict-input/query-parameter")
+def test_problem_of_a_query(roaas: Session, judge: Judge) -> None:
+    """A query parameter that is no number is named, and so is what stood there instead."""
+    numbers = {"number", "integer"}
+    tried = 0
+    for call in reads(roaas):
+        for item in call.operation.parameter("query"):
+            if kind_of(item.schema) not in numbers:
+                continue
+            tried += 1
+            wrong = call.having(item.name, _TEXT)
+            judge_refusal(
+                roaas,
+                partial(wrong.send, roaas),
+                "strict-input/query-parameter",
+                f"text at {item.name}",
+                field=item.name,
+                shown=_TEXT,
+                json=False,
+            )
+            wrong.send(roaas, ("Accept", "application/xml"))
+    if not tried and not any(JSON in operation.bodies for operation in operations_of(roaas.contract)):
+        for id_ in _IDS[:2]:
+            judge.unclaimed(id_, "the contract has no input in which a field could be wrong")
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement(*_IDS, "strict-input/json-missing", "strict-input/json-type")
+def test_problem_of_a_body(roaas: Session) -> None:
+    """A field that is missing or of another type is named in the problem."""
+    calm(roaas)
+    for operation in need(roaas, (), lambda item: JSON in item.bodies, "takes JSON"):
+        call = example_call(roaas, operation)
+        made = [
+            item
+            for item in mutations(call.value, operation.bodies[JSON].schema)
+            if item.requirement in {"json-missing", "json-type"} and (item.shown or "missing" in item.name)
+        ]
+        for item in few(roaas, made[:: max(1, len(made) // 6)], 2):
+            judge_refusal(
+                roaas,
+                partial(call.carrying(item.body).send, roaas),
+                f"strict-input/{item.requirement}",
+                item.name,
+                field=item.field,
+                shown=item.shown,
+                malformed=item.malformed,
+            )
+    calm(roaas)

@@ -1,0 +1,47 @@
+"""Plain reads, and many of them: what the observers judge has to hold each time, not forty-nine times in fifty."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.rest.applicable import is_slow, reads
+from conformance.rest.observers import watch
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.verdict.effort import Effort
+
+pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+# Of each resource at standard effort; and in all at any effort with a robot that is fast enough: one fault in fifty.
+_EACH = 60
+_IN_ALL = 56
+
+
+@pytest.mark.requirement(
+    "http/declared-status",
+    "http/declared-body",
+    "http/content-type",
+    "http/date",
+    "http/framing",
+    "http/no-server-error",
+    "http/json-finite",
+    "http/json-encoding",
+    "http/json-unique-names",
+)
+def test_each_resource_is_read_over_and_over(roaas: Session, effort: Effort) -> None:
+    """Each GET operation in turn, as JSON; the observers judge every answer.
+
+    The turns take a prime number of requests more than there are operations, so that a robot which fails with every
+    n-th answer does not always fail with the same one.
+    """
+    watch(roaas)
+    calls = reads(roaas)
+    rounds = effort.cases(_EACH)
+    if calls and not is_slow(roaas):
+        rounds = max(rounds, math.ceil(_IN_ALL / len(calls)))
+    for turn in range(rounds):
+        for call in calls[turn % len(calls) :] + calls[: turn % len(calls)]:
+            call.send(roaas, *((("Accept", "application/json"),) if turn % 2 else ()))

@@ -1,0 +1,238 @@
+"""Safe methods change nothing (RFC 9110 9.2.1); PUT and DELETE are idempotent (9.2.2)."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.rest.applicable import calm, few, need, reads
+from conformance.rest.calls import JSON, Call, example_call
+from conformance.rest.effects import reader_of, settles_at
+from conformance.rest.snapshot import changed, changes_by_itself, leaves, snapshot
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.needs("rest")
+_TURNS = 3
+# How long a suspect is left alone to see whether it changes by itself, s.
+_ALONE_S = 0.6
+# How long what was put is watched, s: longer than a cancelled goal takes to end.
+_WATCHED_S = 0.15
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("http/safe")
+def test_reading_changes_nothing(roaas: Session, judge: Judge) -> None:
+    """What was steady before GET, HEAD and OPTIONS of everything is the same after them."""
+    _judge_safe(roaas, judge)
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement("http/safe")
+def test_reading_changes_nothing_after_input(roaas: Session, judge: Judge) -> None:
+    """The same when the robot has something to lose: a list that is not empty, a value that was set."""
+    if roaas.allow_motion:
+        calm(roaas)
+        _judge_safe(roaas, judge)
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement("http/safe")
+def test_reading_leaves_what_was_put(roaas: Session, judge: Judge) -> None:
+    """What a PUT has made (an active goal) is still there after HEAD and OPTIONS of everything.
+
+    What does not last twice as long by itself is not judged: a goal ends when it is reached.
+    """
+    calls = [Call(call.operation, call.values) for call in reads(roaas)]
+    others = few(roaas, calls, 1)
+    for operation in need(roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts"):
+        calm(roaas)
+        call = example_call(roaas, operation)
+        reader = reader_of(roaas, call)
+        if reader is None or _is_there(reader.send(roaas)):
+            continue
+        kept, exchange, took = _put_and_watch(roaas, call, reader, [reader, *others], _WATCHED_S)
+        if not kept:
+            # Does it last by itself, twice as long? Then once more with HEAD and OPTIONS.
+            if not _put_and_watch(roaas, call, reader, [], 2 * took)[0]:
+                continue
+            kept, exchange, _ = _put_and_watch(roaas, call, reader, [reader, *others], _WATCHED_S)
+        judge.check(
+            "http/safe",
+            kept,
+            exchange,
+            "what was put still there after HEAD and OPTIONS",
+            found=f"{operation.template} is answered {exchange.came} after HEAD and OPTIONS, and 200 before",
+        )
+    calm(roaas)
+
+
+def _put_and_watch(
+    session: Session, call: Call, reader: Call, asked: list[Call], seconds: float
+) -> tuple[bool, Exchange, float]:
+    """PUT, ask HEAD and OPTIONS of some, and look whether what was put stays there for so long.
+
+    Returns:
+        Whether it does, the last reading, and how long all of it took, s.
+    """
+    calm(session)
+    call.send(session)
+    started = time.monotonic()
+    exchange = reader.send(session)
+    for item in asked:
+        for method in ("HEAD", "OPTIONS"):
+            item.send(session, method=method)
+    until = time.monotonic() + seconds
+    while _is_there(exchange) and time.monotonic() < until:
+        time.sleep(0.01)
+        exchange = reader.send(session)
+    return _is_there(exchange), exchange, time.monotonic() - started
+
+
+def _is_there(exchange: Exchange) -> bool:
+    return exchange.response is not None and exchange.response.ok
+
+
+def _judge_safe(session: Session, judge: Judge) -> None:
+    """Compare what is steady before and after; what changes with nothing asked as well is no effect of asking.
+
+    A robot that changes by itself changes in some turns; one whose safe methods have effects changes in every turn.
+    """
+    calls = few(session, reads(session), 3)
+    suspects: dict[tuple[str, str], Exchange] = {}
+    for turn in range(_TURNS):
+        before = snapshot(session, calls)
+        for call in calls:
+            for method in ("HEAD", "OPTIONS", "GET"):
+                call.send(session, method=method)
+        found: dict[tuple[str, str], Exchange] = {}
+        told: dict[tuple[str, str], str] = {}
+        for call in calls:
+            id_ = call.operation.id
+            exchange = call.send(session, ("Accept", JSON))
+            for place, (old, new) in changed(before[id_][0], leaves(exchange)).items():
+                found[id_, place] = exchange
+                told[id_, place] = f"{place} of {id_} was {old!r} before, and is {new!r}"
+        suspects = found if turn == 0 else {key: item for key, item in found.items() if key in suspects}
+        if not suspects:
+            break
+    by_id = {call.operation.id: call for call in calls}
+    guilty = {
+        key: exchange
+        for key, exchange in list(suspects.items())[:5]
+        if not changes_by_itself(session, by_id[key[0]], key[1], _ALONE_S)
+    }
+    for key, exchange in guilty.items():
+        judge.check("http/safe", False, exchange, "the same after GET, HEAD and OPTIONS of everything", found=told[key])
+    if not guilty:
+        judge.check("http/safe", True, None, "the same after GET, HEAD and OPTIONS of everything")
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement("http/put-idempotent")
+def test_put_twice(roaas: Session, judge: Judge) -> None:
+    """The same PUT twice succeeds twice, and leaves the resource as PUT once does."""
+    wanted = need(roaas, ["http/put-idempotent"], lambda item: item.method == "PUT", "is a PUT")
+    for operation in wanted:
+        calm(roaas)
+        call = example_call(roaas, operation)
+        first, once, second = _pair(roaas, call)
+        if second.response is not None and second.response.status == 409:
+            # A goal of the robot's own may have begun in between: once more from the start.
+            calm(roaas)
+            first, once, second = _pair(roaas, call)
+        if not _accepted(judge, "http/put-idempotent", operation.id, first):
+            continue
+        statuses = [item.response.status if item.response else 0 for item in (first, second)]
+        fine = 200 <= statuses[1] < 300 or statuses[0] == 409
+        judge.check(
+            "http/put-idempotent",
+            fine,
+            second,
+            "a second PUT that succeeds as the first did",
+            found=f"{statuses[0]} and then {statuses[1]} for {operation.id}",
+            cause=f"{operation.id} {statuses[1]}",
+        )
+        # What a single PUT reaches is judged elsewhere; here, that two do not add up.
+        if fine and once:
+            calm(roaas)
+            call.send(roaas)
+            judge.check(
+                "http/put-idempotent",
+                settles_at(roaas, call) != "",
+                second,
+                "the same as after one PUT",
+                found=f"after the second {operation.id}, {once}",
+                cause=f"{operation.id} effect",
+            )
+    calm(roaas)
+
+
+def _pair(session: Session, call: Call) -> tuple[Exchange, str | None, Exchange]:
+    """A PUT, what the resource then shows otherwise, and the same PUT again."""
+    first = call.send(session)
+    second = call.send(session)
+    return first, settles_at(session, call), second
+
+
+def _accepted(judge: Judge, requirement: str, id_: str, exchange: Exchange) -> bool:
+    """Whether the contract's example was taken; a robot with reasons of its own to refuse it is not blamed here."""
+    answer = exchange.response
+    if answer is not None and (answer.ok or answer.status == 409):
+        return True
+    judge.note(requirement, f"{id_} with a valid request is answered {exchange.came}, so it was not tried")
+    return False
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement("http/delete-idempotent")
+def test_delete_twice(roaas: Session, judge: Judge) -> None:
+    """After one DELETE another one is answered 2xx or 404, and the resource stays as it is."""
+    wanted = need(roaas, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "is a DELETE")
+    by_path = {call.operation.template: call for call in reads(roaas)}
+    for operation in wanted:
+        for attempt in (1, 2):
+            calm(roaas)
+            call = example_call(roaas, operation)
+            call.send(roaas)
+            read = by_path.get(operation.template)
+            before = _after_a_while(roaas, read)
+            exchange = call.send(roaas)
+            status = exchange.response.status if exchange.response else 0
+            judge.check(
+                "http/delete-idempotent",
+                200 <= status < 300 or status == 404,
+                exchange,
+                "2xx or 404 for a second DELETE",
+                found=f"status {status}",
+                cause=f"{status}",
+            )
+            after = _after_a_while(roaas, read)
+            # A robot with a mission waiting may have begun it in between: that is no effect of the DELETE.
+            if before == after or attempt == 2:
+                judge.check(
+                    "http/delete-idempotent",
+                    before == after,
+                    exchange,
+                    "the same after the second DELETE as after the first",
+                    found=f"GET is answered {after} after the second DELETE, and {before} after the first",
+                )
+                break
+
+
+def _after_a_while(session: Session, read: Call | None) -> int:
+    """The status of GET, once it is the same three times: a cancelled goal may take a moment to end."""
+    if read is None:
+        return 0
+    statuses: list[int] = []
+    until = time.monotonic() + session.statement.limits.settle_s
+    while True:
+        answer = read.send(session).response
+        statuses.append(answer.status if answer else 0)
+        if (len(statuses) > 2 and len(set(statuses[-3:])) == 1) or time.monotonic() > until:
+            return statuses[-1]

@@ -1,0 +1,168 @@
+"""Schemathesis over the contract's OpenAPI: examples, coverage, fuzzing and a walk along its links.
+
+Its requests are judged by what they are on the wire: valid ones by the statuses of the contract, invalid ones by 4xx.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from hypothesis.errors import Unsatisfiable
+
+from conformance.rest.applicable import allowed, calm, few, is_slow, sampled
+from conformance.rest.motion_guard import Harmless
+from conformance.rest.refusals import judge_refusal
+from conformance.rest.validity import INVALID, VALID, validity
+
+if TYPE_CHECKING:
+    from conformance.documents.openapi import Operation
+    from conformance.engine.session import Session
+    from conformance.rest.generated import Made, Target
+    from conformance.transport.client import HttpClient
+    from conformance.verdict.evidence import Judge
+    from conformance.verdict.explorer import Explorer
+
+pytestmark = pytest.mark.needs("rest")
+_IDS = ("http/declared-status", "http/declared-body", "http/no-server-error")
+_STRICT = tuple(
+    f"strict-input/{name}"
+    for name in (
+        "json-malformed",
+        "json-missing",
+        "json-unknown",
+        "json-type",
+        "json-non-finite",
+        "json-root",
+        "json-encoding",
+        "json-empty",
+        "json-bounds",
+        "path-parameter",
+        "query-parameter",
+        "query-missing",
+        "xml-body",
+        "status-malformed",
+        "status-invalid",
+    )
+)
+# At standard effort, of each operation: cases of the coverage phase, and of each kind of fuzzing.
+_COVERAGE = 110
+_FUZZED = 14
+_POSITIVE_REFUSALS = frozenset({405, 406, 408, 411, 413, 414, 415, 431})
+
+
+def _targets(session: Session, *, moving: bool) -> list[Target]:
+    if session.effort.name == "quick":
+        return []  # importing Schemathesis and reading the contract takes a tenth of the time that a quick run has
+    from conformance.rest.generated import targets  # noqa: PLC0415 - half a second that an unclaimed class need not pay
+
+    chosen = []
+    for target in targets(session.contract):
+        operation = _operation(session, target)
+        if operation is not None and operation.motion == moving and allowed(session, operation):
+            chosen.append(target)
+    return chosen
+
+
+def _operation(session: Session, target: Target) -> Operation | None:
+    from conformance.documents.openapi import operations_of  # noqa: PLC0415 - beside the one above
+
+    return next((item for item in operations_of(session.contract) if item.label == target.label), None)
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement(*_IDS, "strict-input/query-parameter", "strict-input/query-missing")
+def test_reading_operations(roaas: Session, judge: Judge, explore: Explorer) -> None:
+    """What moves nothing."""
+    harmless = Harmless(roaas)
+    for target in _targets(roaas, moving=False):
+        _run(roaas, judge, explore, harmless, target)
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement(*_IDS, *_STRICT)
+def test_moving_operations(roaas: Session, judge: Judge, explore: Explorer) -> None:
+    """What may move the robot: invalid requests, and a few valid ones made fit for it."""
+    harmless = Harmless(roaas)
+    calm(roaas)
+    for target in _targets(roaas, moving=True):
+        _run(roaas, judge, explore, harmless, target)
+        calm(roaas)
+
+
+def _run(session: Session, judge: Judge, explore: Explorer, harmless: Harmless, target: Target) -> None:
+    coverage = sampled(session, list(target.coverage()), _COVERAGE, f"coverage {target.label}")
+    for item in few(session, [*target.examples(), *coverage], 1):
+        _judge_made(session, judge, harmless, item)
+
+    def fuzz(item: Made | None) -> None:
+        if item is not None:
+            _judge_made(session, judge, harmless, item)
+
+    if is_slow(session) or not target.has_input:
+        return
+    for negative in (True, False):
+        try:
+            explore(target.fuzzing(negative=negative), fuzz, cases=_FUZZED)
+        except Unsatisfiable:
+            continue  # its schemas take everything, or nothing: there is no such case
+
+
+def _judge_made(session: Session, judge: Judge, harmless: Harmless, item: Made) -> None:
+    """Send one request where it is harmless, and judge its answer by what it is on the wire."""
+    fit = harmless.made(item)
+    if fit is None:
+        return
+    said = validity(session.contract, fit.method, fit.target, fit.media_type, fit.body)
+    if said.verdict == INVALID:
+        body = said.requirement.startswith("json")
+        judge_refusal(session, lambda: fit.send(session), f"strict-input/{said.requirement}", said.why, json=body)
+        return
+    exchange = fit.send(session)
+    answer = exchange.response
+    if answer is None:
+        return
+    harmless.sent(fit, accepted=answer.ok)
+    if said.verdict == VALID and said.operation is not None:
+        judge.check(
+            "http/declared-status",
+            answer.status not in _POSITIVE_REFUSALS,
+            exchange,
+            f"a valid request of {said.operation.id} not refused for its form",
+            found=f"status {answer.status}",
+            cause=f"{said.operation.id} {answer.status}",
+        )
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement("http/no-server-error")
+def test_walk_along_the_links(roaas: Session, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
+    """A few short walks from operation to operation, as the contract's links lead."""
+    judge.check("http/no-server-error", True, None, "no 5xx on the way")
+    if roaas.effort.name == "quick":
+        return
+    from conformance.rest.generated import as_thesis, made, state_machine  # noqa: PLC0415 - as above
+
+    machine: Any = state_machine(roaas.contract.openapi)
+    if machine is None:
+        judge.note("http/no-server-error", "the contract has no links to walk along")
+        return
+    harmless = Harmless(roaas)
+
+    class Walk(machine):  # type: ignore[misc] # made at run time
+        def call(self, case: Any, **_: Any) -> Any:
+            one = made(case)
+            fit = harmless.made(one) if one is not None else None
+            if fit is None:
+                exchange = rest.send("GET", roaas.rest_path())
+            else:
+                exchange = fit.send(roaas)
+                harmless.sent(fit, accepted=bool(exchange.response and exchange.response.ok))
+            return as_thesis(exchange)
+
+        def validate_response(self, *_: Any, **__: Any) -> None:
+            """The observers have judged it."""
+
+    calm(roaas)
+    explore.machine(Walk, cases=4, steps=5)
+    calm(roaas)

@@ -1,0 +1,135 @@
+"""PUT takes XML in the form that the robot sends (contract, fine print)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.documents.representation import UnreadableError, flattened, local_name, parse_xml, read
+from conformance.documents.writing import xml_bytes
+from conformance.rest.applicable import calm, need
+from conformance.rest.calls import XML, Call, example_call, root_name
+from conformance.rest.effects import reader_of, settles_at
+from conformance.rest.formats import disagreements
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
+_ID = "rest-formats/xml-input"
+
+
+@pytest.mark.requirement("rest-formats/same-values", "rest-formats/xml-root")
+def test_formats_of_what_was_put(roaas: Session, judge: Judge) -> None:
+    """A resource that is there only when something was put (a goal) has the same values in all formats as well."""
+    for operation in need(roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts something"):
+        calm(roaas)
+        call = example_call(roaas, operation)
+        reader = reader_of(roaas, call)
+        if reader is None or _is_there(reader.send(roaas)):
+            continue
+        if not _is_there(call.send(roaas)):
+            continue
+        others = [name for name in (XML, "text/plain") if name in reader.operation.formats]
+        found, exchange = disagreements(roaas, reader, others)
+        if not _is_there(exchange):
+            continue
+        first = found[0] if found else None
+        judge.check(
+            "rest-formats/same-values",
+            first is None,
+            first.exchange if first else exchange,
+            f"the same values in all formats of {reader.operation.template}",
+            found=first.told if first else "",
+            cause=reader.operation.id,
+        )
+        form = _sent_form(roaas, call)
+        wanted = root_name(reader.operation.shape or {})
+        if form is not None and wanted:
+            judge.check(
+                "rest-formats/xml-root",
+                local_name(form) == wanted,
+                exchange,
+                "a root named after the type",
+                found=f"the root element is {local_name(form)!r} and not {wanted!r}",
+            )
+    calm(roaas)
+
+
+def _is_there(exchange: Exchange) -> bool:
+    return exchange.response is not None and exchange.response.ok
+
+
+@pytest.mark.requirement(_ID)
+def test_xml_is_taken(roaas: Session, judge: Judge) -> None:
+    """A valid value as XML is accepted, and has the effect that it has as JSON."""
+    for operation in need(roaas, [_ID], lambda item: XML in item.bodies, "takes XML"):
+        calm(roaas)
+        call = example_call(roaas, operation, XML)
+        plain = example_call(roaas, operation).send(roaas)
+        if plain.response is None or not (plain.response.ok or plain.response.status == 409):
+            judge.note(_ID, f"a valid {operation.id} as JSON is answered {plain.came}, so it was not tried as XML")
+            continue
+        calm(roaas)
+        like = _sent_form(roaas, call)
+        body = xml_bytes(call.value, root_name(operation.bodies[XML].schema) or "value", like)
+        for accept in ("application/json", XML):
+            call = call.carrying(body)
+            exchange = call.send(roaas, ("Accept", accept))
+            status = exchange.response.status if exchange.response else 0
+            taken = judge.check(
+                _ID,
+                200 <= status < 300 or status == 409,
+                exchange,
+                f"{operation.id} as {XML} accepted as it is as JSON",
+                found=exchange.came,
+                cause=f"{operation.id} {status}",
+            )
+            if taken and exchange.response is not None and exchange.response.ok:
+                fault = _echo_fault(call, exchange)
+                judge.check(_ID, not fault, exchange, "the accepted value", found=fault, cause=f"{operation.id} echo")
+        if taken and status != 409:
+            other = settles_at(roaas, call)
+            if other is not None:
+                judge.check(
+                    _ID,
+                    not other,
+                    exchange,
+                    f"the effect that {operation.id} has as JSON",
+                    found=other,
+                    cause=f"{operation.id} effect",
+                )
+    calm(roaas)
+
+
+def _sent_form(session: Session, call: Call) -> etree._Element | None:
+    """The resource as the robot sends it in XML; None where it has nothing to send just now."""
+    reader = reader_of(session, call)
+    answer = reader.send(session, ("Accept", XML)).response if reader else None
+    if answer is None or not answer.ok or answer.media_type != XML:
+        return None
+    try:
+        return parse_xml(answer.body)
+    except UnreadableError:
+        return None
+
+
+def _echo_fault(call: Call, exchange: Exchange) -> str:
+    """What of the value that was sent comes back as another one; empty where all is right, or nothing comes back."""
+    answer = exchange.response
+    schema = (call.operation.declared(answer.status) or {}).get(answer.media_type) if answer else None
+    if answer is None or schema is None or not answer.body:
+        return ""
+    try:
+        shown = flattened(read(answer.media_type, answer.body, schema))
+    except UnreadableError as error:
+        return str(error)
+    for place, value in flattened(call.value).items():
+        if shown.get(place) != value and not place.endswith("[]"):
+            return f"{place} is {shown.get(place, 'nothing')!r} for {value!r}"
+    return ""

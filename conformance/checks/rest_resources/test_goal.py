@@ -1,0 +1,219 @@
+"""The life of a goal: put, read, repeated, contradicted, displaced, cancelled, reached, and put again."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from conformance.robot.drive import Drive
+from conformance.robot.goal import (
+    CANCELLED,
+    NEW,
+    REPEATED,
+    await_goal,
+    await_none,
+    difference,
+    goal_body,
+    put_goal,
+    status_fault,
+)
+from conformance.robot.goals import choose_goals
+from conformance.robot.robot import STILL, Robot, Velocity
+from conformance.robot.stopping import bring_to_rest
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+_ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
+# For so long after a cancelled goal the robot has to stay where it is: longer than second thoughts take, s.
+_STAYS_S: Final = 1.3
+
+
+@pytest.fixture
+def robot(roaas: Session) -> Robot:
+    """The robot, at rest."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    return Robot(roaas)
+
+
+def _judge_new(robot: Robot, judge: Judge, exchange: Exchange, body: dict[str, Any], *ids: str) -> bool:
+    """Judge the answer to a goal that is new, and what GET then shows."""
+    status = exchange.response.status if exchange.response else 0
+    holds = judge.check("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal")
+    if status not in NEW and status not in REPEATED:
+        return False
+    goal, problem, shown = await_goal(robot, body)
+    for id_ in ("rest-resources/goal-get", *ids):
+        judge.check(id_, not problem, shown, "the goal that was put", found=problem)
+    if goal is not None:
+        wrong = status_fault(goal)
+        judge.check(
+            "rest-resources/goal-status", not wrong, shown, "status {code, text} with code 1, 2 or 3", found=wrong
+        )
+    return holds and not problem
+
+
+def _cancel(robot: Robot, judge: Judge) -> Exchange:
+    """Cancel the active goal; judge the status, that it is gone, and that the robot stands still in time."""
+    drive = Drive(robot)
+    exchange = robot.delete_goal()
+    drive.answered = time.monotonic()
+    status = exchange.response.status if exchange.response else 0
+    none = await_none(robot)
+    gone = none.response is not None and none.response.status == 404
+    judge.check(
+        "rest-resources/goal-delete",
+        status in CANCELLED and gone,
+        exchange if status not in CANCELLED else none,
+        "204, then 404 for GET",
+        found="" if status not in CANCELLED else f"GET of the goal is answered {none.came}",
+    )
+    drive.reach(STILL, "safety/cancel")
+    return exchange
+
+
+@pytest.mark.requirement(
+    "rest-resources/goal-none",
+    "rest-resources/goal-put",
+    "rest-resources/goal-get",
+    "rest-resources/goal-status",
+    "rest-resources/goal-id",
+    "rest-resources/goal-repeat",
+    "rest-resources/goal-conflict",
+    "rest-resources/goal-preempt",
+    "rest-resources/goal-fills-in",
+    "rest-resources/velocity-goal",
+    "rest-resources/goal-delete",
+    "rest-resources/goal-delete-none",
+    "rest-resources/goal-delete-none-success",
+    "safety/cancel",
+    "safety/cancel-stays",
+)
+def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge) -> None:
+    """One goal through all that clients do with it, then another in its place, then none."""
+    _judge_none(robot, judge)
+    there, back = choose_goals(robot, 1.5, 2)
+    frame = robot.statement.motion.frame
+    # With all that may be left out; the second goal leaves it out.
+    first = goal_body(there, frame, _ID)
+    first["header"] = {"stamp": {"sec": 12, "nanosec": 34}, "frame_id": frame}
+    first["goal_id"]["stamp"] = {"sec": 56, "nanosec": 78}
+    if not _judge_new(robot, judge, put_goal(robot, first), first, "rest-resources/goal-id"):
+        return
+    _repeat(robot, judge, first, goal_body(back, frame, _ID))
+    _velocity_meanwhile(robot, judge)
+    if robot.goal()[0] is None:
+        put_goal(robot, first)  # a robot may end a goal when it takes a velocity
+    second = goal_body(back, frame)
+    second["goal"]["target_pose"]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
+    _displace(robot, judge, second)
+    _await_motion(robot)
+    _cancel(robot, judge)
+    _stays(robot, judge)
+
+
+def _displace(robot: Robot, judge: Judge, second: dict[str, Any]) -> None:
+    """Put another goal, without a goal_id, while one is active."""
+    put = put_goal(robot, second)
+    if put.response is not None and put.response.status not in NEW | REPEATED:
+        # Is it the missing id that is not taken, or another goal?
+        named = put_goal(robot, second | {"goal_id": {"id": "another"}})
+        taken = named.response is not None and named.response.status in NEW | REPEATED
+        name = "goal-fills-in" if taken else "goal-preempt"
+        judge.check(f"rest-resources/{name}", False, put, "201 or 202 for another goal")
+        return
+    _judge_new(robot, judge, put, second, "rest-resources/goal-preempt")
+    goal, exchange = robot.goal()
+    filled = goal is not None and goal["goal_id"]["id"] not in {"", _ID}
+    judge.check("rest-resources/goal-fills-in", filled, exchange, "a header and a goal_id of the robot's own")
+
+
+def _judge_none(robot: Robot, judge: Judge) -> None:
+    """There is no goal, and none to cancel."""
+    for _ in range(3):
+        exchange = await_none(robot)
+        none = exchange.response is not None and exchange.response.status == 404
+        judge.check("rest-resources/goal-none", none, exchange, "404 without an active goal")
+        exchange = robot.delete_goal()
+        status = exchange.response.status if exchange.response else 0
+        judge.check("rest-resources/goal-delete-none", status == 404, exchange, "404 where there is nothing to cancel")
+        judge.check(
+            "rest-resources/goal-delete-none-success", status in {404, 200, 204}, exchange, "404 or 204 without a goal"
+        )
+
+
+def _repeat(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, Any]) -> None:
+    """The same goal again changes nothing; another pose under its id is refused."""
+    stamps = [goal["goal_id"]["stamp"] for goal in (robot.goal()[0], robot.goal()[0]) if goal is not None]
+    for _ in range(3):
+        exchange = put_goal(robot, body)
+        status = exchange.response.status if exchange.response else 0
+        goal, shown = robot.goal()
+        changed = shown.came if goal is None else difference(goal, body)
+        # A robot that shows one stamp as long as nothing is asked of it shows another one for another goal.
+        if not changed and stamps[1:] == stamps[:1] != [goal["goal_id"]["stamp"]]:
+            changed = f"goal_id.stamp {goal['goal_id']['stamp']} for {stamps[0]}"
+        judge.check(
+            "rest-resources/goal-repeat",
+            status in REPEATED and not changed,
+            exchange if status not in REPEATED else shown,
+            "200, 202 or 204 for the goal that is active already, which stays as it is",
+            found=exchange.came if status not in REPEATED else changed,
+        )
+    exchange = put_goal(robot, other)
+    status = exchange.response.status if exchange.response else 0
+    goal, shown = robot.goal()
+    changed = shown.came if goal is None else difference(goal, body)
+    judge.check(
+        "rest-resources/goal-conflict",
+        status == 409 and not changed,
+        exchange if status != 409 else shown,
+        "409 for another pose under the active goal's id, and the goal as it was",
+        found=exchange.came if status != 409 else changed,
+    )
+
+
+def _velocity_meanwhile(robot: Robot, judge: Judge) -> None:
+    """A velocity while a goal is active is taken, or refused with 409."""
+    exchange = robot.put_velocity(Velocity(angular_z=0.1 * robot.limits.angular_rad_s))
+    status = exchange.response.status if exchange.response else 0
+    judge.check(
+        "rest-resources/velocity-goal", status in {200, 204, 409}, exchange, "200, 204 or 409 while a goal is active"
+    )
+
+
+def _await_motion(robot: Robot) -> None:
+    """Wait a little until the robot moves, so that there is something to cancel."""
+    until = time.monotonic() + min(1.0, robot.settle_s)
+    while time.monotonic() < until:
+        velocity, _ = robot.velocity()
+        if velocity is None or not robot.near(velocity, STILL, 3):
+            return
+        time.sleep(0.02)
+
+
+def _stays(robot: Robot, judge: Judge) -> None:
+    """No motion and no goal come back."""
+    until = time.monotonic() + _STAYS_S * robot.watchfulness
+    while time.monotonic() < until:
+        velocity, exchange = robot.velocity()
+        goal, shown = robot.goal()
+        moving = velocity is not None and not robot.near(velocity, STILL, 2)
+        judge.check(
+            "safety/cancel-stays",
+            not moving and goal is None,
+            exchange if moving else shown,
+            "rest, and no goal, after the goal was cancelled",
+            found=f"velocity {velocity}" if moving else "a goal is active again",
+            cause="does not stay",
+        )
+        time.sleep(0.02)

@@ -1,0 +1,117 @@
+"""A goal that is driven to: it ends there, is then no longer current, and its id can be used again."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from conformance.robot.drive import Drive
+from conformance.robot.goal import NEW, await_none, goal_body, put_goal
+from conformance.robot.goals import choose_goals
+from conformance.robot.plan import ask, judge_start
+from conformance.robot.robot import Robot
+from conformance.robot.stopping import bring_to_rest
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.robot.geometry import Pose
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+# A robot that comes no nearer for so long does not drive, s; and how long one that does is waited for, by effort.
+_NO_PROGRESS_S: Final = 5.0
+# A robot may take a goal for reached a quarter of a metre before it (Nav2 does, unless told otherwise), m.
+_REACHED_M: Final = 0.3
+_LONGEST_S: Final = {"quick": 12.0}
+_LONGEST_DEFAULT_S: Final = 30.0
+
+
+@pytest.fixture
+def robot(roaas: Session) -> Robot:
+    """The robot, at rest."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    return Robot(roaas)
+
+
+@pytest.mark.requirement(
+    "rest-resources/goal-put",
+    "rest-resources/goal-drives",
+    "rest-resources/goal-ended",
+    "rest-resources/goal-id-again",
+    "rest-resources/plan-start",
+    "rest-resources/velocity-odometry",
+    "rest-resources/pose-motion",
+)
+def test_goal_until_it_is_reached(robot: Robot, judge: Judge, roaas: Session) -> None:
+    """A goal nearby is driven to and is then no longer current; its id can be used again."""
+    here = robot.map_pose()
+    if here is None:
+        pytest.skip("the robot's pose cannot be read")
+    (there,) = choose_goals(robot, 0.6 if robot.watchfulness == 1 else 0.4, 1)
+    body = goal_body(there, robot.statement.motion.frame, "reached")
+    exchange = put_goal(robot, body)
+    status = exchange.response.status if exchange.response else 0
+    if not judge.check("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal"):
+        return
+    if not _drive_to(robot, judge, there, here, _LONGEST_S.get(roaas.effort.name, _LONGEST_DEFAULT_S)):
+        return
+    # Away from where it was at first: a plan that always starts there is seen now.
+    before = robot.map_pose()
+    _, plan, asked = ask(robot, here)
+    if plan is not None and before is not None:
+        judge_start(robot, plan, before, asked)
+    again = put_goal(robot, body)
+    status = again.response.status if again.response else 0
+    judge.check(
+        "rest-resources/goal-id-again",
+        status in NEW,
+        again,
+        "201 or 202 for a goal whose id has ended before",
+    )
+    await_none(robot, 0.1)
+    robot.delete_goal()
+
+
+def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: float) -> bool:
+    """Watch until the goal has ended; judge that the robot drove and where it is."""
+    drive = Drive(robot)
+    began = progress = time.monotonic()
+    nearest, yaw, here = start.distance(there), start.yaw, start
+    exchange: Exchange | None = None
+    while True:
+        drive.look()
+        goal, exchange = robot.goal()
+        if drive.trace:
+            here = robot.in_map(drive.trace[-1].pose)
+        now = time.monotonic()
+        if here.distance(there) < nearest - 0.02 or abs(here.yaw - yaw) > 0.05:
+            progress, nearest, yaw = now, min(nearest, here.distance(there)), here.yaw
+        if goal is None or now > progress + _NO_PROGRESS_S or now > began + longest_s:
+            break
+    drive.judge_motion()
+    left = here.distance(there)
+    moved = 0.15 if start.distance(there) > 0.35 else 0.0
+    ended = goal is None
+    if not ended and left > _REACHED_M and now <= progress + _NO_PROGRESS_S:
+        return False  # slow, but on its way: nothing to be said against it
+    drove = judge.check(
+        "rest-resources/goal-drives",
+        left < _REACHED_M and start.distance(here) > moved,
+        exchange,
+        f"the robot at ({there.x:.2f}, {there.y:.2f}), where its goal was",
+        found=f"it is {left:.2f} m away, having moved {start.distance(here):.2f} m",
+        cause="not driven" if start.distance(here) <= moved else "not reached",
+    )
+    judge.check(
+        "rest-resources/goal-ended",
+        ended and exchange is not None and exchange.response is not None and exchange.response.status == 404,
+        exchange,
+        "404 when the goal has been reached",
+        found="" if ended else "the goal is still current",
+    )
+    return ended and drove

@@ -1,0 +1,69 @@
+"""Goals that a robot cannot take."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from conformance.robot.geometry import Pose
+from conformance.robot.goal import await_none, goal_body, put_goal
+from conformance.robot.goals import choose_goals
+from conformance.robot.robot import Robot
+from conformance.robot.stopping import bring_to_rest
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+# A robot may look for a way before it gives up, s.
+_GIVES_UP_S: Final = 10.0
+_FAR: Final = (Pose(1e6, 1e6, 0.0), Pose(-1e6, 0.0, 1.0), Pose(1e300, -1e300, 0.0))
+_LENGTHS: Final = (0.0, 0.5, 0.99, 1.01, 2.0, 1e200)
+_FRAMES: Final = ("no_such_frame", "map2")
+
+
+@pytest.mark.requirement(
+    "rest-resources/goal-unreachable", "rest-resources/goal-frame", "rest-resources/goal-quaternion"
+)
+def test_goals_that_cannot_be_taken(roaas: Session, judge: Judge) -> None:
+    """Outside the map, in an unknown frame, with an orientation that is none."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    robot = Robot(roaas)
+    frame = robot.statement.motion.frame
+    (near,) = choose_goals(robot, 1.0, 1)
+    for length in _LENGTHS:
+        _refused(robot, judge, "goal-quaternion", goal_body(near, frame, length=length), f"a quaternion of {length:g}")
+    for unknown in _FRAMES:
+        if unknown != frame:
+            _refused(robot, judge, "goal-frame", goal_body(near, unknown), f"the frame {unknown!r}")
+    for pose in _FAR:
+        exchange = put_goal(robot, goal_body(pose, frame))
+        status = exchange.response.status if exchange.response else 0
+        none = exchange
+        if status in {200, 201, 202, 204}:
+            none = await_none(robot, _GIVES_UP_S)
+        ended = none.response is not None and none.response.status == 404
+        judge.check(
+            "rest-resources/goal-unreachable",
+            400 <= status < 500 or ended,
+            exchange,
+            "422 (another 4xx conforms), or a goal that is accepted and ends",
+            found=exchange.came if ended or none is exchange else f"the goal is current {_GIVES_UP_S:g} s later",
+        )
+        if none is not exchange and not ended:
+            robot.delete_goal()
+            return
+
+
+def _refused(robot: Robot, judge: Judge, name: str, body: dict[str, object], what: str) -> None:
+    exchange = put_goal(robot, body)
+    status = exchange.response.status if exchange.response else 0
+    judge.check(
+        f"rest-resources/{name}", 400 <= status < 500, exchange, f"4xx for a goal with {what}", cause=exchange.came
+    )
+    if status < 400:
+        robot.delete_goal()

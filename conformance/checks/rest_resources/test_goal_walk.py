@@ -1,0 +1,42 @@
+"""Goals in any order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.robot.goal_walk import machine
+from conformance.robot.goals import choose_goals
+from conformance.robot.robot import Robot
+from conformance.robot.stopping import bring_to_rest
+from conformance.robot.walk import Walk
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.explorer import Explorer
+
+pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+
+
+@pytest.mark.requirement(
+    "rest-resources/goal-put",
+    "rest-resources/goal-get",
+    "rest-resources/goal-none",
+    "rest-resources/goal-repeat",
+    "rest-resources/goal-conflict",
+    "rest-resources/goal-preempt",
+    "rest-resources/goal-delete",
+    "rest-resources/goal-delete-none-success",
+)
+def test_goal_walk(roaas: Session, effort: Effort, explore: Explorer) -> None:
+    """Whatever clients do with goals, in whatever order, the one that was put last is the active one."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    walk = Walk(Robot(roaas), 0.4 * effort.budget_s)
+    poses = choose_goals(walk.robot, 1.5, 2)
+    explore.machine(machine(walk, poses), cases=20, steps=effort.cases(12))
+    if walk.unreachable:
+        raise walk.unreachable

@@ -1,0 +1,88 @@
+"""The lists of sensors and of navigation services."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from conformance.robot.message_shapes import MESSAGE_TYPE, SERVICE_TYPE, Leaf, Shape, read_as
+from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
+from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
+from conformance.robot.robot import SENSORS, SERVICES, Robot
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+
+
+@pytest.mark.requirement(
+    "rest-resources/sensors-type",
+    "rest-resources/sensors-unique",
+    "rest-resources/sensors-named-in-full",
+    "rest-resources/sensors-stable",
+)
+def test_sensors(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Each reading is a list of {name, topic, type}, without repetition, and the same as the one before."""
+    _read_often(Robot(roaas), judge, "sensors", SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, effort.cases(100))
+
+
+@pytest.mark.requirement(
+    "rest-resources/services-type",
+    "rest-resources/services-unique",
+    "rest-resources/services-named-in-full",
+    "rest-resources/services-stable",
+)
+def test_services(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Each reading is a list of {name, type}, without repetition, and the same as the one before."""
+    _read_often(Robot(roaas), judge, "services", SERVICES, SERVICES_SHAPE, SERVICE_TYPE, effort.cases(100))
+
+
+def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, full: Leaf, times: int) -> None:
+    fields = "{name, topic, type}" if what == "sensors" else "{name, type}"
+    before: list[str] | None = None
+    for _ in range(times):
+        exchange = robot.get(path)
+        entries, problem = read_as(exchange.response, shape)
+        holds = judge.check(
+            f"rest-resources/{what}-type", not problem, exchange, f"status 200 with a list of {fields}", found=problem
+        )
+        if not holds:
+            continue
+        listed = _judge_entries(judge, what, entries, exchange, full)
+        if before is not None:
+            judge.check(
+                f"rest-resources/{what}-stable",
+                listed == before,
+                exchange,
+                "the same list as before",
+                found=f"{len(before)} entries, then {len(listed)}; {len(set(before) ^ set(listed))} in one only",
+                cause="another list",
+            )
+        before = listed
+
+
+def _judge_entries(judge: Judge, what: str, entries: list[Any], exchange: Exchange, full: Leaf) -> list[str]:
+    """Judge one list; give its entries in a form that can be compared."""
+    names = ("name", "topic", "type") if what == "sensors" else ("name", "type")
+    listed = sorted(json.dumps([entry[name] for name in names]) for entry in entries)
+    twice = next((one for one, two in itertools.pairwise(listed) if one == two), "")
+    judge.check(
+        f"rest-resources/{what}-unique", not twice, exchange, "no entry twice", found=f"twice {twice}", cause="twice"
+    )
+    short = next((entry["type"] for entry in entries if not full.fits(entry["type"])), "")
+    judge.check(
+        f"rest-resources/{what}-named-in-full",
+        not short,
+        exchange,
+        full.expected,
+        found=f"type {short!r}",
+        cause="not in full",
+    )
+    return listed

@@ -1,0 +1,44 @@
+"""Velocities in any order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.robot.goals import make_room
+from conformance.robot.robot import Robot
+from conformance.robot.stopping import bring_to_rest
+from conformance.robot.velocity_walk import machine
+from conformance.robot.walk import Walk
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.explorer import Explorer
+
+pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+
+
+@pytest.mark.requirement(
+    "rest-resources/velocity-put",
+    "rest-resources/velocity-converges",
+    "rest-resources/linear-put",
+    "rest-resources/linear-keeps-angular",
+    "rest-resources/pose-motion",
+    "rest-resources/pose-rotation",
+    "safety/refused-keeps",
+    "safety/limits-hold",
+)
+def test_velocity_walk(roaas: Session, effort: Effort, explore: Explorer) -> None:
+    """Whatever is asked for, in whatever order, is what the robot does, and its pose follows."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    robot = Robot(roaas)
+    make_room(robot)
+    walk = Walk(robot, 0.8 * effort.budget_s)
+    explore.machine(machine(walk), cases=10, steps=effort.cases(12))
+    walk.drive.judge_motion()
+    if walk.unreachable:
+        raise walk.unreachable

@@ -1,0 +1,109 @@
+"""Clients that vanish, and clients that never come to an end."""
+
+from __future__ import annotations
+
+import time
+from contextlib import closing
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from conformance.robot.drive import Drive
+from conformance.robot.message_shapes import body_of
+from conformance.robot.robot import GOAL_PATH, LINEAR, POSE, STILL, VELOCITY, Robot, Velocity
+from conformance.robot.stopping import bring_to_rest
+from conformance.transport.client import HttpClient, NoAnswerError
+from conformance.transport.incomplete_request import PartialRequest
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.needs("rest")
+_WATCH_S: Final = 0.3
+# For so long a robot has time to read what has come before the connection breaks, s.
+_READ_S: Final = 0.03
+# The usual time may be a tenth of a millisecond; a scheduler's turn on a busy machine is no failure, s.
+_USUAL_S: Final = 1.0
+
+
+@pytest.mark.phase("motion")
+@pytest.mark.motion
+@pytest.mark.requirement("safety/client-vanished")
+def test_client_vanished(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """A velocity of which not all octets came is none, also where those that came would make one."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    robot = Robot(roaas)
+    fast = Velocity(linear_x=0.3 * robot.limits.linear_m_s, angular_z=0.5 * robot.limits.angular_rad_s)
+    body, linear = body_of(fast.twist), body_of(fast.linear)
+    drive = Drive(robot)
+    for path, sent, promised, reset in (
+        (VELOCITY, body[: len(body) // 2], len(body), True),
+        (VELOCITY, body, len(body) + 10, True),
+        (VELOCITY, body, len(body) + 10, False),
+        (VELOCITY, body, None, False),
+        (LINEAR, linear, len(linear) + 10, False),
+        (LINEAR, linear, None, True),
+    ):
+        partial = PartialRequest(rest, "PUT", path, sent=sent, promised=promised)
+        time.sleep(_READ_S)
+        partial.vanish(reset=reset)
+        until = time.monotonic() + _WATCH_S / 5 * robot.watchfulness**2
+        while True:
+            velocity, exchange = drive.look()
+            moves = velocity is not None and not robot.near(velocity, STILL, 2)
+            if moves or time.monotonic() > until:
+                break
+        judge.check(
+            "safety/client-vanished",
+            not moves,
+            exchange,
+            f"rest after {partial.request.method} {path} of which not all octets were sent",
+            found=f"velocity {velocity}",
+            cause="moves",
+        )
+        if moves:
+            bring_to_rest(roaas)
+    drive.keep(_WATCH_S / 2 * robot.watchfulness)
+    velocity, exchange = drive.look()
+    judge.check(
+        "safety/client-vanished",
+        velocity is not None and robot.near(velocity, STILL, 2),
+        exchange,
+        "rest, and an answer, after clients vanished in mid-request",
+        found=str(velocity) if velocity else "",
+        cause="moves",
+    )
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("safety/half-request")
+def test_half_requests(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """While three clients do not come to an end of their requests, others are answered in the usual time."""
+    robot = Robot(roaas)
+    patience_s = max(_USUAL_S, 20 * robot.usual_s)
+    judge.at_risk = ("safety/half-request",)
+    # A client of its own: what hangs here, for once, need not hang later.
+    others = HttpClient(rest.base_url, rest.connection)
+    with (
+        closing(others),
+        PartialRequest(rest, "GET", POSE, head_only=20),
+        PartialRequest(rest, "GET", POSE, head_only=-2),
+        PartialRequest(rest, "OPTIONS", GOAL_PATH, sent=b"{", promised=100),
+    ):
+        for path in (POSE, VELOCITY, POSE):
+            try:
+                # A connection of its own: one that is open already might be served by a thread of its own.
+                exchange = others.send("GET", path, fresh=True, timeout_s=patience_s)
+            except NoAnswerError as none:
+                exchange = none.exchange
+            answered = judge.check(
+                "safety/half-request",
+                exchange.response is not None,
+                exchange,
+                f"an answer within {patience_s:g} s while three other requests are incomplete",
+            )
+            if not answered:
+                return

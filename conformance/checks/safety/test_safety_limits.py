@@ -1,0 +1,157 @@
+"""Velocities that the robot must not take."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from conformance.robot.drive import BusyError, Drive
+from conformance.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
+from conformance.robot.sampling import some
+from conformance.robot.stopping import bring_to_rest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+# No robot of this contract is as fast, whatever its statement leaves out: m/s and rad/s.
+_BEYOND_ANY: Final = 1e3
+_FARTHER: Final = (1e6, 1e308)
+# For so long a command that was taken after all would show, s.
+_WATCH_S: Final = 0.25
+
+
+@pytest.fixture
+def robot(roaas: Session) -> Robot:
+    """The robot, at rest."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    return Robot(roaas)
+
+
+def _only(component: int, value: float) -> Velocity:
+    return Velocity(*(value if index == component else 0.0 for index in range(6)))
+
+
+def _beyond(robot: Robot) -> Iterator[Velocity]:
+    """Velocities with one component just beyond its limit, far beyond it, and absurd, in both directions."""
+    for component in range(6):
+        if not robot.actuated(component):
+            continue
+        limit = robot.limit_of(component)
+        sizes = [1.01 * limit + 1e-3, 1.5 * limit, _BEYOND_ANY] if robot.limits_declared else [_BEYOND_ANY]
+        for size in (*sizes, *_FARTHER):
+            yield from (_only(component, size), _only(component, -size))
+
+
+@pytest.mark.requirement("safety/limits-refused", "safety/refused-keeps", "safety/limits-hold")
+def test_beyond_the_limits(robot: Robot, judge: Judge, effort: Effort) -> None:
+    """A velocity beyond the limits is refused, on both resources, and the robot stays at rest."""
+    for bad in some(list(_beyond(robot)), effort):
+        _judge_refused(robot, judge, bad)
+    _judge_rest(robot, judge)
+
+
+def _judge_refused(robot: Robot, judge: Judge, bad: Velocity) -> None:
+    exchanges = [robot.put_velocity(bad)]
+    if any(bad[:3]):
+        exchanges.append(robot.put_linear(bad))
+    for exchange in exchanges:
+        status = exchange.response.status if exchange.response else 0
+        refused = judge.check(
+            "safety/limits-refused",
+            400 <= status < 500,
+            exchange,
+            f"422 (another 4xx conforms) for a velocity beyond the limits, {bad}",
+            cause=exchange.came,
+        )
+        if not refused:
+            robot.put_velocity(STILL)
+    # A robot that takes what it cannot do sends the velocity to where it is commanded; one look at it on the way.
+    velocity, exchange = robot.velocity()
+    judge.check(
+        "safety/refused-keeps",
+        velocity is None or robot.near(velocity, STILL, 2),
+        exchange,
+        "rest after a velocity that was refused",
+        found=str(velocity),
+        cause="moves",
+    )
+
+
+def _judge_rest(robot: Robot, judge: Judge) -> None:
+    """Nothing of what was refused shows a little later."""
+    drive = Drive(robot)
+    until = time.monotonic() + _WATCH_S * robot.watchfulness
+    velocity: Velocity | None = None
+    exchange: Exchange | None = None
+    while time.monotonic() < until:
+        velocity, exchange = drive.look()
+        if velocity is not None and not robot.near(velocity, STILL, 2):
+            break
+    still = velocity is None or robot.near(velocity, STILL, 2)
+    judge.check(
+        "safety/refused-keeps", still, exchange, "rest after refused velocities", found=str(velocity), cause="moves"
+    )
+    if not robot.limits_declared:
+        judge.check("safety/limits-hold", still, exchange, "no speed beyond any limit", found=str(velocity))
+
+
+@pytest.mark.requirement("safety/unactuated-refused", "safety/refused-keeps")
+def test_components_that_the_robot_cannot_actuate(robot: Robot, judge: Judge) -> None:
+    """They have to be 0; a robot that can actuate more than its statement says shows it by its measured velocity."""
+    components = [component for component in range(6) if not robot.actuated(component)]
+    if not components:
+        judge.check("safety/unactuated-refused", True, None, "nothing: the robot actuates all components")
+    for component in components:
+        _judge_component(robot, judge, component)
+    # Zero is not a value that can be refused, however it is signed.
+    drive = Drive(robot)
+    try:
+        drive.command(Velocity(-0.0, -0.0, -0.0, -0.0, -0.0, -0.0))
+    except BusyError as busy:
+        pytest.skip(str(busy))
+    _judge_rest(robot, judge)
+
+
+def _judge_component(robot: Robot, judge: Judge, component: int) -> None:
+    for value in (0.1, -0.1, 1e-3, _BEYOND_ANY):
+        wanted = _only(component, value)
+        exchanges = [(VELOCITY, robot.put_velocity(wanted))]
+        if component < 3:
+            exchanges.append((LINEAR, robot.put_linear(wanted)))
+        for path, exchange in exchanges:
+            status = exchange.response.status if exchange.response else 0
+            refused = 400 <= status < 500
+            does = not refused and abs(value) == 0.1 and _does(robot, wanted)
+            judge.check(
+                "safety/unactuated-refused",
+                refused or does,
+                exchange,
+                f"422 (another 4xx conforms) for {wanted}, which the robot cannot actuate",
+                found=exchange.came,
+                cause=f"{path} {exchange.came}",
+            )
+            if does:
+                judge.note("safety/unactuated-refused", f"the robot does {wanted}, which its statement leaves out")
+                return
+
+
+def _does(robot: Robot, wanted: Velocity) -> bool:
+    """Whether the robot reaches a velocity that it took, and so can actuate it after all."""
+    until = time.monotonic() + robot.settle_s
+    while time.monotonic() < until:
+        velocity, _ = robot.velocity()
+        if velocity is not None and not robot.near(velocity, STILL, 2) and robot.near(velocity, wanted):
+            robot.put_velocity(STILL)
+            return True
+        time.sleep(0.02)
+    return False

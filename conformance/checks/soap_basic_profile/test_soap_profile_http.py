@@ -1,0 +1,174 @@
+"""SOAP over HTTP by the Basic Profile: methods, media types, SOAPAction, and bodies that are no XML."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.documents.xml_names import WSDL, XSD, clark
+from conformance.documents.xml_node import Node
+from conformance.soap.callable_services import askable, rounds
+from conformance.soap.calls import Answer, ask, call, read_exchange
+from conformance.soap.envelope import NotXmlError, envelope, parse
+from conformance.soap.valid_messages import quiet_example
+from conformance.transport.client import NoAnswerError
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.phase("delivery")
+_ANY = Node(clark("urn:example:strange", "no_such_operation"))
+_TRUNCATED_S = 5.0
+
+
+def _message(service: SoapService) -> Node:
+    """A message that the robot takes, if there is one; else one that any robot can tell from no message."""
+    good = quiet_example(service)
+    return good[1] if good else _ANY
+
+
+@pytest.mark.requirement("soap-basic-profile/R1109")
+def test_soap_action(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """SOAPAction is taken in quotes, with something in them or nothing."""
+    for service in askable(roaas, "soap-basic-profile/R1109"):
+        good = quiet_example(service)
+        if good is None:
+            judge.skip("soap-basic-profile/R1109", f"the {service.name} service took none of the messages tried")
+            continue
+        operation, message = good
+        actions = ['""', f'"{operation.input_action or operation.name}"', '"http://example.com/some/action"']
+        for action in actions * rounds(effort, 3):
+            answer = call(service, message, soap_action=action)
+            judge.check(
+                "soap-basic-profile/R1109",
+                answer.taken,
+                answer.exchange,
+                f"2xx with SOAPAction: {action}",
+                found=answer.told,
+            )
+
+
+def _malformed(message: Node) -> list[tuple[str, bytes]]:
+    """Bodies that are no well-formed XML, none of which leaves a reader waiting for more."""
+    good = envelope([message]).written()
+    end = good.rindex(b"</")
+    return [
+        ("an end tag of another name", good[:end] + b"</wrong>"),
+        ("text after the end", good + b"<"),
+        ("no XML at all", b"delivery please"),
+        ("JSON", b'{"Envelope": {"Body": {}}}'),
+        ("a prefix that is not bound", good.replace(b"xmlns:soap", b"xmlns:other", 1)),
+        ("an entity that is not declared", good.replace(b"</", b"&nothing;</", 1)),
+        ("a bare ampersand", good.replace(b"</", b" & </", 1)),
+        ("an attribute twice", good.replace(b" xmlns", b" a='1' a='2' xmlns", 1)),
+        ("a control character", good.replace(b"</", b"\x01</", 1)),
+        ("octets that are no UTF-8", good.replace(b"</", b"\xff\xfe\xfd</", 1)),
+        ("two roots", good + good),
+        ("an empty body", b""),
+    ]
+
+
+@pytest.mark.requirement("soap-basic-profile/R1125", "soap-basic-profile/R1113")
+def test_malformed(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Malformed XML is answered 4xx without a fault (best 400), or 500 with one."""
+    for service in askable(roaas, "soap-basic-profile/R1125", "soap-basic-profile/R1113"):
+        cases = _malformed(_message(service))
+        apart = service.apart()
+        for what, body in cases[: effort.cases(len(cases))]:
+            try:
+                answer = ask(apart, body)
+            except NoAnswerError as none:
+                if none.kind != "timeout":
+                    raise
+                judge.check("soap-basic-profile/R1125", False, none.exchange, f"an answer to {what}")
+                # One deadline is enough to know it.
+                break
+            _judge_malformed(judge, answer, what)
+        apart.client.close()
+        _truncated(judge, service)
+
+
+def _judge_malformed(judge: Judge, answer: Answer, what: str) -> None:
+    fits = (answer.fault is None and 400 <= answer.status < 500) or (answer.fault is not None and answer.status == 500)
+    expected = f"4xx without a fault or 500 with one, for {what}"
+    judge.check("soap-basic-profile/R1125", fits, answer.exchange, expected, found=answer.told)
+    judge.check(
+        "soap-basic-profile/R1113", answer.status == 400, answer.exchange, f"status 400 for {what}", found=answer.told
+    )
+
+
+def _truncated(judge: Judge, service: SoapService) -> None:
+    """Send half a document, in a connection that ends with it.
+
+    A server that reads XML as it comes may wait for the rest until its own deadline (gSOAP does): that is no breach.
+    """
+    document = envelope([_message(service)]).written()
+    apart = service.apart()
+    try:
+        answer = ask(
+            apart,
+            document[: len(document) * 2 // 3],
+            fresh=True,
+            timeout_s=min(_TRUNCATED_S, service.client.connection.timeout_s),
+        )
+    except NoAnswerError as none:
+        if none.kind == "refused":
+            raise
+        judge.check("soap-basic-profile/R1113", False, none.exchange, "status 400 for a truncated document")
+        return
+    finally:
+        apart.client.close()
+    _judge_malformed(judge, answer, "a truncated document")
+
+
+@pytest.mark.requirement("soap-basic-profile/R1114")
+def test_methods(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Methods other than POST are answered 405; GET may be answered with a description."""
+    for service in askable(roaas, "soap-basic-profile/R1114"):
+        body = envelope([_message(service)]).written()
+        for method in ("PUT", "GET", "DELETE", "PATCH") * rounds(effort, 3):
+            exchange = service.client.send(
+                method,
+                service.path,
+                headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
+                body=body if method in {"PUT", "PATCH"} else b"",
+            )
+            status = exchange.response.status if exchange.response else 0
+            judge.check(
+                "soap-basic-profile/R1114",
+                status == 405 or (method == "GET" and _is_description(exchange)),
+                exchange,
+                f"405 for {method}",
+                found=read_exchange(exchange).told if status == 500 else "",
+            )
+
+
+def _is_description(exchange: Exchange) -> bool:
+    """Whether an answer is a WSDL or a schema."""
+    try:
+        root = parse(exchange.response.body if exchange.response is not None else b"")
+    except NotXmlError:
+        return False
+    return root.tag in {clark(WSDL, "definitions"), clark(XSD, "schema")}
+
+
+@pytest.mark.requirement("soap-basic-profile/R1115")
+def test_media_types(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """A message that comes as anything but text/xml is answered 415."""
+    types = ("text/plain", "application/json", "application/octet-stream", "text/html", "application/xml")
+    for service in askable(roaas, "soap-basic-profile/R1115"):
+        body = envelope([_message(service)]).written()
+        for media_type in types * rounds(effort, 3):
+            answer = ask(service, body, content_type=media_type)
+            judge.check(
+                "soap-basic-profile/R1115",
+                answer.status == 415,
+                answer.exchange,
+                f"415 for {media_type}",
+                found=answer.told,
+            )

@@ -1,0 +1,121 @@
+"""Interoperability: zeep, the common SOAP client for Python, is made from the description and calls everything."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from conformance.soap import delivery_messages as paper
+from conformance.soap.callable_services import rounds
+from conformance.soap.valid_messages import example
+from conformance.transport.client import NoAnswerError
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.soap.zeep_client import ZeepCaller
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+
+# What a user would look for in what zeep returns.
+_VALUES = {
+    "GetPose": ("pose.position.x", "pose.orientation.w", "twist.linear.x"),
+    "GetVelocity": ("linear.x", "angular.z"),
+}
+
+
+def _has(result: Any, path: str) -> bool:
+    """Whether there is a number at a path of names in what zeep returned, whatever it is wrapped in."""
+    from zeep.helpers import serialize_object  # noqa: PLC0415 - see _client
+
+    return _found(serialize_object(result), path.split("."))
+
+
+def _found(value: Any, path: list[str]) -> bool:
+    if isinstance(value, list):
+        return any(_found(item, path) for item in value)
+    if not isinstance(value, dict):
+        return False
+    here: Any = value
+    for step in path:
+        here = here.get(step) if isinstance(here, dict) else None
+    return isinstance(here, float) or any(_found(inner, path) for inner in value.values())
+
+
+def _client(judge: Judge, id_: str, service: SoapService | None) -> ZeepCaller | None:
+    # Imported late: zeep costs a quarter of a second that other checks need not pay.
+    from conformance.soap.zeep_client import ZeepCaller  # noqa: PLC0415
+
+    if service is None:
+        pytest.skip("the service has no address")
+    try:
+        return ZeepCaller(service)
+    except NoAnswerError:
+        raise
+    except Exception as error:  # noqa: BLE001 - whatever zeep finds wrong with a description is the finding
+        judge.check(
+            id_,
+            False,
+            service.wsdl_exchange,
+            "a description from which zeep makes a client",
+            found=f"{type(error).__name__}: {error}"[:300],
+        )
+        return None
+
+
+def _plan(service: SoapService) -> dict[str, float]:
+    """The arguments of a plan that the robot gives to a message of our own; none where it gives none."""
+    operation = next((item for item in service.contract.operations if item.name == "GetPlan"), None)
+    message = example(service, operation) if operation is not None else None
+    return (
+        {} if message is None else {child.name: float(child.text) for child in message.children if child.name in "xy"}
+    )
+
+
+@pytest.mark.phase("delivery")
+@pytest.mark.needs("publishers")
+@pytest.mark.motion
+@pytest.mark.requirement("soap-delivery/interop")
+def test_publishers(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Both operations are called."""
+    client = _client(judge, "soap-delivery/interop", roaas.publishers)
+    if client is None:
+        return
+    for code in (paper.COFFEE, paper.COURIER) * rounds(effort, 4):
+        values: dict[str, Any] = {key: float(text) for key, text in paper.COORDINATES.items()} | {"message_code": code}
+        for operation in ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest"):
+            if operation == "ExecuteCoffeeRequest":
+                values["message_code"] = paper.COFFEE
+            _, problem, exchange = client.call(operation, values)
+            judge.check("soap-delivery/interop", not problem, exchange, f"{operation} by zeep", found=problem)
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.needs("subscribers")
+@pytest.mark.requirement("soap-subscribers/interop")
+def test_subscribers(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """All operations are called; those that have nothing to tell may answer with a fault."""
+    id_ = "soap-subscribers/interop"
+    client = _client(judge, id_, roaas.subscribers)
+    if client is None or roaas.subscribers is None:
+        return
+    plan = _plan(roaas.subscribers)
+    for _ in range(rounds(effort, 5)):
+        for operation, arguments in (
+            ("GetPose", {}),
+            ("GetVelocity", {}),
+            ("GetSensors", {}),
+            ("GetNavigationServices", {}),
+            ("GetGoal", {}),
+            ("GetPlan", plan or {"x": 0.0, "y": 0.0}),
+        ):
+            result, problem, exchange = client.call(operation, **arguments)
+            if problem.startswith("fault") and (operation == "GetGoal" or (operation == "GetPlan" and not plan)):
+                problem = ""
+            elif not problem:
+                problem = next(
+                    (f"zeep finds no {path}" for path in _VALUES.get(operation, ()) if not _has(result, path)), ""
+                )
+            judge.check(id_, not problem, exchange, f"{operation} by zeep", found=problem)

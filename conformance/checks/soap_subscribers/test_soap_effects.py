@@ -1,0 +1,121 @@
+"""What a SOAP message does beside being answered: seen in the robot's list of deliveries, and in the goal it shows."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.documents.xml_names import ENVELOPE, clark
+from conformance.documents.xml_node import Node
+from conformance.robot.geometry import Pose
+from conformance.robot.goal import goal_body
+from conformance.robot.message_shapes import DELIVERIES, read_as
+from conformance.robot.robot import Robot
+from conformance.robot.stopping import bring_to_rest
+from conformance.soap import content
+from conformance.soap import delivery_messages as paper
+from conformance.soap.calls import call
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.engine.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.transport.client import HttpClient
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+_LIST = "/robot/app/delivery/"
+# A delivery with these coordinates is none that any other check sends.
+_DEPOT_X = 4711.125
+_STEP_S = 0.02
+
+
+def _listed(rest: HttpClient, depot_x: float) -> int | None:
+    """How many deliveries with that depot the robot lists; None where it lists none at all."""
+    deliveries, problem = read_as(rest.send("GET", _LIST).response, DELIVERIES)
+    if problem:
+        return None
+    return sum(1 for delivery in deliveries if delivery["request"]["depot_x"] == depot_x)
+
+
+@pytest.mark.phase("delivery")
+@pytest.mark.needs("publishers")
+@pytest.mark.motion
+@pytest.mark.requirement("soap-basic-profile/R1028")
+def test_misunderstood_has_no_effect(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """A delivery that is answered MustUnderstand is not in the robot's list of deliveries, where there is one."""
+    service, rest = roaas.publishers, roaas.rest
+    if service is None or rest is None or not roaas.contract.own or _listed(rest, 0.0) is None:
+        # What the robot does cannot be seen then; that it answers nothing but the fault is judged elsewhere.
+        return
+    block = Node(clark("urn:example:strange", "Transaction"), "5", (), ((clark(ENVELOPE, "mustUnderstand"), "1"),))
+    for number in range(effort.cases(4)):
+        depot_x = _DEPOT_X + number
+        answer = call(service, paper.delivery(depot_x=repr(depot_x)), headers=(block,))
+        if answer.code != "MustUnderstand":
+            continue
+        # A valid delivery after it shows when the robot is through with both.
+        marker = depot_x + 0.5
+        call(service, paper.delivery(depot_x=repr(marker)))
+        _until(lambda marker=marker: (_listed(rest, marker) or 0) > 0, 1.0)  # type: ignore[misc] # a default argument binds the loop's value
+        judge.check(
+            "soap-basic-profile/R1028",
+            not _listed(rest, depot_x),
+            answer.exchange,
+            "a request that is answered MustUnderstand to have no effect",
+            found="it is in the robot's list of deliveries",
+        )
+
+
+@pytest.mark.phase("motion")
+@pytest.mark.needs("subscribers")
+@pytest.mark.requirement("soap-subscribers/goal")
+def test_goal_is_shown(roaas: Session, judge: Judge) -> None:
+    """While a goal that came over REST is active, GetGoal shows it."""
+    service = roaas.subscribers
+    if service is None or roaas.rest is None or not roaas.allow_motion or "rest" in roaas.unreachable:
+        # Then whatever goal the robot has is judged as it comes.
+        return
+    bring_to_rest(roaas)
+    robot = Robot(roaas)
+    here = robot.map_pose()
+    if here is None:
+        return
+    id_ = "roaas-soap-goal"
+    # A turn on the spot, on which the robot needs no free space.
+    put = goal_body(Pose(here.x, here.y, here.yaw + 2.5), roaas.statement.motion.frame, id_)
+    exchange = robot.put("/robot/navigation/action/goal/", put)
+    if exchange.response is None or exchange.response.status not in {201, 202}:
+        return
+    shown = _until(lambda: _goal_id(service) == id_, robot.settle_s)
+    # A short goal may have ended before anybody could see it; then REST does not show it either.
+    ended = robot.goal()[0] is None
+    if shown or not ended:
+        answer = call(service, Node(clark(paper.NAMESPACE, "GetGoal")))
+        judge.check(
+            "soap-subscribers/goal",
+            shown,
+            answer.exchange,
+            f"the active goal, with goal_id.id {id_!r}",
+            found=f"goal_id.id {_goal_id(service)!r}",
+        )
+    bring_to_rest(roaas)
+
+
+def _goal_id(service: SoapService) -> str | None:
+    answer = call(service, Node(clark(paper.NAMESPACE, "GetGoal")))
+    first = answer.envelope.first if answer.taken and answer.envelope else None
+    return content.text_at(first, "goal_id", "id") if first is not None else None
+
+
+def _until(condition: Callable[[], bool], seconds: float) -> bool:
+    """Ask until it is so, or the time is over."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(_STEP_S)
+    return True

@@ -1,0 +1,158 @@
+"""GetPlan of RoAAS's own contract: from the robot to the asked pose, in the asked frame; or a fault."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.documents.xml_names import clark, local
+from conformance.robot.geometry import Pose
+from conformance.robot.plan import START_OFF
+from conformance.soap import content
+from conformance.soap import delivery_messages as paper
+from conformance.soap.calls import Answer, call
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from lxml import etree
+
+    from conformance.documents.xsd_shapes import Element
+    from conformance.engine.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
+_PLAN = "soap-subscribers/plan"
+_TOLERANCE = 0.25
+
+
+@dataclass(frozen=True)
+class _Path:
+    """A path: its frames, and the positions of its poses, m."""
+
+    frames: frozenset[str]
+    points: tuple[tuple[float, float], ...]
+
+
+@pytest.fixture
+def subscribers(roaas: Session) -> SoapService:
+    """The robot's subscribers service."""
+    if roaas.subscribers is None:
+        pytest.skip("the robot's subscribers service has no address")
+    return roaas.subscribers
+
+
+def _returned(service: SoapService) -> Element:
+    wrapper = service.contract.shape(clark(paper.NAMESPACE, "GetPlanResponse"))
+    if wrapper is None:
+        pytest.skip("the contract has no GetPlan")
+    return wrapper.children[0]
+
+
+def _path(wrapper: etree._Element, expected: Element) -> tuple[_Path | None, str]:
+    """The path that an answer holds, and what is wrong with it."""
+    returned = content.content_of(wrapper, expected)
+    if returned is None:
+        return None, "an empty response"
+    problem = next(content.incomplete(returned, expected), "")
+    plan = content.find(returned, ["plan"])
+    if problem or plan is None:
+        return None, problem or "no plan"
+    declared = next(child for child in expected.children[0].children if local(child.tag) == "poses")
+    poses = content.items(plan, declared)
+    poses = [pose for pose in poses if content.children_of(pose, "pose")]
+    points = [(content.number_at(pose, "position", "x"), content.number_at(pose, "position", "y")) for pose in poses]
+    whole = tuple((x, y) for x, y in points if x is not None and y is not None)
+    frames = {content.text_at(item, "header", "frame_id") or "" for item in (plan, *poses)}
+    return (_Path(frozenset(frames), whole), "") if whole else (None, "a path without poses")
+
+
+def _here(roaas: Session, service: SoapService) -> Pose | None:
+    """Where the robot is in the frame of plans."""
+    position = paper.position(service)
+    if position is None:
+        return None
+    return Pose(*position, 0.0).seen_from(Pose(*roaas.statement.motion.odom_to_map))
+
+
+def _targets(roaas: Session, here: Pose) -> Iterator[Pose]:
+    """Poses near the robot that it may reach; the last one is where it is."""
+    for goal in roaas.statement.motion.goals:
+        yield Pose(*goal)
+    for reach in (1.0, 0.5):
+        for turn in (0, 45, -45, 90, -90, 135, -135, 180):
+            yield here.ahead(reach, math.radians(turn))
+    yield here
+
+
+@pytest.mark.requirement(_PLAN, "soap-subscribers/response-valid")
+def test_plan(roaas: Session, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """A path starts at the robot, ends at the asked position within the tolerance, and is in the asked frame."""
+    expected = _returned(subscribers)
+    frame = roaas.statement.motion.frame
+    wanted = effort.cases(10)
+    planned = 0
+    here = _here(roaas, subscribers)
+    if here is None:
+        judge.check(_PLAN, False, None, "a plan", found="GetPose does not say where the robot is")
+        return
+    answer: Answer | None = None
+    for number, target in enumerate(_targets(roaas, here)):
+        # Frame and tolerance may be left out: then they are map and 0.1 (contract, REST).
+        given = {"frame_id": frame, "tolerance": repr(_TOLERANCE)} if number % 2 or frame != "map" else {}
+        before = _here(roaas, subscribers) or here
+        answer = call(subscribers, paper.plan(target.x, target.y, yaw="0.0", **given))
+        after = _here(roaas, subscribers) or before
+        if answer.fault is not None:
+            continue
+        planned += 1
+        wrapper = answer.envelope.first if answer.taken and answer.envelope else None
+        path, problem = (None, answer.told) if wrapper is None else _path(wrapper, expected)
+        if path is not None:
+            problem = _problem(path, before, after, target, frame)
+        judge.check(_PLAN, not problem, answer.exchange, "a path from the robot to the asked pose", found=problem)
+        if planned >= wanted:
+            break
+    if not planned and answer is not None:
+        judge.check(_PLAN, False, answer.exchange, "a plan to where the robot is", found=answer.told)
+
+
+def _problem(path: _Path, before: Pose, after: Pose, target: Pose, frame: str) -> str:
+    """What is wrong with a path; empty when nothing is."""
+    first, last = path.points[0], path.points[-1]
+    start = math.hypot(first[0] - before.x, first[1] - before.y)
+    end = math.hypot(last[0] - target.x, last[1] - target.y)
+    if start > START_OFF + before.distance(after):
+        return f"it starts {start:.3f} m from the robot"
+    if end > _TOLERANCE:
+        return f"it ends {end:.3f} m from the asked position"
+    if path.frames != {frame}:
+        return f"it is in the frame {', '.join(sorted(path.frames - {frame}))!r}, not {frame!r}"
+    return ""
+
+
+@pytest.mark.requirement("soap-subscribers/plan-none")
+def test_no_plan(subscribers: SoapService, judge: Judge) -> None:
+    """Where there can be no plan, the answer is a fault: far outside any map, and in a frame that nobody knows."""
+    expected = _returned(subscribers)
+    for message, what in (
+        (paper.plan(1e7, -1e7), "a position 10,000 km away"),
+        (paper.plan(0.0, 0.0, frame_id="no_such_frame"), "a frame that the robot does not know"),
+    ):
+        answer = call(subscribers, message)
+        wrapper = answer.envelope.first if answer.taken and answer.envelope else None
+        path = _path(wrapper, expected)[0] if wrapper is not None else None
+        # A robot in an open world may know a way to anywhere; then it has to end there.
+        arrives = path is not None and math.hypot(path.points[-1][0] - 1e7, path.points[-1][1] + 1e7) < 1
+        judge.check(
+            "soap-subscribers/plan-none",
+            answer.fault is not None or arrives,
+            answer.exchange,
+            f"a fault for {what}",
+            found=answer.told,
+        )

@@ -1,0 +1,151 @@
+"""The subscribers service of RoAAS's own contract: the read side of Table 1 over SOAP."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.documents.xml_names import clark, local
+from conformance.documents.xml_node import Node
+from conformance.soap import content
+from conformance.soap import delivery_messages as paper
+from conformance.soap.calls import Answer, call
+from conformance.soap.envelope import text_of
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+    from conformance.documents.xsd_shapes import Element
+    from conformance.engine.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
+_VALID = "soap-subscribers/response-valid"
+
+
+@pytest.fixture
+def subscribers(roaas: Session) -> SoapService:
+    """The robot's subscribers service."""
+    if roaas.subscribers is None:
+        pytest.skip("the robot's subscribers service has no address")
+    return roaas.subscribers
+
+
+def _returned(service: SoapService, operation: str) -> Element:
+    """Declaration of what an operation returns, by the contract."""
+    wrapper = service.contract.shape(clark(paper.NAMESPACE, f"{operation}Response"))
+    if wrapper is None or not wrapper.children:
+        pytest.skip(f"the contract has no {operation}")
+    return wrapper.children[0]
+
+
+def _wrapper(judge: Judge, service: SoapService, operation: str, answer: Answer) -> etree._Element | None:
+    """The response wrapper of an answer without a fault, judged by its name and by the description."""
+    expected = clark(paper.NAMESPACE, f"{operation}Response")
+    first = answer.envelope.first if answer.envelope is not None and answer.fault is None else None
+    if first is None or first.tag != expected:
+        judge.check(_VALID, False, answer.exchange, f"{expected} in the Body", found=answer.told)
+        return None
+    described = service.described
+    if described.shape(expected) is None:
+        described = service.contract
+    reason = described.types.invalid(first)
+    judge.check(_VALID, not reason, answer.exchange, f"{operation}Response as the description says it is", found=reason)
+    return first
+
+
+def _complete(judge: Judge, id_: str, service: SoapService, operation: str) -> etree._Element | None:
+    """Ask an operation without arguments, and judge that it returns all that the contract says; return it."""
+    answer = call(service, Node(clark(paper.NAMESPACE, operation)))
+    judge.check(id_, answer.taken, answer.exchange, f"{operation}Response", found=answer.told)
+    if not answer.succeeded:
+        return None
+    wrapper = _wrapper(judge, service, operation, answer)
+    expected = _returned(service, operation)
+    returned = content.content_of(wrapper, expected) if wrapper is not None else None
+    if returned is None:
+        judge.check(id_, False, answer.exchange, f"{operation}Response with content", found=f"{answer.told}, empty")
+        return None
+    problem = next(content.incomplete(returned, expected), "")
+    return returned if judge.check(id_, not problem, answer.exchange, _named(expected), found=problem) else None
+
+
+def _named(expected: Element) -> str:
+    return f"complete content: {', '.join(local(child.tag) for child in expected.children)}"
+
+
+@pytest.mark.requirement("soap-subscribers/pose", "soap-subscribers/velocity", _VALID)
+def test_pose_and_velocity(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """GetPose gives a complete Odometry, GetVelocity a complete Twist, every time."""
+    for _ in range(effort.cases(60)):
+        pose = _complete(judge, "soap-subscribers/pose", subscribers, "GetPose")
+        if pose is not None:
+            length = sum((content.number_at(pose, "orientation", axis) or 0.0) ** 2 for axis in "xyzw") ** 0.5
+            judge.check(
+                "soap-subscribers/pose",
+                abs(length - 1) <= 1e-3,
+                None,
+                "an orientation of unit length within 1e-3",
+                found=f"length {length:g}",
+            )
+        _complete(judge, "soap-subscribers/velocity", subscribers, "GetVelocity")
+
+
+@pytest.mark.requirement("soap-subscribers/sensors", "soap-subscribers/services", _VALID)
+def test_lists(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """GetSensors and GetNavigationServices list complete items, with full type names, and none twice."""
+    for _ in range(effort.cases(40)):
+        for operation, id_ in (
+            ("GetSensors", "soap-subscribers/sensors"),
+            ("GetNavigationServices", "soap-subscribers/services"),
+        ):
+            answer = call(subscribers, Node(clark(paper.NAMESPACE, operation)))
+            judge.check(id_, answer.taken, answer.exchange, f"{operation}Response", found=answer.told)
+            if not answer.succeeded:
+                continue
+            wrapper = _wrapper(judge, subscribers, operation, answer)
+            if wrapper is not None:
+                problem = _list_problem(wrapper, _returned(subscribers, operation))
+                judge.check(id_, not problem, answer.exchange, "a list of complete items", found=problem)
+
+
+def _list_problem(wrapper: etree._Element, expected: Element) -> str:
+    """What is wrong with a list; empty when nothing is. An empty list is a list."""
+    seen: set[tuple[str | None, ...]] = set()
+    names = [local(child.tag) for child in expected.children]
+    for item in content.items(wrapper, expected):
+        problem = next(content.incomplete(item, expected), "")
+        if problem:
+            return problem
+        values = tuple(content.text_at(item, name) for name in names)
+        if values in seen:
+            return f"{values} stands twice"
+        seen.add(values)
+        type_ = content.text_at(item, "type") or ""
+        if len(type_.split("/")) != 3 or not all(type_.split("/")):  # package/msg/Name (contract, ROS side)
+            return f"type {type_!r} is not named in full"
+    return ""
+
+
+@pytest.mark.requirement("soap-subscribers/goal", _VALID)
+def test_goal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """GetGoal gives a complete goal; without one an empty response, or a fault."""
+    expected = _returned(subscribers, "GetGoal")
+    for _ in range(effort.cases(30)):
+        answer = call(subscribers, Node(clark(paper.NAMESPACE, "GetGoal")))
+        if answer.fault is not None:
+            judge.check("soap-subscribers/goal", True, answer.exchange, "a fault where there is no goal")
+            continue
+        wrapper = _wrapper(judge, subscribers, "GetGoal", answer) if answer.succeeded else None
+        if wrapper is None:
+            judge.check("soap-subscribers/goal", False, answer.exchange, "GetGoalResponse", found=answer.told)
+            continue
+        returned = content.content_of(wrapper, expected)
+        empty = returned is None or (len(returned) == 0 and not text_of(returned).strip())
+        problem = "" if empty or returned is None else next(content.incomplete(returned, expected), "")
+        judge.check(
+            "soap-subscribers/goal", not problem, answer.exchange, "an empty response or a complete goal", found=problem
+        )

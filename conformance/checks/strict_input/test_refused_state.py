@@ -1,0 +1,209 @@
+"""What the contract does not allow changes nothing: neither the velocity, nor the goal, nor what the robot delivers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import pytest
+
+from conformance.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
+from conformance.robot.delivery import Delivery, path_of
+from conformance.robot.drive import Drive
+from conformance.robot.goal import await_goal, await_none, difference, goal_body, put_goal
+from conformance.robot.goals import choose_goals
+from conformance.robot.invalid import invalid_bodies
+from conformance.robot.message_shapes import body_of
+from conformance.robot.probe.client import ProbeError
+from conformance.robot.robot import GOAL_PATH, LINEAR, STILL, VELOCITY, Robot, Velocity
+from conformance.robot.sampling import some
+from conformance.robot.soap_services import message, send_delivery
+from conformance.robot.stopping import bring_to_rest
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.transport.client import HttpClient
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.needs("rest"), pytest.mark.motion]
+_WATCH_S: Final = 0.3
+_CORRECT: Final = ("3", "1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
+_BAD_PARTS: Final = (
+    *((0, text) for text in ("0", "5", "abc", "", "3.5", "2147483648")),
+    *((place, text) for place in (1, 4, 6) for text in ("abc", "", "NaN", "Infinity", "-Infinity", "1e400")),
+)
+
+
+@pytest.fixture
+def robot(roaas: Session) -> Robot:
+    """The robot, at rest."""
+    reason = bring_to_rest(roaas)
+    if reason:
+        pytest.skip(reason)
+    return Robot(roaas)
+
+
+def _put(robot: Robot, path: str, media_type: str, body: bytes) -> Exchange:
+    return robot.rest.send("PUT", path, headers=(("Content-Type", media_type),), body=body)
+
+
+@pytest.mark.phase("motion")
+@pytest.mark.requirement("strict-input/velocity-refused")
+def test_an_invalid_velocity_moves_nothing(roaas: Session, robot: Robot, judge: Judge) -> None:
+    """A robot at rest stays there, whatever is wrong with what it is sent."""
+    fast = Velocity(
+        linear_x=0.4 * robot.limits.linear_m_s if robot.actuated(0) else 0.0,
+        angular_z=0.4 * robot.limits.angular_rad_s if robot.actuated(5) else 0.0,
+    )
+    drive = Drive(robot)
+    sent: list[tuple[str, Exchange]] = []
+    for path, valid, number in ((VELOCITY, fast.twist, "linear.x"), (LINEAR, fast.linear, "x")):
+        for what, media_type, body in some(list(invalid_bodies(valid, number)), roaas.effort):
+            sent.append((f"{path} with {what}", _put(robot, path, media_type, body)))
+            velocity, _ = robot.velocity()
+            if not _judge_still(robot, judge, velocity, sent):
+                bring_to_rest(roaas)
+                sent.clear()
+    drive.keep(_WATCH_S * robot.watchfulness)
+    velocity, _ = drive.look()
+    _judge_still(robot, judge, velocity, sent)
+
+
+def _judge_still(robot: Robot, judge: Judge, velocity: Velocity | None, sent: list[tuple[str, Exchange]]) -> bool:
+    """Judge that the robot is at rest; what moved it is the last that it did not refuse."""
+    if not sent:
+        return True
+    taken = [one for one in sent if one[1].response is None or one[1].response.status < 400]
+    what, exchange = (taken or sent)[-1]
+    return judge.check(
+        "strict-input/velocity-refused",
+        velocity is None or robot.near(velocity, STILL, 2),
+        exchange,
+        f"rest after PUT {what}",
+        found=f"velocity {velocity}",
+        cause=what,
+    )
+
+
+@pytest.mark.phase("motion")
+@pytest.mark.requirement("strict-input/goal-refused")
+def test_an_invalid_goal_is_not_followed(robot: Robot, judge: Judge, effort: Effort) -> None:
+    """Neither where there is no goal, nor in place of one."""
+    frame = robot.statement.motion.frame
+    near, other = choose_goals(robot, 1.5, 2)
+    number = "goal.target_pose.pose.position.x"
+    bodies = list(invalid_bodies(goal_body(near, frame, "not to be followed"), number))
+    bodies += [(what, "application/json", body_of(body)) for what, body in _invalid_goals(near, frame)]
+    bodies = some(bodies, effort)
+    for what, media_type, body in bodies:
+        exchange = _put(robot, GOAL_PATH, media_type, body)
+        goal, _ = robot.goal()
+        if not judge.check(
+            "strict-input/goal-refused",
+            goal is None,
+            exchange,
+            f"no goal after PUT of one with {what}",
+            found="it is the active goal",
+            cause=what,
+        ):
+            robot.delete_goal()
+            await_none(robot)
+    active = goal_body(other, frame, "to be followed")
+    put_goal(robot, active)
+    if await_goal(robot, active)[1]:
+        return  # that a valid goal is followed is for others to judge
+    for what, media_type, body in bodies:
+        exchange = _put(robot, GOAL_PATH, media_type, body)
+        goal, _ = robot.goal()
+        if goal is None:
+            break  # it has arrived
+        problem = difference(goal, active)
+        judge.check(
+            "strict-input/goal-refused",
+            not problem,
+            exchange,
+            f"the goal that was active before PUT of one with {what}",
+            found=problem,
+            cause=what,
+        )
+        if problem:
+            break
+    robot.delete_goal()
+    await_none(robot)
+
+
+def _invalid_goals(near: Any, frame: str) -> list[tuple[str, dict[str, Any]]]:
+    return [
+        ("an empty id", goal_body(near, frame, "")),
+        ("an id of 256 characters", goal_body(near, frame, "a" * 256)),
+        ("a number as id", {**goal_body(near, frame), "goal_id": {"id": 5}}),
+        ("an unknown frame", goal_body(near, "no_such_frame", "unknown frame")),
+        ("a quaternion of length 2", goal_body(near, frame, "long", length=2.0)),
+        ("a quaternion of length 0", goal_body(near, frame, "none", length=0.0)),
+    ]
+
+
+@pytest.mark.phase("delivery")
+@pytest.mark.requirement("strict-input/delivery-refused")
+def test_an_invalid_delivery_reaches_nobody(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+    """All are refused, and of a batch with a valid one at its end, only that one arrives."""
+    observer: DeliveryObserver | None = None
+    try:
+        observer = observer_of(roaas)
+        observer.mark()
+    except (NoObserverError, ProbeError) as nobody:
+        observer = None
+        judge.note("strict-input/delivery-refused", f"judged by the answers alone: {nobody}")
+    exchanges = []
+    for place, text in some(_BAD_PARTS, roaas.effort):
+        values = list(_CORRECT)
+        values[place] = text
+        exchanges.append(rest.send("PUT", path_of(*values), fresh=True))
+    if roaas.publishers is not None:
+        exchanges += _invalid_soap(roaas.publishers)
+    for exchange in exchanges:
+        status = exchange.response.status if exchange.response else 0
+        judge.check("strict-input/delivery-refused", status >= 400, exchange, "a refusal of an invalid delivery")
+    if observer is None:
+        return
+    last = Delivery(3, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
+    rest.send("PUT", last.rest_path, fresh=True)
+    try:
+        seen = [one.delivery for one in observer.collect(1)]
+    except (NoObserverError, ProbeError) as nobody:
+        pytest.skip(str(nobody))
+    if seen != [last]:
+        odd = next((one for one in seen if one != last), None)
+        guilty = next((one for one in exchanges if one.response is None or one.response.ok), exchanges[-1])
+        judge.check(
+            "strict-input/delivery-refused",
+            odd is None,
+            guilty,
+            "no message for an invalid delivery",
+            found=f"{len(seen) - 1} messages, among them {odd}",
+        )
+        return
+    judge.check("strict-input/delivery-refused", True, exchanges[-1], "no message for an invalid delivery")
+
+
+def _invalid_soap(publishers: SoapService) -> list[Exchange]:
+    """Messages with a bad code, a value that is not finite, a missing and a second element."""
+    values = dict(zip(("depot_x", "depot_y", "destination_x", "destination_y"), _CORRECT[1:5], strict=True))
+    values |= {"message_code": "3", "source_x": "5.5", "source_y": "6.5"}
+    changes: list[dict[str, str | None]] = [
+        {"message_code": "5"},
+        {"message_code": "abc"},
+        {"depot_x": "INF"},
+        {"source_y": "NaN"},
+        {"destination_x": None},
+        {"source_y": "x"},
+    ]
+    exchanges = [send_delivery(publishers, Delivery(0, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5))]
+    for change in changes:
+        given = {**values, **change}
+        content = "".join(f"<{name}>{value}</{name}>" for name, value in given.items() if value is not None)
+        body = message("ExecuteDeliveryRequest", f"<arg0>{content}</arg0>")
+        exchanges.append(publishers.post(body, fresh=True))
+    return exchanges

@@ -1,0 +1,124 @@
+"""Contract-invalid SOAP input is refused: a valid message broken in one way, which lxml and xmlschema both see."""
+
+from __future__ import annotations
+
+import random
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import strategies as st
+
+from conformance.soap.callable_services import askable
+from conformance.soap.calls import Answer, call
+from conformance.soap.messages import ordinary, variants
+from conformance.soap.mutations import Mutant, invalid_ones, mutants
+from conformance.soap.valid_messages import example
+from conformance.verdict.evidence import RefutedError
+
+if TYPE_CHECKING:
+    from conformance.documents.wsdl import Operation
+    from conformance.documents.xml_node import Node
+    from conformance.documents.xsd_shapes import Element
+    from conformance.engine.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+    from conformance.verdict.explorer import Explorer
+
+pytestmark = pytest.mark.phase("delivery")
+_KINDS = ("missing", "unknown", "duplicate", "order", "namespace", "lexical", "range", "non-finite", "nil", "body")
+_FAULT = "strict-input/soap-fault"
+_IDS = (*(f"strict-input/soap-{kind}" for kind in _KINDS), _FAULT)
+
+
+def _targets(service: SoapService) -> list[tuple[Operation, Element, Node]]:
+    """The operations of which the robot took a message, each with its declaration and that message."""
+    found = []
+    for operation in service.contract.operations:
+        declared = service.contract.shape(operation.request) if operation.request else None
+        message = example(service, operation)
+        if declared is not None and message is not None:
+            found.append((operation, declared, message))
+    return found
+
+
+def _judged(judge: Judge, mutant: Mutant, answer: Answer) -> bool:
+    """Judge that a mutant was refused, and how."""
+    why = f" ({mutant.reason})" if mutant.reason else ""
+    refused = judge.check(
+        f"strict-input/soap-{mutant.kind}",
+        answer.refused,
+        answer.exchange,
+        f"a refusal where {mutant.what}{why}",
+        found=answer.told,
+        cause=f"{mutant.kind} {answer.status} {answer.taken}",
+    )
+    if answer.taken:
+        return refused
+    return judge.check(
+        _FAULT,
+        answer.fault is not None and answer.status == 500,
+        answer.exchange,
+        f"a fault with status 500 where {mutant.what}",
+        found=answer.told,
+        cause=f"{answer.status} {answer.fault is None}",
+    )
+
+
+@pytest.mark.requirement(*_IDS)
+def test_single_mutations(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Every single mutation of a message that the robot takes is refused with a fault."""
+    chance = random.Random(roaas.seed)  # noqa: S311 - choice of cases, not of secrets
+    asked: dict[str, int] = dict.fromkeys(_KINDS, 0)
+    services = askable(roaas, *_IDS)
+    for service in services:
+        found = [
+            (declared, mutant) for _, declared, message in _targets(service) for mutant in mutants(declared, message)
+        ]
+        chance.shuffle(found)
+        # Of each kind alike, so that the many ways to miswrite a number do not crowd out the rest.
+        for kind in _KINDS:
+            ours = [mutant for _, mutant in found if mutant.kind == kind]
+            for mutant in invalid_ones(ours[: effort.cases(60)], service.contract.types):
+                asked[kind] += 1
+                _judged(judge, mutant, call(service, *mutant.payload))
+    for kind, count in asked.items():
+        if not count:
+            judge.skip(f"strict-input/soap-{kind}", _nothing(services, kind))
+
+
+def _nothing(services: list[SoapService], kind: str) -> str:
+    names = " and ".join(service.name for service in services)
+    return f"the operations of the {names} service that took a message leave nothing to break by {kind!r}"
+
+
+@pytest.mark.requirement(*_IDS)
+def test_mutations_of_any_message(roaas: Session, judge: Judge, explore: Explorer) -> None:
+    """Mutations are refused whatever the other values of the message are."""
+    for service in askable(roaas, *_IDS):
+        targets = [
+            (declared, _fullest(declared, message)) for _, declared, message in _targets(service) if message.children
+        ]
+        if not targets:
+            continue
+
+        def refused(case: tuple[Element, Mutant], service: SoapService = service) -> None:
+            for invalid in invalid_ones([case[1]], service.contract.types):
+                if not _judged(judge, invalid, call(service, *invalid.payload)):
+                    raise RefutedError(invalid.what)
+
+        explore(st.sampled_from(targets).flatmap(_broken), refused, cases=80)
+
+
+def _broken(target: tuple[Element, Node]) -> st.SearchStrategy[tuple[Element, Mutant]]:
+    """Any single mutation of any valid message of an operation."""
+    declared, base = target
+    return variants(declared, base).flatmap(
+        lambda drawn: st.sampled_from(list(mutants(declared, drawn))).map(lambda mutant: (declared, mutant))
+    )
+
+
+def _fullest(declared: Element, message: Node) -> Node:
+    """A message with all optional elements, so that those are broken as well."""
+    full = ordinary(declared, optional=True)
+    return full if len(full.paths()) > len(message.paths()) else message

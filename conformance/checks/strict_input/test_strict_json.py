@@ -1,0 +1,113 @@
+"""JSON bodies that break the contract in one way each, confirmed to be invalid as they are sent, are refused."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.rest.applicable import calm, few, need, sampled
+from conformance.rest.calls import JSON, example_call
+from conformance.rest.mutations import Mutation, mutations
+from conformance.rest.refusals import judge_refusal
+
+if TYPE_CHECKING:
+    from conformance.documents.openapi import Operation
+    from conformance.engine.session import Session
+    from conformance.rest.calls import Call
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
+_NAMES = (
+    "json-malformed",
+    "json-missing",
+    "json-unknown",
+    "json-duplicate",
+    "json-type",
+    "json-non-finite",
+    "json-root",
+    "json-depth",
+    "json-huge-number",
+    "json-encoding",
+    "json-empty",
+    "json-bounds",
+)
+_IDS = tuple(f"strict-input/{name}" for name in _NAMES)
+_STATUSES = ("strict-input/status-malformed", "strict-input/status-invalid")
+# What a robot may be killed by: judged before it is sent.
+_HOSTILE = ("strict-input/json-depth", "strict-input/json-huge-number")
+# Of one requirement and operation at standard effort; beyond that they repeat themselves.
+_EACH = 50
+
+
+@pytest.mark.requirement(*_IDS, *_STATUSES, "http/problem-detail", "http/problem-value", "http/no-server-error")
+def test_mutations_are_refused(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Each named mutation of a valid body is refused with 4xx, and the next valid one is taken as before."""
+    possible: set[str] = set()
+    for operation in need(roaas, (*_IDS, *_STATUSES), lambda item: JSON in item.bodies, "takes JSON"):
+        calm(roaas)
+        call = example_call(roaas, operation)
+        by_name = _by_requirement(call, operation)
+        possible |= {name for name, made in by_name.items() if made}
+        first = call.send(roaas)
+        if not _accepted(first.response.status if first.response else 0):
+            _say_unjudged(judge, operation, first.came)
+            continue
+        for name, made in by_name.items():
+            for item in few(roaas, sampled(roaas, made, _count(effort, name), f"{operation.id} {name}"), 1):
+                _try(roaas, judge, call, item)
+        calm(roaas)
+        again = call.send(roaas)
+        judge.check(
+            "http/no-server-error",
+            _accepted(again.response.status if again.response else 0),
+            again,
+            f"a valid {operation.id} taken after all that was refused",
+            found=again.came,
+        )
+    calm(roaas)
+    for name in _NAMES if possible else ():
+        if name not in possible:
+            judge.unclaimed(f"strict-input/{name}", "no body of the contract can be wrong in this way")
+
+
+def _accepted(status: int) -> bool:
+    return 200 <= status < 300 or status == 409
+
+
+def _say_unjudged(judge: Judge, operation: Operation, came: str) -> None:
+    for id_ in (*_IDS, *_STATUSES):
+        judge.note(id_, f"a valid {operation.id} is answered {came}, so nothing was made of it")
+
+
+def _count(effort: Effort, name: str) -> int:
+    """How many at standard effort; a deep body costs a robot a hundred times what another one does."""
+    if name == "json-depth":
+        return 6 if effort.name != "quick" else 1
+    return _EACH
+
+
+def _by_requirement(call: Call, operation: Operation) -> dict[str, list[Mutation]]:
+    by_name: dict[str, list[Mutation]] = {name: [] for name in _NAMES}
+    for item in mutations(call.value, operation.bodies[JSON].schema):
+        by_name[item.requirement].append(item)
+    return by_name
+
+
+def _try(session: Session, judge: Judge, call: Call, item: Mutation) -> None:
+    requirement = f"strict-input/{item.requirement}"
+    judge.at_risk = (requirement,)
+    refused = judge_refusal(
+        session,
+        partial(call.carrying(item.body).send, session, fresh=requirement in _HOSTILE),
+        requirement,
+        f"{item.name}",
+        field=item.field,
+        shown=item.shown,
+        malformed=item.malformed,
+        closing=item.requirement == "json-depth",
+    )
+    if not refused:
+        calm(session)

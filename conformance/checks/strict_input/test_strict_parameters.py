@@ -1,0 +1,125 @@
+"""Parameters that break the contract are refused, and so is leaving out those that are required."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.rest.applicable import calm, few, is_slow, need, readable, sampled
+from conformance.rest.calls import Call, example_call
+from conformance.rest.parameters import Wrong, wrong_texts
+from conformance.rest.refusals import judge_refusal
+
+if TYPE_CHECKING:
+    from conformance.documents.openapi import Operation
+    from conformance.engine.session import Session
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.needs("rest")
+_QUERY = "strict-input/query-parameter"
+_MISSING = "strict-input/query-missing"
+_PATH = "strict-input/path-parameter"
+
+
+def _has(where: str, operation: Operation) -> bool:
+    return any(wrong_texts(item) for item in operation.parameter(where))
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement(_QUERY, "http/problem-detail", "http/problem-value")
+def test_query_parameters(roaas: Session, judge: Judge) -> None:
+    """Text, nothing, NaN, Infinity and 1e400 are refused where a number belongs."""
+    for operation in need(roaas, [_QUERY], partial(_has, "query"), "takes numbers in its query"):
+        call = _valid_call(roaas, operation)
+        if not _valid(roaas, judge, call, _QUERY):
+            continue
+        wrong = [item for parameter in operation.parameter("query") for item in wrong_texts(parameter)]
+        for item in _chosen(roaas, wrong, 120, operation):
+            _try(roaas, call, item, _QUERY)
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement(_MISSING, "http/problem-detail")
+def test_missing_query_parameters(roaas: Session, judge: Judge) -> None:
+    """Each required parameter is missed when it is left out."""
+
+    def required(operation: Operation) -> bool:
+        return any(item.required for item in operation.parameter("query"))
+
+    for operation in need(roaas, [_MISSING], required, "requires a query parameter"):
+        call = _valid_call(roaas, operation)
+        if not _valid(roaas, judge, call, _MISSING):
+            continue
+        bare = Call(operation, {item.name: call.values[item.name] for item in operation.parameter("path")})
+        for item in operation.parameter("query"):
+            if item.required:
+                lacking = call.having(item.name, None)
+                judge_refusal(
+                    roaas,
+                    partial(lacking.send, roaas),
+                    _MISSING,
+                    f"no parameter {item.name}",
+                    field=item.name,
+                    json=False,
+                )
+        judge_refusal(roaas, partial(bare.send, roaas), _MISSING, "no parameter at all", json=False)
+
+
+@pytest.mark.phase("delivery")
+@pytest.mark.requirement(_PATH, "http/problem-detail", "http/problem-value")
+def test_path_parameters(roaas: Session, judge: Judge) -> None:
+    """Text, nothing, NaN, Infinity, 1e400 and values not enumerated are refused in a path."""
+    for operation in need(roaas, [_PATH], partial(_has, "path"), "takes numbers in its path"):
+        call = example_call(roaas, operation)
+        if not _valid(roaas, judge, call, _PATH):
+            continue
+        wrong = [item for parameter in operation.parameter("path") for item in wrong_texts(parameter)]
+        for item in _chosen(roaas, wrong, 120, operation):
+            if not item.text:
+                continue  # two slashes in a row are another path, which servers may shorten
+            _try(roaas, call, item, _PATH)
+        if operation.motion:
+            calm(roaas)
+
+
+def _valid_call(session: Session, operation: Operation) -> Call:
+    return readable(session, operation) if operation.method == "GET" else example_call(session, operation)
+
+
+def _valid(session: Session, judge: Judge, call: Call, requirement: str) -> bool:
+    """Whether the valid request is taken, so that a refusal of another one has to do with what was changed."""
+    exchange = call.send(session)
+    if exchange.response is not None and (exchange.response.ok or exchange.response.status == 409):
+        return True
+    judge.skip(requirement, f"a valid {call.operation.id} is answered {exchange.came}, so nothing was made of it")
+    return False
+
+
+def _chosen(session: Session, wrong: list[Wrong], standard: int, operation: Operation) -> list[Wrong]:
+    """With little effort, one of each kind and some more."""
+    first: dict[str, Wrong] = {}
+    for item in wrong:
+        first.setdefault(item.text, item)
+    named: dict[str, Wrong] = {}
+    for item in wrong:
+        named.setdefault(item.name, item)
+    if is_slow(session):
+        return few(session, wrong, 6)
+    basic = list(dict.fromkeys([*first.values(), *named.values()]))
+    return list(dict.fromkeys(basic + sampled(session, wrong, standard, operation.id)))
+
+
+def _try(session: Session, call: Call, item: Wrong, requirement: str) -> None:
+    refused = judge_refusal(
+        session,
+        partial(call.having(item.name, item.text).send, session),
+        requirement,
+        item.what,
+        field=item.name,
+        shown=item.shown,
+        json=False,
+    )
+    if not refused and call.operation.motion:
+        calm(session)

@@ -1,0 +1,46 @@
+"""XML bodies that break the contract are refused, by robots that take XML."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.rest.applicable import calm, few, need, sampled
+from conformance.rest.calls import XML, example_call, root_name
+from conformance.rest.refusals import judge_refusal
+from conformance.rest.xml_mutations import xml_mutations
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
+_ID = "strict-input/xml-body"
+_EACH = 80
+
+
+@pytest.mark.requirement(_ID, "http/no-server-error")
+def test_xml_mutations_are_refused(roaas: Session, judge: Judge) -> None:
+    """Each named mutation of a valid XML body is refused with 4xx."""
+    taken = 0
+    operations = need(roaas, [_ID], lambda item: XML in item.bodies, "takes XML")
+    for operation in operations:
+        calm(roaas)
+        call = example_call(roaas, operation, XML)
+        exchange = call.send(roaas)
+        answer = exchange.response
+        if answer is None or not (answer.ok or answer.status == 409):
+            judge.note(_ID, f"a valid {operation.id} as XML is answered {exchange.came}, so nothing was made of it")
+            continue
+        taken += 1
+        schema = operation.bodies[XML].schema
+        made = xml_mutations(call.value, schema, root_name(schema) or "value")
+        for name, body in few(roaas, sampled(roaas, made, _EACH, operation.id), 3):
+            wrong = call.carrying(body)
+            if not judge_refusal(roaas, partial(wrong.send, roaas), _ID, name, json=False):
+                calm(roaas)
+    calm(roaas)
+    if not taken and "rest-formats" not in roaas.claims:
+        judge.unclaimed(_ID, "the robot takes no XML")

@@ -1,0 +1,125 @@
+"""The same attacks in XML bodies over REST, on every resource that takes XML by the contract's OpenAPI."""
+
+from __future__ import annotations
+
+import statistics
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.documents.xml_node import Node
+from conformance.soap.attack_runner import Siege, judge_calls, outcome
+from conformance.soap.attacks import VALUE, Attack, Carrier, attacks
+from conformance.soap.callback_server import Trap
+from conformance.soap.envelope import NotXmlError, elements, parse, text_of
+from conformance.transport.client import HttpClient
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from lxml import etree
+
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.phase("attack")
+_REST = "xml-security/rest"
+_XML = "application/xml"
+_BODIES = ("put", "post", "patch")
+_DEADLINE_S = 10.0
+# More than there are for any requirement.
+_EACH = 99
+# With less than half the effort (in quick runs, and on slow robots) there is one for each requirement.
+_HALF = 0.5
+# What a robot may take, or what is no matter of XML bodies over REST.
+_NOT_HERE = frozenset({"no-callback"})
+
+
+def _targets(roaas: Session) -> Iterator[tuple[str, str]]:
+    """Method and path of each operation that takes XML, as far as its path needs no values."""
+    for path, operations in roaas.contract.openapi.get("paths", {}).items():
+        if "{" in path or not isinstance(operations, dict):
+            continue
+        for method in _BODIES:
+            body = operations.get(method, {}).get("requestBody", {})
+            if isinstance(body, dict) and _XML in body.get("content", {}):
+                yield method.upper(), path
+
+
+def _carrier(rest: HttpClient, path: str) -> Carrier:
+    """What the resource itself sends as XML, with a place in its first value; else a document of no meaning."""
+    exchange = rest.send("GET", path, headers=(("Accept", _XML),))
+    answer = exchange.response
+    plain = Carrier(f"<message>{VALUE}</message>", "message", "1")
+    if answer is None or not answer.ok:
+        return plain
+    try:
+        root = parse(answer.body)
+    except NotXmlError:
+        return plain
+    value: list[str] = []
+    node = _node(root, value)
+    written = node.written().decode()
+    name = written[1:].split(">", 1)[0].split(" ", 1)[0].rstrip("/")
+    return Carrier(written, name, value[0]) if value else plain
+
+
+def _node(element: etree._Element, value: list[str]) -> Node:
+    """An element as a node, VALUE for the first text in it, which goes into ``value``."""
+    children = tuple(_node(child, value) for child in elements(element))
+    text = text_of(element).strip() if not children else ""
+    if text and not value:
+        value.append(text)
+        text = VALUE
+    return Node(str(element.tag), text, children)
+
+
+@pytest.mark.motion
+@pytest.mark.requirement(_REST, "xml-security/responsive", "xml-security/no-callback")
+def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Each attack in the body of each operation that takes XML; a robot that takes none refuses them all."""
+    rest = roaas.rest
+    targets = list(_targets(roaas))
+    if rest is None or not targets:
+        judge.unclaimed(_REST, "there is no REST interface that takes XML")
+        return
+    if "rest" in roaas.unreachable:
+        pytest.skip(f"the robot's REST interface does not answer: {roaas.unreachable['rest']}")
+    alone = roaas.publishers is None and roaas.subscribers is None
+    quick = effort.factor < _HALF
+    with Trap(rest.host, rest.port) as trap:
+        sieges = []
+        for number, (method, path) in enumerate(targets[:1] if quick else targets):
+            siege = _siege(roaas, rest, method, path, alone=alone)
+            sieges.append(siege)
+            for attack in attacks(_carrier(rest, path), trap.url, 1 if quick else _EACH, f"rest{number}"):
+                if siege.ids(attack):
+                    siege.attack(attack)
+        judge_calls(judge, trap, sieges)
+
+
+def _siege(roaas: Session, rest: HttpClient, method: str, path: str, *, alone: bool) -> Siege:
+    def send(attack: Attack) -> Exchange:
+        apart = HttpClient(rest.base_url, rest.connection)
+        headers = (("Content-Type", _XML), ("Accept", "*/*"), *attack.headers)
+        deadline = min(_DEADLINE_S, rest.connection.timeout_s)
+        try:
+            return outcome(
+                lambda: apart.send(method, path, headers=headers, body=attack.body, fresh=True, timeout_s=deadline)
+            )
+        finally:
+            apart.close()
+
+    def ask() -> Exchange:
+        return rest.send("GET", path)
+
+    def ids(attack: Attack) -> tuple[str, ...]:
+        own = f"xml-security/{attack.name}"
+        ledger = roaas.contract.ledger
+        must = own in ledger and ledger[own].level == "MUST" and attack.name not in _NOT_HERE
+        return (*((own,) if alone else ()), *((_REST,) if must else ()))
+
+    times = [answer.elapsed_ms for answer in (ask().response for _ in range(5)) if answer is not None]
+    return Siege(roaas.judge, send, ask, statistics.median(times), ids)

@@ -1,0 +1,163 @@
+"""Attacks on the SOAP services by XML: refused, nothing leaked, nobody called, and the robot still well."""
+
+from __future__ import annotations
+
+import statistics
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.documents.xml_names import ADDRESSING, clark
+from conformance.documents.xml_node import Node
+from conformance.soap.attack_runner import Siege, judge_calls, outcome
+from conformance.soap.attacks import ASIDE, VALUE, Attack, Carrier, attacks
+from conformance.soap.callable_services import askable
+from conformance.soap.callback_server import Trap
+from conformance.soap.envelope import envelope
+from conformance.soap.messages import simple_leaves, with_text
+from conformance.soap.valid_messages import example
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conformance.engine.session import Session
+    from conformance.soap.service import SoapService
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.phase("attack")
+_NAMES = (
+    "doctype",
+    "internal-entity",
+    "external-entity",
+    "no-callback",
+    "parameter-entity",
+    "expansion",
+    "quadratic",
+    "depth",
+    "attributes",
+    "long-name",
+    "size",
+    "compressed",
+    "processing-instruction",
+    "xinclude",
+    "responsive",
+)
+_IDS = tuple(f"xml-security/{name}" for name in _NAMES)
+_DEADLINE_S = 10.0
+# More than there are for any requirement.
+_EACH = 99
+# With less than half the effort (in quick runs, and on slow robots) there is one for each requirement.
+_HALF = 0.5
+
+
+def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
+    """A message that the robot takes: as it is, with VALUE for one of its values, and that value."""
+    found: tuple[Node, Node, str] | None = None
+    for operation in service.contract.operations:
+        message = example(service, operation)
+        declared = service.contract.shape(operation.request) if operation.request else None
+        if message is None or declared is None:
+            continue
+        leaves = simple_leaves(declared, message)
+        if leaves:
+            path = leaves[0][0]
+            return message, with_text(message, path, VALUE), message.at(path).text
+        found = found or (message, replace(message, text=VALUE), "")
+    return found
+
+
+def _siege(judge: Judge, service: SoapService, message: Node) -> Siege:
+    document = envelope([message]).written()
+
+    def send(attack: Attack) -> Exchange:
+        apart = service.apart()
+        try:
+            deadline = min(_DEADLINE_S, service.client.connection.timeout_s)
+            return outcome(lambda: apart.post(attack.body, headers=attack.headers, fresh=True, timeout_s=deadline))
+        finally:
+            apart.client.close()
+
+    def ask() -> Exchange:
+        return service.post(document)
+
+    times = [answer.elapsed_ms for answer in (ask().response for _ in range(5)) if answer is not None]
+    return Siege(judge, send, ask, statistics.median(times))
+
+
+def _no_soap(roaas: Session) -> bool:
+    """Whether the robot has no SOAP service at all: then the class is judged over REST alone."""
+    return roaas.publishers is None and roaas.subscribers is None
+
+
+@pytest.mark.requirement(*_IDS)
+def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Each attack in a message that the robot would take without it, in the Body and in a Header block."""
+    if _no_soap(roaas):
+        return
+    services = askable(roaas, *_IDS)
+    with Trap(services[0].client.host, services[0].client.port) as trap:
+        sieges = []
+        for service in services:
+            harmless = _harmless(service)
+            if harmless is None:
+                for id_ in _IDS:
+                    judge.skip(id_, f"the {service.name} service took none of the messages tried")
+                continue
+            message, marked, value = harmless
+            aside = Node(clark("urn:example:strange", "Note"), ASIDE)
+            document = envelope([marked], (aside,)).written().decode()
+            carrier = Carrier(document, document[1:].split(" ", 1)[0], value)
+            siege = _siege(judge, service, message)
+            sieges.append(siege)
+            for attack in attacks(carrier, trap.url, 1 if effort.factor < _HALF else _EACH, service.name):
+                siege.attack(attack)
+        judge_calls(judge, trap, sieges)
+
+
+@pytest.mark.requirement("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
+def test_addressing(roaas: Session, judge: Judge, effort: Effort) -> None:
+    """Addresses in WS-Addressing headers are not called, whichever header names them."""
+    ids = ("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
+    if _no_soap(roaas):
+        for id_ in (ids[0], "xml-security/soapaction-spoofing"):
+            judge.unclaimed(id_, "the robot has no SOAP service")
+        return
+    services = askable(roaas, *ids)
+    with Trap(services[0].client.host, services[0].client.port) as trap:
+        sieges = []
+        for service in services:
+            harmless = _harmless(service)
+            if harmless is None:
+                continue
+            siege = _siege(judge, service, harmless[0])
+            sieges.append(siege)
+            spoofed = list(_spoofed(service, harmless[0], trap))
+            for attack in spoofed[: effort.cases(len(spoofed))]:
+                siege.attack(attack)
+        judge_calls(judge, trap, sieges)
+
+
+def _spoofed(service: SoapService, message: Node, trap: Trap) -> Iterator[Attack]:
+    action = next((item.input_action for item in service.contract.operations if item.request == message.tag), None)
+    broken = Node(clark("urn:example:strange", "no_such_operation"))
+    valid, invalid = ("a valid message", message), ("an invalid one", broken)
+    # The likeliest first: a response goes to ReplyTo, a fault to FaultTo.
+    for first, then in ((valid, invalid), (invalid, valid)):
+        for name, (what, payload) in (("ReplyTo", first), ("FaultTo", then), ("From", first)):
+            lure = f"{service.name}-{name.lower()}-{payload.name}"
+            headers = (
+                Node(clark(ADDRESSING, "Action"), action or "urn:example:action"),
+                Node(clark(ADDRESSING, "MessageID"), "urn:uuid:0b7d3c1e-6f43-4a2e-8f57-3c1d2f6f9a01"),
+                Node(clark(ADDRESSING, "To"), service.endpoint),
+                Node(clark(ADDRESSING, name), "", (Node(clark(ADDRESSING, "Address"), trap.url(lure)),)),
+            )
+            yield Attack(
+                "addressing-spoofing",
+                f"{name} of {what}",
+                envelope([payload], headers).written(),
+                must_refuse=False,
+                lure=lure,
+            )

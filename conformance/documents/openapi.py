@@ -1,0 +1,269 @@
+"""The operations of a contract, read from its OpenAPI description into values."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+from conformance.contract.files import ContractError
+from conformance.documents.json_schema import Schema, UnresolvedError, modern, opened, resolved
+
+if TYPE_CHECKING:
+    from conformance.contract.files import Contract
+
+METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace")
+SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE"})
+_PARAMETER = re.compile(r"\{([^{}]*)\}")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an operation.
+
+    Attributes:
+        name: as it is sent.
+        where: path, query, header or cookie.
+        required: whether a request needs it.
+        schema: of its value.
+        examples: values that the contract gives for it; may be empty.
+    """
+
+    name: str
+    where: str
+    required: bool
+    schema: Schema
+    examples: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True)
+class Body:
+    """One media type that an operation takes.
+
+    Attributes:
+        media_type: without parameters.
+        schema: of the value.
+        examples: values (text for XML) that the contract gives; may be empty.
+    """
+
+    media_type: str
+    schema: Schema
+    examples: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Operation:
+    """One method of one resource.
+
+    Attributes:
+        id: operationId, or method and path where there is none.
+        method: in upper case.
+        template: path with ``{name}`` for parameters.
+        parameters: of path and operation together.
+        bodies: what it takes, by media type.
+        body_required: whether a request needs a body.
+        responses: schemas of what it answers, by status ("200", "2XX", "default") and media type; open to more fields.
+        motion: whether it may move the robot (or change what a vendor would not have changed).
+        optional: whether a robot may do without it.
+    """
+
+    id: str
+    method: str
+    template: str
+    parameters: tuple[Parameter, ...] = ()
+    bodies: dict[str, Body] = field(default_factory=dict)
+    body_required: bool = False
+    responses: dict[str, dict[str, Schema]] = field(default_factory=dict)
+    motion: bool = False
+    optional: bool = False
+
+    @property
+    def label(self) -> str:
+        """Method and path, for people."""
+        return f"{self.method} {self.template}"
+
+    @property
+    def safe(self) -> bool:
+        """Whether the method is safe by RFC 9110 9.2.1."""
+        return self.method in SAFE
+
+    def declared(self, status: int) -> dict[str, Schema] | None:
+        """The media types that the contract declares for a status; None where it does not declare the status."""
+        for key in (str(status), f"{status // 100}XX", f"{status // 100}xx", "default"):
+            if key in self.responses:
+                return self.responses[key]
+        return None
+
+    @cached_property
+    def formats(self) -> tuple[str, ...]:
+        """The media types of its successful answers, the contract's first one first."""
+        found = [name for status, content in self.responses.items() if status.startswith("2") for name in content]
+        return tuple(dict.fromkeys(found))
+
+    @cached_property
+    def shape(self) -> Schema | None:
+        """The schema of what a successful answer holds, whatever its format; None where the contract has none."""
+        for status, content in self.responses.items():
+            if status.startswith("2"):
+                for media_type, schema in content.items():
+                    if is_json(media_type):
+                        return schema
+        return None
+
+    def parameter(self, where: str) -> tuple[Parameter, ...]:
+        """The parameters of one kind."""
+        return tuple(item for item in self.parameters if item.where == where)
+
+
+def is_json(media_type: str) -> bool:
+    """Whether a media type is JSON (RFC 6839 3.1)."""
+    return media_type == "application/json" or media_type.endswith("+json")
+
+
+def is_xml(media_type: str) -> bool:
+    """Whether a media type is XML (RFC 7303 4)."""
+    return media_type in {"application/xml", "text/xml"} or media_type.endswith("+xml")
+
+
+@lru_cache(maxsize=8)
+def operations_of(contract: Contract) -> tuple[Operation, ...]:
+    """All operations of a contract, in its order.
+
+    Raises:
+        ContractError: its OpenAPI description has a reference that leads nowhere, or is not built as one.
+    """
+    try:
+        return tuple(read_operations(contract.openapi))
+    except (UnresolvedError, AttributeError, TypeError, KeyError) as error:
+        raise ContractError(f"{contract.openapi_path} is no usable OpenAPI description: {error}") from error
+
+
+def read_operations(document: Schema) -> list[Operation]:
+    """The operations of an OpenAPI document.
+
+    Raises:
+        UnresolvedError, AttributeError, TypeError, KeyError: it is not built as one.
+    """
+    found: list[Operation] = []
+    for path, item in document.get("paths", {}).items():
+        whole = resolved(document, item)
+        shared = whole.get("parameters", [])
+        found += [_operation(path, name.upper(), whole[name], shared) for name in METHODS if name in whole]
+    return found
+
+
+def _operation(path: str, method: str, given: dict[str, Any], shared: list[dict[str, Any]]) -> Operation:
+    own = {(item["name"], item["in"]) for item in given.get("parameters", [])}
+    parameters = [item for item in shared if (item["name"], item["in"]) not in own] + given.get("parameters", [])
+    body = given.get("requestBody", {})
+    return Operation(
+        id=given.get("operationId", f"{method} {path}"),
+        method=method,
+        template=path,
+        parameters=tuple(_parameter(item) for item in parameters),
+        bodies={
+            name.split(";", 1)[0].strip().lower(): Body(
+                name.split(";", 1)[0].strip().lower(), modern(content.get("schema", {})), _examples(content)
+            )
+            for name, content in body.get("content", {}).items()
+        },
+        body_required=bool(body.get("required", False)),
+        responses={
+            str(status): {
+                name.split(";", 1)[0].strip().lower(): opened(modern(content.get("schema", {})))
+                for name, content in response.get("content", {}).items()
+            }
+            for status, response in given.get("responses", {}).items()
+        },
+        motion=bool(given.get("x-roaas-motion", method not in SAFE)),
+        optional=bool(given.get("x-roaas-optional", False)),
+    )
+
+
+def _parameter(given: dict[str, Any]) -> Parameter:
+    content: dict[str, Any] = next(iter(given.get("content", {}).values()), {})
+    return Parameter(
+        given["name"],
+        given["in"],
+        bool(given.get("required", given["in"] == "path")),
+        modern(given.get("schema", content.get("schema", {}))),
+        _examples(given),
+    )
+
+
+def _examples(given: dict[str, Any]) -> tuple[Any, ...]:
+    """The examples of a parameter or a media type; its schema's where it has none of its own."""
+    if "example" in given:
+        return (given["example"],)
+    named = tuple(item["value"] for item in given.get("examples", {}).values() if "value" in item)
+    schema = given.get("schema", {})
+    if named:
+        return named
+    return (schema["example"],) if "example" in schema else tuple(schema.get("examples", ()))
+
+
+@dataclass(frozen=True)
+class Resource:
+    """All operations of one path.
+
+    Attributes:
+        template: the path.
+        operations: by method.
+    """
+
+    template: str
+    operations: dict[str, Operation]
+
+    @cached_property
+    def pattern(self) -> re.Pattern[str]:
+        """Matches the paths that the template stands for."""
+        parts = _PARAMETER.split(self.template)
+        return re.compile("".join(re.escape(part) if i % 2 == 0 else "[^/]*" for i, part in enumerate(parts)))
+
+    @property
+    def methods(self) -> frozenset[str]:
+        """The methods that the contract gives it, HEAD with GET included."""
+        given = frozenset(self.operations)
+        return given | {"HEAD"} if "GET" in given else given
+
+    @property
+    def optional(self) -> bool:
+        """Whether a robot may do without it."""
+        return all(operation.optional for operation in self.operations.values())
+
+
+@lru_cache(maxsize=8)
+def resources_of(contract: Contract) -> tuple[Resource, ...]:
+    """The resources of a contract, in its order.
+
+    Raises:
+        ContractError: see operations_of.
+    """
+    by_path: dict[str, dict[str, Operation]] = {}
+    for operation in operations_of(contract):
+        by_path.setdefault(operation.template, {})[operation.method] = operation
+    return tuple(Resource(template, operations) for template, operations in by_path.items())
+
+
+def resource_at(contract: Contract, path: str) -> Resource | None:
+    """The resource that a path is for; a literal path wins over a template (OpenAPI 3.1, 4.8.8.2)."""
+    found = [item for item in resources_of(contract) if item.pattern.fullmatch(path)]
+    return min(found, key=lambda item: item.template.count("{"), default=None)
+
+
+def matching(contract: Contract, method: str, path: str) -> Operation | None:
+    """The operation that a request is for; HEAD counts as GET.
+
+    Args:
+        contract: whose.
+        method: as sent.
+        path: below the base URL, without query.
+    """
+    resource = resource_at(contract, path)
+    return resource.operations.get("GET" if method == "HEAD" else method) if resource else None
+
+
+def known_path(contract: Contract, path: str) -> bool:
+    """Whether any resource of the contract has this path."""
+    return resource_at(contract, path) is not None

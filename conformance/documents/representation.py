@@ -1,0 +1,214 @@
+"""JSON, XML and YAML read by one schema into one comparable value."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import yaml
+from lxml import etree
+
+from conformance.documents.json_schema import Schema, as_double, kind_of, types_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import is_json, is_xml
+
+# The contract's numbers; a point without digits after it is XML Schema's and YAML's affair, and harmless.
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_WHOLE = re.compile(r"[+-]?\d{1,400}", re.ASCII)
+_NULLS = {"", "null", "~", "Null", "NULL"}
+# libyaml where PyYAML was built with it: an Odometry is 150 lines, and pure Python takes 20 ms for them.
+_Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+_NIL = "{http://www.w3.org/2001/XMLSchema-instance}nil"
+
+
+class UnreadableError(Exception):
+    """A body that is not what its media type says; the message names what is wrong."""
+
+
+def read(media_type: str, body: bytes, schema: Schema) -> Any:
+    """A body as a JSON value of the given schema; fields that the schema does not name are left out.
+
+    What does not fit the schema stays as it is written (mostly text), so that validating the value shows it.
+
+    Raises:
+        UnreadableError: it is no JSON, XML or YAML at all.
+    """
+    try:
+        if is_json(media_type):
+            text = read_json(body)
+            if text.problem:
+                raise UnreadableError(text.problem)
+            return projected(text.value, schema)
+        if is_xml(media_type):
+            return from_element(parse_xml(body), schema)
+        return from_plain(parse_yaml(body), schema)
+    except RecursionError as error:
+        raise UnreadableError("it is nested too deeply to be read") from error
+
+
+def parse_xml(body: bytes) -> etree._Element:
+    """The root element of a document that a robot sent; nothing in it is resolved or fetched.
+
+    Raises:
+        UnreadableError: it is not well-formed, or has a document type declaration.
+    """
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
+    )
+    try:
+        root = etree.fromstring(body, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        raise UnreadableError(f"no well-formed XML: {str(error)[:200]}") from error
+    if root.getroottree().docinfo.internalDTD is not None:
+        raise UnreadableError("XML with a document type declaration")
+    return root
+
+
+def parse_yaml(body: bytes) -> Any:
+    """The one document of a YAML stream, its scalars as text; a last empty document (``---``) is no document.
+
+    ``ros2 topic echo`` prints ``---`` behind each message.
+
+    Raises:
+        UnreadableError: it is no YAML, or more than one document.
+    """
+    try:
+        documents = list(yaml.load_all(body.decode("utf-8"), Loader=_Loader))
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
+        raise UnreadableError(f"no YAML: {' '.join(str(error).split())[:200]}") from error
+    while len(documents) > 1 and documents[-1] in (None, ""):
+        documents.pop()
+    if len(documents) != 1:
+        raise UnreadableError(f"{len(documents)} YAML documents where one was expected")
+    return documents[0]
+
+
+def local_name(element: etree._Element) -> str:
+    """An element's name without its namespace."""
+    return etree.QName(element).localname
+
+
+def from_element(element: etree._Element, schema: Schema) -> Any:
+    """An element as a JSON value; see read()."""
+    schema = flat(schema)
+    kind = kind_of(schema)
+    children = [child for child in element if isinstance(child.tag, str)]
+    if "null" in types_of(schema) and (element.get(_NIL) in {"true", "1"} or (not children and not element.text)):
+        return None
+    if kind == "array":
+        return [from_element(child, schema.get("items", {})) for child in children]
+    if kind == "object":
+        return _from_children(children, schema)
+    if children:
+        return {local_name(child): "" for child in children}
+    return scalar(element.text or "", kind)
+
+
+def _from_children(children: list[etree._Element], schema: Schema) -> dict[str, Any]:
+    by_name: dict[str, list[etree._Element]] = {}
+    for child in children:
+        by_name.setdefault(local_name(child), []).append(child)
+    properties: dict[str, Schema] = schema.get("properties", {})
+    if not properties:
+        return {name: group[0].text or "" for name, group in by_name.items()}
+    result: dict[str, Any] = {}
+    for name, part in properties.items():
+        group = by_name.get(name, [])
+        if kind_of(flat(part)) == "array":
+            if group or name in schema.get("required", ()):
+                result[name] = _items(group, flat(part).get("items", {}))
+        elif len(group) == 1:
+            result[name] = from_element(group[0], part)
+        elif group:
+            result[name] = [from_element(item, part) for item in group]
+    return result
+
+
+def _items(group: list[etree._Element], schema: Schema) -> list[Any]:
+    """An array's items: one child of the field's name for each, or all nested in one such child."""
+    if len(group) == 1:
+        inner = [child for child in group[0] if isinstance(child.tag, str)]
+        fields = set(flat(schema).get("properties", {}))
+        nested = not fields & {local_name(child) for child in inner} if fields else bool(inner)
+        if nested or not (inner or (group[0].text or "").strip()):
+            return [from_element(child, schema) for child in inner]
+    return [from_element(item, schema) for item in group]
+
+
+def from_plain(value: Any, schema: Schema) -> Any:
+    """YAML whose scalars are all text as a JSON value; see read()."""
+    schema = flat(schema)
+    kind = kind_of(schema)
+    if isinstance(value, str):
+        if value in _NULLS and "null" in types_of(schema):
+            return None
+        if kind in {"array", "object"}:
+            return value
+        return scalar(value, kind)
+    if isinstance(value, list):
+        return [from_plain(item, schema.get("items", {})) for item in value]
+    if isinstance(value, dict):
+        properties: dict[str, Schema] = schema.get("properties", {})
+        return {
+            name: from_plain(item, properties.get(name, {}))
+            for name, item in value.items()
+            if name in properties or not properties
+        }
+    return value
+
+
+def scalar(text: str, kind: str) -> Any:
+    """A single value as its schema's type; the text itself where it is none."""
+    stripped = text.strip(" \t\r\n")
+    if kind in {"number", "integer"} and _NUMBER.fullmatch(stripped):
+        return int(stripped) if _WHOLE.fullmatch(stripped) else float(stripped)
+    if kind == "boolean" and stripped.lower() in {"true", "false", "1", "0"}:
+        return stripped.lower() in {"true", "1"}
+    return text
+
+
+def projected(value: Any, schema: Schema) -> Any:
+    """A JSON value without the fields that its schema does not name."""
+    schema = flat(schema)
+    if isinstance(value, list):
+        return [projected(item, schema.get("items", {})) for item in value]
+    properties: dict[str, Schema] = schema.get("properties", {})
+    if not isinstance(value, dict) or not properties:
+        return value
+    return {name: projected(item, properties[name]) for name, item in value.items() if name in properties}
+
+
+def flat(schema: Schema) -> Schema:
+    """A schema with the properties of its allOf, or of its first alternative, as its own."""
+    parts = [*schema.get("allOf", ()), *schema.get("oneOf", ())[:1], *schema.get("anyOf", ())[:1]]
+    if not parts:
+        return schema
+    result = {key: item for key, item in schema.items() if key not in {"allOf", "oneOf", "anyOf"}}
+    for part in parts:
+        inner = flat(part)
+        result = {
+            **inner,
+            **result,
+            "properties": {**inner.get("properties", {}), **result.get("properties", {})},
+            "required": [*inner.get("required", ()), *result.get("required", ())],
+        }
+        if not result["properties"]:
+            del result["properties"]
+    return result
+
+
+def flattened(value: Any, where: str = "") -> dict[str, Any]:
+    """Every single value by its place; numbers as doubles, and the length of each list."""
+    if isinstance(value, dict):
+        leaves: dict[str, Any] = {} if value else {where: "{}"}
+        for name, item in value.items():
+            leaves.update(flattened(item, f"{where}.{name}" if where else str(name)))
+        return leaves
+    if isinstance(value, list):
+        leaves = {f"{where}[]": len(value)}
+        for index, item in enumerate(value):
+            leaves.update(flattened(item, f"{where}[{index}]"))
+        return leaves
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return {where: as_double(value)}
+    return {where: value}

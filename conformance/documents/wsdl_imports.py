@@ -1,0 +1,99 @@
+"""Follows a WSDL's references: wsdl:import, xsd:import and xsd:include, each document once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+from urllib.parse import urljoin
+
+from conformance.documents.xml_names import WSDL, XSD, clark
+from conformance.documents.xsd import SchemaDocument
+from conformance.soap.envelope import NotXmlError, parse
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+# Obtains a document by its resolved location. Raises OSError or ValueError with the reason where it cannot.
+Fetch = Callable[[str], bytes]
+# More documents than this are no description of a robot, but a robot that keeps its reader busy.
+_MOST: Final = 50
+
+
+@dataclass
+class Collected:
+    """What was found.
+
+    Attributes:
+        definitions: wsdl:definitions elements.
+        schemas: schema documents.
+        missing: reason by location.
+    """
+
+    definitions: list[etree._Element] = field(default_factory=list)
+    schemas: list[SchemaDocument] = field(default_factory=list)
+    missing: dict[str, str] = field(default_factory=dict)
+
+
+def collect(wsdl: bytes, location: str, fetch: Fetch) -> Collected:
+    """Find all documents of a description.
+
+    Raises:
+        ValueError: the first one is no WSDL; the message says why.
+    """
+    try:
+        root = parse(wsdl)
+    except NotXmlError as error:
+        raise ValueError(f"no well-formed XML: {error}") from error
+    if root.tag != clark(WSDL, "definitions"):
+        raise ValueError(f"its document element is {root.tag}, not wsdl:definitions")
+    found = Collected()
+    waiting: list[tuple[str, etree._Element]] = [(location, root)]
+    seen = {location}
+    while waiting:
+        place, element = waiting.pop(0)
+        for reference in _take(found, place, element):
+            target = _resolved(place, reference)
+            if target in seen:
+                continue
+            seen.add(target)
+            if len(seen) > _MOST:
+                found.missing[target] = f"more than {_MOST} documents"
+                return found
+            try:
+                waiting.append((target, parse(fetch(target))))
+            except (OSError, ValueError) as error:
+                found.missing[target] = str(error) or type(error).__name__
+    return found
+
+
+def _take(found: Collected, place: str, root: etree._Element) -> list[str]:
+    """Put a document where it belongs, and return the locations that it refers to."""
+    if root.tag == clark(WSDL, "definitions"):
+        found.definitions.append(root)
+        references = [element.get("location") for element in root.findall(clark(WSDL, "import"))]
+        for number, schema in enumerate(root.iterfind(f"{clark(WSDL, 'types')}/{clark(XSD, 'schema')}")):
+            found.schemas.append(SchemaDocument(f"{place}#{number}", schema, inline=True))
+            references += _schema_references(schema)
+    elif root.tag == clark(XSD, "schema"):
+        found.schemas.append(SchemaDocument(place, root))
+        references = _schema_references(root)
+    else:
+        found.missing[place] = f"neither a WSDL nor a schema, but {root.tag}"
+        references = []
+    return [reference for reference in references if reference]
+
+
+def _schema_references(root: etree._Element) -> list[str | None]:
+    return [
+        element.get("schemaLocation")
+        for kind in ("import", "include", "redefine")
+        for element in root.findall(clark(XSD, kind))
+    ]
+
+
+def _resolved(place: str, reference: str) -> str:
+    if "://" in reference or "://" in place:
+        return urljoin(place, reference)
+    return str(Path(place).parent / reference)

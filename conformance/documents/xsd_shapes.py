@@ -1,0 +1,178 @@
+"""What a schema allows, as frozen values that strategies, mutations and comparisons walk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import TYPE_CHECKING, Any, Final
+
+from conformance.documents.xml_names import XSD, clark
+
+if TYPE_CHECKING:
+    from conformance.documents.xsd import Types
+
+# A type that holds itself is followed this deep.
+_DEEPEST: Final = 12
+
+
+@dataclass(frozen=True)
+class Simple:
+    """A simple type.
+
+    Attributes:
+        builtin: local name of the type of XML Schema Part 2 that it comes from.
+        enumeration: the values it is limited to, as written; empty: not limited.
+        minimum: smallest value; maximum: greatest; None: those of the builtin.
+        min_length: in characters; max_length: likewise.
+        patterns: regular expressions of XML Schema that a value must match.
+    """
+
+    builtin: str
+    enumeration: tuple[str, ...] = ()
+    minimum: Decimal | None = None
+    maximum: Decimal | None = None
+    min_length: int | None = None
+    max_length: int | None = None
+    patterns: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Group:
+    """Children.
+
+    Attributes:
+        model: sequence, choice or all.
+        items: the particles.
+        minimum: how often the group stands at least; maximum: at most (None: without bound).
+    """
+
+    model: str
+    items: tuple[Element | Group, ...] = ()
+    minimum: int = 1
+    maximum: int | None = 1
+
+
+@dataclass(frozen=True)
+class Complex:
+    """A complex type.
+
+    Attributes:
+        content: the children, or None.
+        text: the type of its text, where it has simple content.
+        attributes: name in Clark notation, type and whether it is required, for each.
+        wildcard: whether it takes children or attributes that the schema does not name.
+    """
+
+    content: Group | None = None
+    text: Simple | None = None
+    attributes: tuple[tuple[str, Simple, bool], ...] = ()
+    wildcard: bool = False
+
+
+@dataclass(frozen=True)
+class Element:
+    """An element declaration.
+
+    Attributes:
+        tag: as it stands in a message, in Clark notation: form and elementFormDefault are in it.
+        type: of its content.
+        minimum: how often it stands at least; maximum: at most (None: without bound).
+        nillable: whether xsi:nil is allowed.
+    """
+
+    tag: str
+    type: Simple | Complex
+    minimum: int = 1
+    maximum: int | None = 1
+    nillable: bool = False
+
+    @property
+    def children(self) -> tuple[Element, ...]:
+        """The element particles right inside, groups flattened."""
+        if isinstance(self.type, Simple) or self.type.content is None:
+            return ()
+        return _flat(self.type.content)
+
+
+def _flat(group: Group) -> tuple[Element, ...]:
+    found: list[Element] = []
+    for item in group.items:
+        found += [item] if isinstance(item, Element) else _flat(item)
+    return tuple(found)
+
+
+def shape(types: Types, tag: str) -> Element | None:
+    """The global element of that name, or None where the schema has none."""
+    if tag not in types.shapes:
+        declared = types.python.maps.elements.get(tag)
+        types.shapes[tag] = None if declared is None else _element(declared, 0)
+    return types.shapes[tag]
+
+
+def _element(declared: Any, depth: int) -> Element:
+    space, _, name = str(declared.name).rpartition("}")
+    tag = str(declared.name) if space else name
+    return Element(
+        tag,
+        _type(declared.type, depth),
+        declared.min_occurs,
+        declared.max_occurs,
+        nillable=bool(declared.nillable),
+    )
+
+
+def _type(declared: Any, depth: int) -> Simple | Complex:
+    if declared.is_simple():
+        return _simple(declared)
+    if depth > _DEEPEST:
+        return Complex()
+    attributes = tuple(
+        (str(name), _simple(attribute.type), attribute.use == "required")
+        for name, attribute in declared.attributes.items()
+        if name is not None and attribute.use != "prohibited"
+    )
+    wildcard = None in declared.attributes
+    if declared.has_simple_content():
+        return Complex(None, _simple(declared.content), attributes, wildcard)
+    content = _group(declared.content, depth)
+    wildcard = wildcard or any(type(item).__name__ == "XsdAnyElement" for item in declared.content.iter_elements())
+    return Complex(content, None, attributes, wildcard)
+
+
+def _group(declared: Any, depth: int) -> Group:
+    items: list[Element | Group] = []
+    for item in declared:
+        if hasattr(item, "model"):
+            items.append(_group(item, depth))
+        elif type(item).__name__ != "XsdAnyElement":
+            items.append(_element(item, depth + 1))
+    return Group(declared.model, tuple(items), declared.min_occurs, declared.max_occurs)
+
+
+def _simple(declared: Any) -> Simple:
+    builtin = declared
+    while builtin is not None and not str(builtin.name or "").startswith(clark(XSD, "")):
+        builtin = builtin.base_type
+    # A builtin's own pattern only says again what its name says.
+    patterns = None if builtin is declared else getattr(declared, "patterns", None)
+    return Simple(
+        str(builtin.name).rpartition("}")[2] if builtin is not None else "string",
+        tuple(_written(value) for value in getattr(declared, "enumeration", None) or ()),
+        _decimal(getattr(declared, "min_value", None)),
+        _decimal(getattr(declared, "max_value", None)),
+        getattr(declared, "min_length", None),
+        getattr(declared, "max_length", None),
+        tuple(str(pattern) for pattern in getattr(patterns, "regexps", ()) or ()),
+    )
+
+
+def _written(value: object) -> str:
+    return ("true" if value else "false") if isinstance(value, bool) else str(value)
+
+
+def _decimal(value: object) -> Decimal | None:
+    """A bound as a number; one of a type that is no number (a date) is not known here."""
+    if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
+        return None
+    bound = Decimal(value) if not isinstance(value, float) else Decimal(repr(value))
+    return bound if bound.is_finite() else None

@@ -1,0 +1,1 @@
+"""Connects to a robot, runs the checks with pytest, turns exceptions into evidence, writes the result."""

@@ -1,0 +1,132 @@
+"""``roaas certify --init``: a first statement, from what the robot's descriptions say."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from conformance.contract.ledger import CLASSES
+from conformance.engine.pytest_run import connection_of
+from conformance.engine.session import Session
+from conformance.transport.client import HttpClient, NoAnswerError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conformance.contract.statement import Statement
+
+_TEMPLATE = """\
+# Implementation conformance statement: what the vendor says of the robot, and what it is then judged by.
+# Written from the robot's own descriptions; look over every line, then: roaas certify {file} --allow-motion
+
+[robot]
+name = {name}
+vendor = ""
+version = {version}
+
+[endpoints]
+{endpoints}
+# ca_file = "ca.pem"         # authorities to trust for https
+# token_file = "token"       # holds a bearer token
+# request_rate = 100         # ceiling, requests per second
+# timeout_s = 10             # deadline of one request
+
+[claims]
+# profile = "full"           # or "paper"; beside or instead of single classes
+classes = [
+{claims}]
+
+[limits]
+# What is not declared is judged with the reference robot's limits halved, 2 s to settle, and no check of the hold time.
+# linear_m_s = 0.7           # greatest speed
+# angular_rad_s = 2.5        # greatest turning rate
+# settle_s = 0.6             # a commanded velocity is reached within
+# hold_s = 1.0               # a velocity holds for, unless renewed
+# tolerance = 0.05           # of a reached velocity, relative
+# tolerance_abs = 0.02       # and absolute, m/s or rad/s
+
+[motion]
+# Where the robot may be driven. Without an arena, goals stay within radius_m of where it is.
+# arena = [0.0, 0.0, 10.0, 5.0]       # x_min, y_min, x_max, y_max, m
+# radius_m = 1.0
+# frame = "map"
+# goals = [[1.0, 2.0, 0.0]]           # x, y, yaw: poses that can be reached
+# odom_to_map = [0.0, 0.0, 0.0]       # x, y, yaw of the odometry frame in the map
+# actuated = ["linear.x", "angular.z"]
+
+[ros]
+# With a domain, a probe watches what reaches ROS (needs rclpy where the suite runs).
+# domain_id = 0
+# delivery_topic = "/DeliveryRequestMsg/from_json"
+# cmd_vel_topic = "/cmd_vel"
+"""
+
+
+def write_first_statement(path: Path, known: Statement) -> str:
+    """Ask the robot what it is and write a commented statement.
+
+    Returns:
+        Why the robot could not be asked, or an empty text.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    session = Session(statement=known, connection=connection_of(known.endpoints))
+    session.connect()
+    if not session.reached:
+        return "; ".join(f"{name}: {why}" for name, why in session.unreachable.items())
+    info = _openapi(session.rest).get("info", {}) if session.rest else {}
+    info = info if isinstance(info, dict) else {}
+    claims, doubts = _claims(session)
+    lines = [f'  "{name}",' if name not in doubts else f'  # "{name}",  # {doubts[name]}' for name in claims]
+    path.write_text(
+        _TEMPLATE.format(
+            file=path.name,
+            name=_quoted(info.get("title", "")),
+            version=_quoted(info.get("version", "")),
+            endpoints="\n".join(_endpoints(session)),
+            claims="".join(f"{line}\n" for line in lines),
+        ),
+        encoding="utf-8",
+    )
+    return ""
+
+
+def _quoted(text: Any) -> str:
+    """A TOML basic string: JSON's escapes are TOML's (TOML 1.0, String), once DEL is escaped too."""
+    return json.dumps(str(text)[:200], ensure_ascii=True).replace("\x7f", "\\u007f")
+
+
+def _openapi(rest: HttpClient) -> dict[str, Any]:
+    try:
+        answer = rest.send("GET", "/openapi.json").response
+        document = json.loads(answer.body) if answer and answer.ok else {}
+    except (NoAnswerError, ValueError, RecursionError):
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
+def _endpoints(session: Session) -> list[str]:
+    where = session.statement.endpoints
+    lines = []
+    for key in ("rest", "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint"):
+        value = getattr(where, key)
+        interface = key.split("_", 1)[0]
+        remark = f"  # did not answer: {session.unreachable[interface]}" if interface in session.unreachable else ""
+        lines.append(f"{key} = {_quoted(value)}{remark}" if value else f'# {key} = ""')
+    return lines
+
+
+def _claims(session: Session) -> tuple[list[str], dict[str, str]]:
+    """All classes, and a doubt for each that the robot does not look as if it had."""
+    doubts = {
+        name: "no address for an interface that it needs" for name in CLASSES if name not in session.statement.claimed()
+    }
+    if session.rest and "rest" not in session.unreachable and "rest-formats" not in doubts:
+        try:
+            answer = session.rest.send("GET", session.rest_path(), headers=[("Accept", "application/xml")]).response
+        except NoAnswerError:
+            answer = None
+        if answer is None or answer.media_type != "application/xml":
+            doubts["rest-formats"] = "the robot did not send XML when asked for it"
+    return list(CLASSES), doubts

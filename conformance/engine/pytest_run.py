@@ -1,0 +1,80 @@
+"""A session from pytest's own options, for ``pytest --pyargs conformance`` in somebody's project."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.contract.ledger import CLASSES
+from conformance.contract.statement import Statement, StatementError, load_statement
+from conformance.engine.session import Session
+from conformance.transport.client import Connection
+from conformance.verdict.effort import EFFORTS, Effort
+
+if TYPE_CHECKING:
+    from conformance.contract.statement import Endpoints
+
+
+def session_from_options(config: pytest.Config) -> Session:
+    """Make and connect a session.
+
+    Raises:
+        pytest.UsageError: no robot is named, an option has a value that it cannot have, or nothing answers.
+    """
+    given = config.getoption("robot_statement")
+    try:
+        statement = load_statement(Path(given)) if given else Statement()
+    except StatementError as error:
+        raise pytest.UsageError(str(error)) from error
+    statement = replace(statement, endpoints=_endpoints(config, statement.endpoints))
+    classes = config.getoption("robot_class")
+    if classes:
+        unknown = sorted(set(classes) - set(CLASSES))
+        if unknown:
+            raise pytest.UsageError(f"--robot-class {unknown[0]}: there are {', '.join(CLASSES)}")
+        statement = replace(statement, claims=tuple(classes))
+    where = statement.endpoints
+    if not (where.rest or where.publishers or where.subscribers):
+        raise pytest.UsageError("name a robot: --robot-rest, --robot-publishers-wsdl or --robot-subscribers-wsdl")
+    effort = config.getoption("robot_effort")
+    if effort not in EFFORTS:
+        raise pytest.UsageError(f"--robot-effort {effort}: there are {', '.join(EFFORTS)}")
+    session = Session(
+        statement=statement,
+        claims=statement.claimed(),
+        allow_motion=config.getoption("robot_allow_motion"),
+        seed=config.getoption("robot_seed"),
+        effort=Effort(effort),
+        connection=connection_of(where),
+    )
+    session.connect()
+    if not session.reached:
+        raise pytest.UsageError(f"the robot cannot be reached: {session.unreachable}")
+    return session
+
+
+def _endpoints(config: pytest.Config, declared: Endpoints) -> Endpoints:
+    options = {
+        "rest": config.getoption("robot_rest"),
+        "publishers_wsdl": config.getoption("robot_publishers_wsdl"),
+        "subscribers_wsdl": config.getoption("robot_subscribers_wsdl"),
+        "timeout_s": config.getoption("robot_timeout"),
+    }
+    return replace(declared, **{key: value for key, value in options.items() if value is not None})
+
+
+def connection_of(where: Endpoints) -> Connection:
+    """Deadline, credentials and ceiling as the statement has them.
+
+    Raises:
+        OSError: the token file cannot be read.
+    """
+    return Connection(
+        timeout_s=where.timeout_s,
+        ca_file=Path(where.ca_file) if where.ca_file else None,
+        token=Path(where.token_file).read_text(encoding="utf-8").strip() if where.token_file else None,
+        request_rate=where.request_rate,
+    )

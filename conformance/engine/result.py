@@ -1,0 +1,207 @@
+"""result.json: what a run found, as a document (format roaas-result/1)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import tempfile
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
+from conformance.contract.ledger import CLASS_TITLES
+
+if TYPE_CHECKING:
+    import datetime as dt
+    from collections.abc import Mapping
+
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Finding
+    from conformance.verdict.verdicts import Verdict
+
+RESULT_FORMAT = "roaas-result/1"
+# As much of a body as a reader looks at; its length is always told.
+_SHOWN_BODY = 4096
+_SHOWN_CURL = 20_000
+_LIBRARIES = ("schemathesis", "hypothesis", "zeep", "lxml", "xmlschema", "httpcore", "h11")
+
+
+def result_document(
+    session: Session,
+    verdicts: list[Verdict],
+    classes: Mapping[str, tuple[str, str]],
+    overall: str,
+    *,
+    started: dt.datetime,
+    finished: dt.datetime,
+    command: str,
+    notes: list[str],
+    interrupted: bool,
+) -> dict[str, Any]:
+    """Put a run together as result.json has it."""
+    statement = session.statement
+    limits = asdict(statement.limits)
+    tolerances = {key: limits.pop(key) for key in ("tolerance", "tolerance_abs")}
+    return {
+        "format": RESULT_FORMAT,
+        "verdict": overall,
+        "interrupted": interrupted,
+        "suite": {"version": suite_version(), "contract": _contract_name(session), "digest": suite_digest(session)},
+        "target": _target(session),
+        "statement": {
+            "robot": statement.robot,
+            "endpoints": {key: value for key, value in asdict(statement.endpoints).items() if value is not None},
+            "claims": list(session.claims),
+            "limits": {key: value for key, value in limits.items() if value is not None},
+            "tolerances": tolerances,
+            "motion_allowed": session.allow_motion,
+        },
+        "seed": session.seed,
+        "effort": session.effort.name,
+        "command": command,
+        "started": _rfc3339(started),
+        "finished": _rfc3339(finished),
+        "duration_s": round((finished - started).total_seconds(), 3),
+        "requests": session.connection.sent,
+        "environment": {
+            "python": platform.python_version(),
+            "platform": platform.platform(),
+            "libraries": {name: _installed(name) for name in _LIBRARIES},
+        },
+        "classes": {name: value for name, (value, _) in classes.items()},
+        "class_titles": {name: CLASS_TITLES[name] for name in classes},
+        "class_reasons": {name: reason for name, (_, reason) in classes.items() if reason},
+        "requirements": [_requirement(verdict) for verdict in verdicts],
+        "notes": notes,
+    }
+
+
+def _contract_name(session: Session) -> str:
+    directory = session.contract.directory
+    return CONTRACT_VERSION if directory == CONTRACT_DIR else f"own ({directory.resolve().name})"
+
+
+def _target(session: Session) -> dict[str, Any]:
+    where = session.statement.endpoints
+    target: dict[str, Any] = {"rest": where.rest}
+    for name in ("publishers", "subscribers"):
+        service = getattr(session, name)
+        target[f"{name}_wsdl"] = getattr(where, f"{name}_wsdl")
+        target[f"{name}_endpoint"] = service.client.base_url + service.path if service else None
+    return {**target, "ros_domain_id": session.statement.ros.domain_id}
+
+
+def _requirement(verdict: Verdict) -> dict[str, Any]:
+    requirement = verdict.requirement
+    shown = verdict.value not in {"not-claimed", "skip"}
+    expected = verdict.expected_failure
+    return {
+        "id": requirement.id,
+        "class": requirement.class_,
+        "level": requirement.level,
+        "source": requirement.source,
+        "text": requirement.text,
+        "verdict": verdict.value,
+        "cases": verdict.evidence.cases,
+        "reason": verdict.reason,
+        "untestable": requirement.untestable,
+        "checks": sorted(verdict.evidence.checks - {""}),
+        "failures": [_failure(finding) for finding in verdict.evidence.findings.values()] if shown else [],
+        **({"expected_failure": {"reason": expected[0], "expires": expected[1]}} if expected else {}),
+    }
+
+
+def _failure(finding: Finding) -> dict[str, Any]:
+    return {
+        "message": finding.message,
+        "expected": finding.expected,
+        "seen": finding.seen,
+        "request": _request(finding.exchange) if finding.exchange else None,
+        "response": _response(finding.exchange) if finding.exchange else None,
+    }
+
+
+def _request(exchange: Exchange) -> dict[str, Any]:
+    request = exchange.request
+    curl = request.curl()
+    if len(curl) > _SHOWN_CURL:
+        curl = f"# the request is {len(curl)} characters long as a command; run the check again with the same seed\n"
+    shown = {"method": request.method, "url": request.url, "headers": _headers(request.headers), "curl": curl}
+    return {**shown, **_body(request.raw if request.raw is not None else request.body)}
+
+
+def _response(exchange: Exchange) -> dict[str, Any]:
+    response = exchange.response
+    if response is None:
+        return {"status": None, "headers": {}, "body": None, "elapsed_ms": None, "error": exchange.problem}
+    return {
+        "status": response.status,
+        "headers": _headers(response.headers),
+        "elapsed_ms": round(response.elapsed_ms, 3),
+        **_body(response.body),
+    }
+
+
+def _headers(pairs: tuple[tuple[str, str], ...]) -> dict[str, str | list[str]]:
+    headers: dict[str, str | list[str]] = {}
+    for name, value in pairs:
+        before = headers.get(name)
+        headers[name] = value if before is None else [*([before] if isinstance(before, str) else before), value]
+    return headers
+
+
+def _body(body: bytes) -> dict[str, Any]:
+    if not body:
+        return {"body": None}
+    shown = body[:_SHOWN_BODY].decode("utf-8", "replace")
+    return {"body": shown} if len(body) <= _SHOWN_BODY else {"body": shown, "body_length": len(body)}
+
+
+def _rfc3339(moment: dt.datetime) -> str:
+    return moment.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+
+
+def _installed(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def suite_version() -> str:
+    """Version of the installed distribution."""
+    return _installed("roaas")
+
+
+def suite_digest(session: Session) -> str:
+    """Digest over the suite's modules and the contract's files: two runs with the same digest asked the same."""
+    digest = hashlib.sha256()
+    package = Path(__file__).parents[1]
+    files = [*package.rglob("*.py"), *(path for path in session.contract.directory.iterdir() if path.is_file())]
+    for path in sorted(set(files)):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return f"sha256:{digest.hexdigest()}"
+
+
+def write_result(document: dict[str, Any], directory: Path) -> Path:
+    """Write result.json whole or not at all.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    target = directory / "result.json"
+    with tempfile.NamedTemporaryFile("w", dir=directory, delete=False, encoding="utf-8", suffix=".tmp") as file:
+        json.dump(document, file, indent=1, ensure_ascii=False)
+        file.write("\n")
+    # A temporary file is for its owner only; a result is for whoever may read the folder.
+    mask = os.umask(0)
+    os.umask(mask)
+    Path(file.name).chmod(0o666 & ~mask)
+    Path(file.name).replace(target)
+    return target

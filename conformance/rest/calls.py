@@ -1,0 +1,168 @@
+"""Requests made from the contract's own examples, made fit for the robot at hand."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from conformance.documents.json_schema import Schema, kind_of
+from conformance.documents.representation import flat
+from conformance.documents.writing import json_text, text_of, xml_bytes
+
+if TYPE_CHECKING:
+    from conformance.documents.openapi import Operation, Parameter
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+
+JSON = "application/json"
+XML = "application/xml"
+_DEPTH = 12
+
+
+@dataclass(frozen=True)
+class Call:
+    """One request for an operation.
+
+    Attributes:
+        operation: which.
+        values: texts of path and query parameters, by name, before they are percent-encoded.
+        media_type: of the body; empty where there is none.
+        body: octets.
+        value: what the body holds, or None.
+    """
+
+    operation: Operation
+    values: dict[str, str]
+    media_type: str = ""
+    body: bytes = b""
+    value: Any = None
+
+    @property
+    def path(self) -> str:
+        """The target below the base URL, with its query."""
+        path = self.operation.template
+        for item in self.operation.parameter("path"):
+            path = path.replace(f"{{{item.name}}}", quote(self.values.get(item.name, ""), safe=""))
+        query = "&".join(
+            f"{quote(item.name, safe='')}={quote(self.values[item.name], safe='')}"
+            for item in self.operation.parameter("query")
+            if item.name in self.values
+        )
+        return f"{path}?{query}" if query else path
+
+    def having(self, name: str, text: str | None) -> Call:
+        """The same with another text for a parameter, or without it."""
+        values = {key: item for key, item in self.values.items() if key != name}
+        return replace(self, values=values if text is None else {**values, name: text})
+
+    def carrying(self, body: bytes, media_type: str | None = None) -> Call:
+        """The same with another body."""
+        return replace(self, body=body, media_type=media_type or self.media_type)
+
+    def send(
+        self,
+        session: Session,
+        *headers: tuple[str, str],
+        method: str | None = None,
+        fresh: bool = False,
+        timeout_s: float | None = None,
+    ) -> Exchange:
+        """Send it.
+
+        Raises:
+            NoAnswerError: no HTTP response came.
+        """
+        rest = session.rest
+        if rest is None:
+            raise RuntimeError("the run has no REST interface")
+        fields = list(headers)
+        names = {name.lower() for name, _ in fields}
+        if self.media_type and "content-type" not in names:
+            fields.append(("Content-Type", self.media_type))
+        return rest.send(
+            method or self.operation.method,
+            self.path,
+            headers=[pair for pair in fields if pair != ("Content-Type", "")],
+            body=self.body,
+            fresh=fresh,
+            timeout_s=timeout_s,
+        )
+
+
+def example_call(session: Session, operation: Operation, media_type: str = JSON) -> Call:
+    """A valid request for an operation, by the contract's examples.
+
+    Optional query parameters are given where the contract has an example for them.
+
+    Args:
+        session: the run.
+        operation: which.
+        media_type: of the body, where the operation takes one.
+    """
+    given: dict[str, Any] = {}
+    for item in operation.parameters:
+        if item.where in {"path", "query"} and (item.required or item.examples):
+            given[item.name] = example_of(item)
+    if given:
+        given = _fitted(session, operation, given)
+    call = Call(operation, {name: text_of(value) for name, value in given.items()})
+    if media_type not in operation.bodies:
+        return call
+    value = body_value(session, operation)
+    return replace(call, media_type=media_type, body=body_bytes(operation, media_type, value), value=value)
+
+
+def body_value(session: Session, operation: Operation) -> Any:
+    """A valid value for an operation's body, by the contract's JSON example."""
+    body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
+    plain = [item for item in body.examples if not isinstance(item, str)]
+    return _fitted(session, operation, plain[0] if plain else minimal(body.schema))
+
+
+def body_bytes(operation: Operation, media_type: str, value: Any) -> bytes:
+    """A body value as octets."""
+    if media_type == XML:
+        return xml_bytes(value, root_name(operation.bodies[XML].schema) or "value")
+    return json_text(value).encode()
+
+
+def root_name(schema: Schema) -> str:
+    """The name that a schema gives its XML element; empty where it gives none."""
+    return str(schema.get("xml", {}).get("name", ""))
+
+
+def example_of(parameter: Parameter) -> Any:
+    """A valid value of a parameter."""
+    return parameter.examples[0] if parameter.examples else minimal(parameter.schema)
+
+
+def minimal(schema: Schema, depth: int = 0) -> Any:
+    """A small value that a schema allows (patterns aside)."""
+    schema = flat(schema)
+    given = [schema[key] for key in ("example", "const", "default") if key in schema]
+    given += [schema[key][0] for key in ("examples", "enum") if schema.get(key)]
+    if given:
+        return given[0]
+    kind = kind_of(schema)
+    if kind == "object":
+        names = schema.get("required", ()) if depth < _DEPTH else ()
+        return {name: minimal(schema.get("properties", {}).get(name, {}), depth + 1) for name in names}
+    if kind == "array":
+        return [minimal(schema.get("items", {}), depth + 1) for _ in range(schema.get("minItems", 0))]
+    if kind in {"number", "integer"}:
+        least = schema.get("minimum", schema.get("exclusiveMinimum", 0) + (1 if "exclusiveMinimum" in schema else 0))
+        return max(least, min(1, schema.get("maximum", max(least, 1))))
+    return True if kind == "boolean" else "a" * max(1, schema.get("minLength", 1))
+
+
+def _fitted(session: Session, operation: Operation, value: Any) -> Any:
+    """A value made fit for this robot: within its limits, near where it is."""
+    if not session.contract.own:
+        return value
+    try:
+        examples = importlib.import_module("conformance.robot.examples")
+    except ModuleNotFoundError:
+        return value
+    return examples.fit(session, operation.id, value)

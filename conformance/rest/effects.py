@@ -1,0 +1,67 @@
+"""Whether what was put is what is then got."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Any
+
+from conformance.documents.openapi import operations_of
+from conformance.documents.representation import flattened
+from conformance.rest.calls import JSON, Call, example_call
+from conformance.rest.snapshot import leaves
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+
+_PAUSE_S = 0.01
+
+
+def reader_of(session: Session, call: Call) -> Call | None:
+    """The GET of the resource that a PUT is for, with the same values in its path."""
+    for operation in operations_of(session.contract):
+        if operation.method == "GET" and operation.template == call.operation.template:
+            read = example_call(session, operation)
+            return Call(operation, {**read.values, **call.values})
+    return None
+
+
+def settles_at(session: Session, call: Call) -> str | None:
+    """Wait until GET shows what was put.
+
+    Returns:
+        Empty when it does; what it shows instead when the settle time is over (a quarter more than declared, and half
+        a second for a loaded machine); None where nothing can be compared.
+    """
+    read = reader_of(session, call)
+    if read is None or not isinstance(call.value, dict):
+        return None
+    limits = session.statement.limits
+    until = time.monotonic() + 1.25 * limits.settle_s + 0.5 + 4 * session.effort.usual_ms / 1000
+    wanted = flattened(call.value)
+    renew_at = time.monotonic() + 0.4 * (limits.hold_s or math.inf)
+    while True:
+        shown = leaves(read.send(session, ("Accept", JSON)))
+        if shown["status"] == 404:  # noqa: PLR2004 - what was put has ended since: a goal that was reached
+            return None
+        other = [
+            f"{place} is {shown.get(place, 'nothing')!r} for {value!r}"
+            for place, value in wanted.items()
+            if not place.endswith("[]") and not _near(session, shown.get(place), value)
+        ]
+        if not other:
+            return ""
+        if time.monotonic() > until:
+            return other[0]
+        if time.monotonic() > renew_at:
+            renew_at = math.inf
+            call.send(session)
+        time.sleep(_PAUSE_S)
+
+
+def _near(session: Session, shown: Any, wanted: Any) -> bool:
+    numbers = [item for item in (shown, wanted) if isinstance(item, float)]
+    if len(numbers) < 2:  # noqa: PLR2004 - both, or compare as they are
+        return bool(shown == wanted)
+    limits = session.statement.limits
+    return abs(numbers[0] - numbers[1]) <= limits.tolerance_abs + limits.tolerance * abs(numbers[1])

@@ -1,0 +1,104 @@
+"""One state in several formats: read each, and compare value by value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from conformance.documents.representation import UnreadableError, flattened, read
+from conformance.rest.calls import JSON
+from conformance.rest.snapshot import steady
+
+if TYPE_CHECKING:
+    from conformance.documents.json_schema import Schema
+    from conformance.engine.session import Session
+    from conformance.rest.calls import Call
+    from conformance.transport.exchange import Exchange
+
+# A robot at rest jitters; what its formats say otherwise in so many turns in a row is no jitter.
+_TURNS = 10
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """One value that two formats tell differently.
+
+    Attributes:
+        place: which.
+        told: what each says.
+        exchange: the answer that disagrees with JSON.
+    """
+
+    place: str
+    told: str
+    exchange: Exchange
+
+
+def disagreements(session: Session, call: Call, media_types: list[str]) -> tuple[list[Disagreement], Exchange]:
+    """Read a resource as JSON, in the other formats, and as JSON again, until all say the same.
+
+    Only what both JSON answers say alike is compared, so that what changes between two reads blames nobody; what
+    differs in every turn, at the same place, is a disagreement.
+
+    Returns:
+        What disagrees in every turn; and the last JSON exchange.
+    """
+    schema = call.operation.shape or {}
+    suspects: dict[tuple[str, str], Disagreement] | None = None
+    exchange = None
+    for _ in range(_TURNS):
+        first = call.send(session, ("Accept", JSON))
+        others = [(name, call.send(session, ("Accept", name))) for name in media_types]
+        exchange = call.send(session, ("Accept", JSON))
+        pictures = [_picture(item, JSON, schema) for item in (first, exchange)]
+        if any(picture is None for picture in pictures):
+            return [], exchange  # what is wrong with that, others judge
+        known = steady(picture for picture in pictures if picture is not None)
+        found = {
+            (name, item.place): item
+            for name, other in others
+            for item in _compare(known, pictures, _picture(other, name, schema), name, other)
+        }
+        suspects = found if suspects is None else {key: item for key, item in found.items() if key in suspects}
+        if not suspects:
+            break
+    if exchange is None:
+        raise AssertionError("unreachable: there is at least one turn")
+    return list((suspects or {}).values()), exchange
+
+
+def _picture(exchange: Exchange, media_type: str, schema: Schema) -> dict[str, Any] | None:
+    answer = exchange.response
+    if answer is None or not answer.ok or answer.media_type != media_type:
+        return None
+    try:
+        return flattened(read(media_type, answer.body, schema))
+    except UnreadableError:
+        return None
+
+
+def _compare(
+    known: dict[str, Any],
+    pictures: list[dict[str, Any] | None],
+    other: dict[str, Any] | None,
+    name: str,
+    exchange: Exchange,
+) -> list[Disagreement]:
+    if other is None:
+        return []
+    found = [
+        Disagreement(place, f"{place} is {other.get(place, 'nothing')!r} in {name} and {value!r} in JSON", exchange)
+        for place, value in known.items()
+        if not _same(value, other.get(place, None if value is None else ...))
+    ]
+    everywhere = set().union(*(picture or {} for picture in pictures))
+    found += [
+        Disagreement(place, f"{place} is {value!r} in {name} and nothing in JSON", exchange)
+        for place, value in other.items()
+        if place not in everywhere
+    ]
+    return found
+
+
+def _same(value: Any, other: Any) -> bool:
+    return type(value) is type(other) and bool(value == other)

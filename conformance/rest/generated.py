@@ -1,0 +1,181 @@
+"""Schemathesis as a maker of requests: its cases go through the suite's own client and are judged by the suite.
+
+Its own checks take 5xx for a refusal, and call data negative that is valid once it is on the wire; so what it makes
+is read back from the wire (validity.py) and judged by that.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import requests
+import schemathesis
+from schemathesis import GenerationMode
+from schemathesis.core.result import Ok
+from schemathesis.core.transport import Response as ThesisResponse
+from schemathesis.generation.drivers import CoverageGenerator, ExamplesGenerator
+from schemathesis.generation.feedback import NO_FEEDBACK
+from schemathesis.generation.overrides import Override
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from hypothesis.strategies import SearchStrategy
+
+    from conformance.contract.files import Contract
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+
+_BASE = "http://robot.invalid"
+
+
+@dataclass(frozen=True)
+class Made:
+    """One request that Schemathesis made.
+
+    Attributes:
+        method: as to be sent.
+        target: path and query below the base URL.
+        content_type: whole field; empty where there is none.
+        body: octets.
+    """
+
+    method: str
+    target: str
+    content_type: str
+    body: bytes
+
+    @property
+    def media_type(self) -> str:
+        """Content-Type without parameters."""
+        return self.content_type.split(";", 1)[0].strip().lower()
+
+    def send(self, session: Session) -> Exchange:
+        """Send it through the run's client.
+
+        Raises:
+            NoAnswerError: no HTTP response came.
+        """
+        if session.rest is None:
+            raise RuntimeError("the run has no REST interface")
+        fields = [("Content-Type", self.content_type)] if self.content_type else []
+        return session.rest.send(self.method, self.target, headers=fields, body=self.body)
+
+
+@dataclass(frozen=True)
+class Target:
+    """One operation, as Schemathesis has it.
+
+    Attributes:
+        label: method and path.
+        operation: Schemathesis's own.
+        schema: of the whole contract.
+    """
+
+    label: str
+    operation: Any
+    schema: Any
+
+    @property
+    def has_input(self) -> bool:
+        """Whether there is anything in its requests to vary."""
+        return any(True for _ in self.operation.iter_parameters()) or bool(list(self.operation.body))
+
+    def examples(self) -> Iterator[Made]:
+        """From the contract's examples."""
+        maker = ExamplesGenerator(
+            operation=self.operation, override=Override(), feedback=NO_FEEDBACK, fill_missing=False
+        )
+        yield from _all_made(maker)
+
+    def coverage(self) -> Iterator[Made]:
+        """Each constraint of the schemas, from its one side and from the other."""
+        config = self.schema.config.generation_for(operation=self.operation, phase="coverage")
+        maker = CoverageGenerator(
+            operation=self.operation,
+            generation_modes=[GenerationMode.POSITIVE, GenerationMode.NEGATIVE],
+            generation_config=config,
+            auth_storage=None,
+            override=Override(),
+            feedback=NO_FEEDBACK,
+        )
+        yield from _all_made(maker)
+
+    def fuzzing(self, *, negative: bool) -> SearchStrategy[Made | None]:
+        """Anything that fits the schemas, or does not; None for what cannot be sent."""
+        mode = GenerationMode.NEGATIVE if negative else GenerationMode.POSITIVE
+        strategy: SearchStrategy[Any] = self.operation.as_strategy(generation_mode=mode)
+        return strategy.map(made)
+
+
+def targets(contract: Contract) -> tuple[Target, ...]:
+    """The operations of a contract; those that Schemathesis cannot read are left out.
+
+    Read anew each time: Schemathesis keeps in its schema which cases it has made, and makes some only once.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        schema = schemathesis.openapi.from_dict(contract.openapi)
+        found = []
+        for result in schema.get_all_operations():
+            operation: Any = result.ok() if isinstance(result, Ok) else None
+            if operation is None:
+                continue
+            found.append(Target(operation.label, operation, schema))
+        return tuple(found)
+
+
+def state_machine(document: dict[str, Any]) -> Any:
+    """The state machine that the contract's links make; None where it has none."""
+    from schemathesis.core.errors import NoLinksFound  # noqa: PLC0415 - an internal name, used here alone
+
+    try:
+        return schemathesis.openapi.from_dict(document).as_state_machine()
+    except NoLinksFound:
+        return None
+
+
+def _all_made(cases: Any) -> Iterator[Made]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for case in cases:
+            one = made(case)
+            if one is not None:
+                yield one
+
+
+def made(case: Any) -> Made | None:
+    """A case as it goes over the wire; None where HTTP cannot carry it."""
+    try:
+        given = case.as_transport_kwargs(base_url=_BASE)
+        keys = ("method", "url", "files", "data", "json", "params", "cookies")
+        request = requests.Request(
+            **{key: given[key] for key in keys if key in given}, headers=dict(given.get("headers") or {})
+        ).prepare()
+    except (ValueError, TypeError, requests.RequestException, UnicodeError):
+        return None
+    url = urlsplit(request.url or "")
+    body = request.body or b""
+    if not isinstance(body, str | bytes):
+        return None
+    content_type = str(request.headers.get("Content-Type") or "")
+    target = (url.path or "/") + (f"?{url.query}" if url.query else "")
+    method = str(request.method)
+    if not (content_type.isprintable() and content_type.isascii() and target.isascii() and method.isascii()):
+        return None
+    return Made(method, target, content_type, body.encode() if isinstance(body, str) else body)
+
+
+def as_thesis(exchange: Exchange) -> ThesisResponse:
+    """An answer as Schemathesis's state machine takes it."""
+    answer = exchange.response
+    if answer is None:
+        raise ValueError("an exchange without an answer")
+    headers: dict[str, list[str]] = {}
+    for name, value in answer.headers:
+        headers.setdefault(name.lower(), []).append(value)
+    sent = requests.Request(exchange.request.method, exchange.request.url).prepare()
+    return ThesisResponse(answer.status, headers, answer.body, sent, answer.elapsed_ms / 1000, verify=True)

@@ -1,0 +1,92 @@
+"""Random requests made harmless: what a robot accepts of them stays slow, near and seldom."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from conformance.documents.json_text import read_json
+from conformance.documents.writing import json_text
+from conformance.rest.applicable import allowed
+from conformance.rest.calls import JSON, example_call
+from conformance.rest.validity import INVALID, VALID, Validity, validity
+
+if TYPE_CHECKING:
+    from conformance.documents.openapi import Operation
+    from conformance.engine.session import Session
+    from conformance.rest.generated import Made
+
+# How many valid requests of one moving operation are sent: each may start a mission.
+_ACCEPTED = 3
+# The greatest number in an invalid body: a robot that takes it all the same must not run away.
+_SLOW = 0.1
+
+
+class Harmless:
+    """Looks at every random request before it is sent.
+
+    Args:
+        session: the run.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._valid: Counter[str] = Counter()
+
+    def made(self, item: Made) -> Made | None:
+        """The request as it may be sent; None where it may not."""
+        said = self._validity(item)
+        operation = said.operation
+        if operation is None:
+            return item if self._may_reach(item) else None
+        if not allowed(self._session, operation):
+            return None
+        if not operation.motion:
+            return item
+        if said.verdict == VALID:
+            return self._fitted(item, operation)
+        if not self._session.contract.own:
+            return item
+        # What may be taken with whatever values are in it is not sent to a robot; what must be refused is sent slow.
+        return self._slow(item) if said.verdict == INVALID else None
+
+    def sent(self, item: Made, *, accepted: bool) -> None:
+        """Count what was accepted."""
+        operation = self._validity(item).operation
+        if accepted and operation is not None and operation.motion:
+            self._valid[operation.id] += 1
+
+    def _validity(self, item: Made) -> Validity:
+        return validity(self._session.contract, item.method, item.target, item.media_type, item.body)
+
+    def _may_reach(self, item: Made) -> bool:
+        """Whether a request for no operation of the contract may be sent: a method that a resource has not."""
+        return self._session.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
+
+    def _fitted(self, item: Made, operation: Operation) -> Made | None:
+        """A valid request of a moving operation with the contract's values, fit for this robot; a few of them."""
+        if self._valid[operation.id] >= _ACCEPTED:
+            return None
+        if not self._session.contract.own:
+            return item
+        call = example_call(self._session, operation, item.media_type or JSON)
+        return replace(item, target=call.path, body=call.body if operation.bodies else item.body)
+
+    def _slow(self, item: Made) -> Made:
+        text = read_json(item.body)
+        if not item.body or text.problem or item.media_type != JSON:
+            return item
+        return replace(item, body=json_text(_slowed(text.value)).encode())
+
+
+def _slowed(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _slowed(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_slowed(item) for item in value]
+    if isinstance(value, float) and abs(value) > _SLOW:
+        return _SLOW
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 1:
+        return 1
+    return value

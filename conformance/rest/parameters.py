@@ -1,0 +1,61 @@
+"""Parameter texts that the contract clearly does not allow (contract, fine print: only what is clearly outside)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from conformance.documents.json_schema import kind_of, shape_of
+
+if TYPE_CHECKING:
+    from conformance.documents.openapi import Parameter
+
+# Letters, nothing, and what programming languages take for numbers though the contract does not.
+_NO_NUMBERS = ("abc", "roaas-no-number", "", "NaN", "Infinity", "-Infinity", "inf", "1e400", "-1e400", "1.5m", "0x1F")
+_NO_INTEGERS = ("3.5", "99999999999999999999")
+# Which of these a problem can name as they are.
+_TELLING = {"abc", "roaas-no-number", "1.5m"}
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """One text that is refused.
+
+    Attributes:
+        name: of the parameter.
+        text: what to send.
+        what: what is wrong with it.
+        shown: what a problem can name of it, or empty.
+    """
+
+    name: str
+    text: str
+    what: str
+    shown: str = ""
+
+
+def wrong_texts(parameter: Parameter) -> list[Wrong]:
+    """Texts that a parameter does not take; none where it takes any text."""
+    schema = parameter.schema
+    kind = kind_of(schema)
+    found: list[Wrong] = []
+    if kind in {"number", "integer"}:
+        texts = [*_NO_NUMBERS, *(_NO_INTEGERS if kind == "integer" else ())]
+        found += [
+            Wrong(parameter.name, text, f"{text or 'nothing'!r} at {parameter.name}", text if text in _TELLING else "")
+            for text in texts
+        ]
+        outside = [schema[key] + step for key, step in (("minimum", -1), ("maximum", 1)) if key in schema]
+        if "enum" in schema:
+            whole = [value for value in schema["enum"] if isinstance(value, int)]
+            outside += [max(whole) + 1, min(whole) - 1, 0, -1] if whole else []
+        found += [
+            Wrong(parameter.name, str(value), f"{value}, which is not allowed, at {parameter.name}", str(value))
+            for value in dict.fromkeys(outside)
+            if shape_of(schema).problem(value)
+        ]
+    elif "enum" in schema or "pattern" in schema:
+        text = "roaas-not-one-of-these"
+        if shape_of(schema).problem(text):
+            found.append(Wrong(parameter.name, text, f"a text that is not allowed at {parameter.name}", text))
+    return found

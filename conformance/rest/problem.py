@@ -1,0 +1,117 @@
+"""Problem details (RFC 9457): what an error answer has to be."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from conformance.documents.json_text import read_json
+from conformance.documents.representation import UnreadableError, local_name, parse_xml
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.rest.request_context import Sent
+    from conformance.transport.exchange import Exchange, Response
+
+JSON = "application/problem+json"
+XML = "application/problem+xml"
+_NAMESPACE = "urn:ietf:rfc:7807"
+# What servers, proxies and gateways answer before any resource is asked; and 401, which tells by its own field.
+_TRANSPORT = frozenset({401, 407, 408, 411, 413, 414, 417, 421, 426, 429, 431})
+_NOT_ACCEPTABLE = 406
+_SERVER_ERROR = 500
+_UNAVAILABLE = 503
+
+
+def judge(session: Session, exchange: Exchange, answer: Response, sent: Sent) -> None:
+    """Judge one answer of 400 and above."""
+    status = answer.status
+    if status in _TRANSPORT or not sent.usual or (status >= _SERVER_ERROR and status != _UNAVAILABLE):
+        return
+    if status == _UNAVAILABLE and sent.operation is None:
+        return
+    if sent.is_head and not answer.media_type:
+        return
+    media_type = answer.media_type
+    allowed = [JSON, *([XML] if sent.names_xml or status == _NOT_ACCEPTABLE else [])]
+    session.judge.check(
+        "http/problem-type",
+        media_type in allowed,
+        exchange,
+        f"an error as {' or '.join(allowed)}",
+        found=f"status {status} as {media_type or 'no media type'}",
+        cause=f"{media_type} {sent.operation.id if sent.operation else 'elsewhere'}",
+    )
+    if sent.likes_xml > sent.likes_json and status != _NOT_ACCEPTABLE:
+        fault = "" if sent.is_head or media_type != XML else _xml_fault(answer)
+        session.judge.check(
+            "rest-formats/problem-xml",
+            media_type == XML and not fault,
+            exchange,
+            f"an error as {XML}, because XML was asked for",
+            found=fault or f"status {status} as {media_type or 'no media type'}",
+            cause=fault or media_type,
+        )
+    if not sent.is_head and media_type in {JSON, XML}:
+        _judge_status(session, exchange, answer)
+
+
+def _xml_fault(answer: Response) -> str:
+    try:
+        root = parse_xml(answer.body)
+    except UnreadableError as error:
+        return str(error)
+    return "" if root.tag == f"{{{_NAMESPACE}}}problem" else f"the root element is {root.tag}"
+
+
+def _judge_status(session: Session, exchange: Exchange, answer: Response) -> None:
+    members = members_of(answer)
+    stated = None if members is None else members.get("status")
+    missing = stated is None and members is not None
+    # RFC 9457 lets the member be left out; the contract of RoAAS requires it.
+    holds = (missing and not session.contract.own) or (stated == answer.status and not isinstance(stated, bool))
+    session.judge.check(
+        "http/problem-status",
+        holds,
+        exchange,
+        f"a problem with the status of the answer, {answer.status}",
+        found=f"status member {stated!r} in an answer {answer.status}"
+        if members is not None
+        else "a problem that cannot be read",
+        cause="missing" if missing else type(stated).__name__,
+    )
+
+
+def members_of(answer: Response) -> dict[str, Any] | None:
+    """The members of a problem, status as a number; None where it cannot be read as one."""
+    if answer.media_type == XML:
+        try:
+            root = parse_xml(answer.body)
+        except UnreadableError:
+            return None
+        members: dict[str, Any] = {
+            local_name(child): (child.text or "") for child in root if isinstance(child.tag, str)
+        }
+        status = str(members.get("status", "")).strip()
+        if re.fullmatch(r"[+-]?\d{1,9}", status, re.ASCII):
+            members["status"] = int(status)
+        return members
+    value = read_json(answer.body).value
+    return value if isinstance(value, dict) else None
+
+
+def detail_of(answer: Response) -> str:
+    """The detail of a problem; empty where there is none."""
+    members = members_of(answer) or {}
+    detail = members.get("detail")
+    return detail if isinstance(detail, str) else ""
+
+
+def names(detail: str, word: str) -> bool:
+    """Whether a detail names a field: as a word of its own, not as a part of another one.
+
+    Of a name in several parts, longer forms count as well: ``destination_x`` for ``dest_x``, as in the ROS message.
+    """
+    first, *parts = word.split("_")
+    pattern = "".join([re.escape(first), *(rf"[A-Za-z0-9]*_{re.escape(part)}" for part in parts)])
+    return re.search(rf"(?<![A-Za-z0-9_]){pattern}(?![A-Za-z0-9_])", detail) is not None

@@ -1,0 +1,114 @@
+"""Whether what breaks the contract is refused: with 4xx, with the fitting one, and with a detail that helps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from conformance.rest import problem
+from conformance.transport.client import NoAnswerError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+
+# These refuse the request for another reason than its content.
+_NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
+_MALFORMED, _INVALID = 400, 422
+
+
+def refuses(status: int) -> bool:
+    """Whether a status refuses a request because of what is in it."""
+    return 400 <= status < 500 and status not in _NO_REFUSALS  # noqa: PLR2004 - RFC 9110 15.5
+
+
+def judge_refusal(
+    session: Session,
+    send: Callable[[], Exchange],
+    requirement: str,
+    what: str,
+    *,
+    field: str = "",
+    shown: str = "",
+    malformed: bool | None = None,
+    closing: bool = False,
+    json: bool = True,
+) -> bool:
+    """Send one invalid request, and judge what comes.
+
+    Args:
+        session: the run.
+        send: sends it.
+        requirement: id of what asks for its refusal.
+        what: what is wrong with it.
+        field: name of the wrong field, where a problem can name it.
+        shown: text of the wrong value, where a problem can name it.
+        malformed: whether 400 (no JSON) or 422 (JSON of a wrong shape or value) fits better; None: either.
+        closing: whether closing the connection refuses it as well.
+        json: whether its body is JSON (or meant to be).
+
+    Returns:
+        Whether it was refused.
+
+    Raises:
+        NoAnswerError: there was no answer where there had to be one.
+    """
+    judge = session.judge
+    try:
+        exchange = send()
+    except NoAnswerError as none:
+        if closing and none.kind == "closed":
+            return judge.check(requirement, holds=True, exchange=none.exchange, expected="4xx, or a closed connection")
+        if none.kind not in {"closed", "garbage"} or not session.alive():
+            raise
+        return judge.check(
+            requirement,
+            holds=False,
+            exchange=none.exchange,
+            expected=f"4xx for {what}",
+            found=str(none),
+            cause=f"{what.split(' at ', 1)[0]} {none.kind}",
+        )
+    answer = exchange.response
+    status = answer.status if answer else 0
+    refused = judge.check(
+        requirement,
+        refuses(status),
+        exchange,
+        f"4xx for {what}",
+        found=f"status {status}",
+        cause=f"{what.split(' at ', 1)[0]} {status}",
+    )
+    if not refused or answer is None:
+        return False
+    if json and malformed is not None:
+        fitting = _MALFORMED if malformed else _INVALID
+        judge.check(
+            f"strict-input/status-{'malformed' if malformed else 'invalid'}",
+            status == fitting,
+            exchange,
+            f"{fitting} for {what}",
+            found=f"status {status}",
+            cause=f"{status}",
+        )
+    if status in {_MALFORMED, _INVALID}:
+        _judge_detail(session, exchange, what, field, shown)
+    return True
+
+
+def _judge_detail(session: Session, exchange: Exchange, what: str, field: str, shown: str) -> None:
+    detail = problem.detail_of(exchange.response) if exchange.response else ""
+    for requirement, wanted, named in (
+        ("http/problem-detail", f"the field {field!r}", problem.names(detail, field) if field else True),
+        ("http/problem-value", f"the value {shown!r}", shown in detail),
+    ):
+        if field if requirement.endswith("detail") else shown:
+            session.judge.check(
+                requirement,
+                named,
+                exchange,
+                f"a detail that names {wanted}, for {what}",
+                found=f"detail {detail[:200]!r}" if detail else "no detail",
+                cause=("unnamed" if detail else "no detail"),
+            )

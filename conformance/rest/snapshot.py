@@ -1,0 +1,87 @@
+"""What a robot shows that does not change by itself: what two readings may be compared by."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import is_json
+from conformance.documents.representation import flattened
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from conformance.engine.session import Session
+    from conformance.rest.calls import Call
+    from conformance.transport.exchange import Exchange
+
+Picture = dict[str, Any]
+_READINGS = 3
+_PAUSE_S = 0.04
+# As many times a suspect is given to come to rest.
+_WINDOWS = 12
+
+
+def leaves(exchange: Exchange) -> Picture:
+    """Status and every single value of a JSON answer, by place."""
+    answer = exchange.response
+    if answer is None:
+        return {"status": 0}
+    picture: Picture = {"status": answer.status}
+    if answer.ok and is_json(answer.media_type):
+        text = read_json(answer.body)
+        if not text.problem:
+            picture.update(flattened(text.value))
+    return picture
+
+
+def steady(pictures: Iterable[Picture]) -> Picture:
+    """What is the same in all pictures."""
+    first, *others = pictures
+    return {
+        place: value
+        for place, value in first.items()
+        if all(place in other and other[place] == value for other in others)
+    }
+
+
+def snapshot(session: Session, calls: Iterable[Call]) -> dict[str, tuple[Picture, Exchange]]:
+    """What is steady over some readings of each operation, by its id, with the last reading.
+
+    With a pause between the readings: a robot's sensors speak tens of times a second, and a client asks faster.
+    """
+    taken: dict[str, list[Exchange]] = {}
+    for turn in range(_READINGS):
+        if turn:
+            time.sleep(_PAUSE_S)
+        for call in calls:
+            exchange = call.send(session, ("Accept", "application/json"))
+            taken.setdefault(call.operation.id, []).append(exchange)
+    return {id_: (steady(leaves(one) for one in exchanges), exchanges[-1]) for id_, exchanges in taken.items()}
+
+
+def changed(before: Picture, after: Picture) -> dict[str, tuple[Any, Any]]:
+    """What was steady before and is another after; places that are gone count only where the status is the same."""
+    if before.get("status") != after.get("status"):
+        return {"status": (before.get("status"), after.get("status"))} if "status" in before else {}
+    return {place: (value, after.get(place, "nothing")) for place, value in before.items() if after.get(place) != value}
+
+
+def changes_by_itself(session: Session, call: Call, place: str, seconds: float) -> bool:
+    """Whether one value of a resource goes on changing while nothing else is asked of the robot.
+
+    What has set it going may take a while to end (a robot that was set in motion): only a value that does not come
+    to rest in any of several such times changes by itself.
+    """
+    return all(_changes(session, call, place, seconds) for _ in range(_WINDOWS))
+
+
+def _changes(session: Session, call: Call, place: str, seconds: float) -> bool:
+    until = time.monotonic() + seconds
+    first = leaves(call.send(session, ("Accept", "application/json")))
+    while time.monotonic() < until:
+        time.sleep(_PAUSE_S)
+        if leaves(call.send(session, ("Accept", "application/json"))).get(place) != first.get(place):
+            return True
+    return False

@@ -1,0 +1,79 @@
+"""Whether a value read in between two others is what they say: for states that may change while they are read."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Final
+
+from conformance.robot.message_shapes import is_number, shown
+
+# Two writings of one double.
+_EXACT: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class Slack:
+    """How far a number may lie outside what was read before and after it, where that was not the same twice."""
+
+    absolute: float = 0.02
+    relative: float = 0.05
+
+
+def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str = "") -> str:
+    """In what ``between`` contradicts both its neighbours; empty where it does not.
+
+    Compared are the fields that all three have; stamps are left to the caller, as they go on.
+    """
+    if isinstance(before, dict) and isinstance(after, dict):
+        return _in_fields(before, between, after, slack, where)
+    if isinstance(before, list) and isinstance(after, list):
+        return _in_lists(before, between, after, slack, where)
+    if is_number(before) and is_number(after):
+        low, high = sorted((float(before), float(after)))
+        room = _EXACT * (1 + abs(low)) if low == high else slack.absolute + slack.relative * max(abs(low), abs(high))
+        if not is_number(between) or not low - room <= float(between) <= high + room:
+            wanted = f"{low!r}" if low == high else f"{low!r} to {high!r}"
+            return f"{where} is {shown(between)} for {wanted}"
+        return ""
+    return "" if between in (before, after) else f"{where} is {shown(between)} for {shown(before)}"
+
+
+def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slack: Slack, where: str) -> str:
+    for name, first in before.items():
+        if name == "stamp" or name not in after:
+            continue
+        path = f"{where}.{name}" if where else name
+        if not isinstance(between, dict) or name not in between:
+            return f"{path} is missing"
+        problem = disagreement(first, between[name], after[name], slack, path)
+        if problem:
+            return problem
+    return ""
+
+
+def _in_lists(before: list[Any], between: Any, after: list[Any], slack: Slack, where: str) -> str:
+    lengths = {len(before), len(after)}
+    if not isinstance(between, list) or len(between) not in lengths:
+        return f"{where} has {len(between) if isinstance(between, list) else 'no'} items for {len(before)}"
+    if len(lengths) > 1:
+        return ""
+    for index, triple in enumerate(zip(before, between, after, strict=True)):
+        problem = disagreement(*triple, slack, f"{where}[{index}]")
+        if problem:
+            return problem
+    return ""
+
+
+def stamp_of(message: Any) -> tuple[float, float]:
+    """The stamp in a message's header, (sec, nanosec); zeros where there is none that can be read."""
+    header = message.get("header") if isinstance(message, dict) else None
+    stamp = header.get("stamp") if isinstance(header, dict) else None
+    if not isinstance(stamp, dict) or not is_number(stamp.get("sec")) or not is_number(stamp.get("nanosec")):
+        return 0.0, 0.0
+    return float(stamp["sec"]), float(stamp["nanosec"])
+
+
+def entries_of(listed: list[Any], names: tuple[str, ...]) -> list[str]:
+    """A list of entries in a form that can be compared, whatever its order."""
+    return sorted(json.dumps([entry.get(name) for name in names]) for entry in listed)

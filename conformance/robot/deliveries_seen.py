@@ -1,0 +1,158 @@
+"""Who sees what became of a delivery: a ROS probe beside the robot, or the robot's own list."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from conformance.robot.delivery import Delivery
+from conformance.robot.message_shapes import DELIVERIES as LIST
+from conformance.robot.message_shapes import read_as
+from conformance.robot.probe.client import ProbeError, probe_of
+from conformance.robot.robot import ACCEPT_JSON, DELIVERIES
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.robot.probe.client import Probe
+    from conformance.transport.client import HttpClient
+
+# How long messages are waited for, and how long after the last one another would still be noticed, s.
+_ARRIVES_S: Final = 2.0
+_QUIET_S: Final = 0.15
+_STEP_S: Final = 0.02
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A delivery that arrived.
+
+    Attributes:
+        delivery: its values.
+        interface: "rest" or "soap", where that can be seen, else empty.
+    """
+
+    delivery: Delivery
+    interface: str = ""
+
+
+class DeliveryObserver(Protocol):
+    """Sees deliveries.
+
+    Attributes:
+        exact: whether even the sign of a zero is seen, which JSON may lose.
+    """
+
+    exact: bool
+
+    def mark(self) -> None:
+        """Forget what was seen so far."""
+
+    def collect(self, count: int) -> list[Seen]:
+        """What was seen since the mark, oldest first, after waiting for ``count`` and a little longer."""
+
+
+class NoObserverError(Exception):
+    """Nobody sees what becomes of a delivery; the message says why."""
+
+
+class ListObserver:
+    """The robot's own list.
+
+    Args:
+        rest: where it is.
+        slow_s: how long the robot usually takes.
+    """
+
+    exact = False
+
+    def __init__(self, rest: HttpClient, slow_s: float = 0.0) -> None:
+        self._rest = rest
+        self._slow_s = slow_s
+        self._before: list[Any] = []
+
+    def mark(self) -> None:
+        """See DeliveryObserver."""
+        self._before = self._listed()
+
+    def collect(self, count: int) -> list[Seen]:
+        """See DeliveryObserver."""
+        until = time.monotonic() + _ARRIVES_S + 4 * self._slow_s
+        while len(self._new()) < count and time.monotonic() < until:
+            time.sleep(_STEP_S)
+        time.sleep(_QUIET_S)
+        return [Seen(Delivery.of(entry["request"]), entry["interface"]) for entry in reversed(self._new())]
+
+    def _new(self) -> list[Any]:
+        """The entries that the list had not at the mark, newest first: those before the first old one."""
+        listed = self._listed()
+        now, old = [_identity(entry) for entry in listed], [_identity(entry) for entry in self._before]
+        for count in range(len(now)):
+            rest = now[count:]
+            if rest == old[: len(rest)]:
+                return listed[:count]
+        return listed
+
+    def _listed(self) -> list[Any]:
+        value, problem = read_as(self._rest.send("GET", DELIVERIES, headers=ACCEPT_JSON).response, LIST)
+        if problem:
+            raise NoObserverError(f"the robot's list of deliveries cannot be read: {problem}")
+        entries: list[Any] = value
+        return entries
+
+
+def _identity(entry: Any) -> tuple[Any, ...]:
+    """What of an entry stays the same; its state does not."""
+    accepted = entry["accepted"]
+    return (Delivery.of(entry["request"]).bits, accepted["sec"], accepted["nanosec"], entry["interface"])
+
+
+class ProbeObserver:
+    """A ROS node beside the robot.
+
+    Args:
+        probe: its process.
+    """
+
+    exact = True
+
+    def __init__(self, probe: Probe) -> None:
+        self._probe = probe
+        self._marked = False
+
+    def mark(self) -> None:
+        """See DeliveryObserver."""
+        if not self._marked:
+            time.sleep(_QUIET_S)  # what others sent may still be on its way; later collect() has waited
+            self._marked = True
+        self._probe.deliveries()
+
+    def collect(self, count: int) -> list[Seen]:
+        """See DeliveryObserver."""
+        until = time.monotonic() + _ARRIVES_S
+        seen: list[Delivery] = []
+        while len(seen) < count and time.monotonic() < until:
+            seen += self._probe.deliveries()
+            time.sleep(_STEP_S)
+        time.sleep(_QUIET_S)
+        return [Seen(delivery) for delivery in seen + self._probe.deliveries()]
+
+
+def observer_of(session: Session) -> DeliveryObserver:
+    """The best observer that this run has.
+
+    Raises:
+        NoObserverError: it has none.
+    """
+    reason = "no ROS domain is given (--ros-domain-id)"
+    if session.statement.ros.domain_id is not None:
+        try:
+            return ProbeObserver(probe_of(session))
+        except ProbeError as error:
+            reason = f"the ROS probe does not work: {error}"
+    if session.rest is None:
+        raise NoObserverError(reason)
+    exchange = session.rest.send("GET", DELIVERIES, headers=ACCEPT_JSON)
+    if exchange.response is None or not exchange.response.ok:
+        raise NoObserverError(f"{reason}, and the robot has no list of deliveries ({exchange.came})")
+    return ListObserver(session.rest, session.effort.usual_ms / 1000)

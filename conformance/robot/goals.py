@@ -1,0 +1,85 @@
+"""Where a robot may be sent."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from conformance.robot.geometry import Pose
+from conformance.robot.goal import await_none, goal_body, put_goal
+from conformance.robot.plan import EXACT, ask, reachable
+
+if TYPE_CHECKING:
+    from conformance.robot.robot import Robot
+
+# How far velocities may take a robot: aside, and straight ahead, m.
+_NEAR_M: Final = 0.4
+_FAR_M: Final = 0.7
+_PLACES: Final = 8
+# A robot that makes room is waited for so long, s.
+_ARRIVES_S: Final = 10.0
+
+
+def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
+    """So many different poses about ``distance`` metres from the robot (nearer where the statement says so).
+
+    Poses to which the robot has a plan, or that lie on the way to one. Ends the check that asks, as one that cannot be
+    judged, where the robot has no plan to anywhere near; a robot that answers no such question is sent straight ahead.
+    """
+    here = robot.map_pose() or Pose(0.0, 0.0, 0.0)
+    reach = min(distance, robot.statement.motion.radius_m) if robot.statement.motion.arena is None else distance
+    goals = reachable(robot, here, reach, count)
+    if not goals:
+        goals = [here.ahead(reach)]
+        _, _, exchange = ask(robot, goals[0])
+        if exchange.response is not None and 400 <= exchange.response.status < 500:  # noqa: PLR2004 - RFC 9110 15.5
+            pytest.skip("the robot has no plan to any pose around it")
+    for part in range(1, count):
+        if len(goals) < count:
+            goals.append(_on_the_way(robot, here, goals[0], 1 - part / (count + 1)) or _turned(goals[0], part))
+    return goals
+
+
+def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | None:
+    """The pose at a share of the straight way to a goal, where the robot has a plan to it."""
+    x, y = (one + share * (other - one) for one, other in zip(here[:2], goal[:2], strict=True))
+    pose = Pose(x, y, goal.yaw)
+    _, plan, _ = ask(robot, pose)
+    return pose if plan is not None and plan.poses[-1].distance(pose) < EXACT else None
+
+
+def _turned(goal: Pose, part: int) -> Pose:
+    """The place of a goal with another heading: another pose, and as reachable."""
+    return Pose(goal.x, goal.y, math.remainder(goal.yaw + part, math.tau))
+
+
+def make_room(robot: Robot) -> None:
+    """Drive a robot that stands close to something to where it can be driven about by its velocity.
+
+    A simulated robot's wheels go on turning against a wall, and its pose then moves otherwise than its velocity says.
+    Where the robot stays if it knows of no such place, or does not go there, is for the checks to find out.
+    """
+    here = robot.map_pose()
+    if here is None or _is_open(robot, here):
+        return
+    for distance in (0.8, 1.5, 2.5):
+        for pose in reachable(robot, here, distance, _PLACES):
+            if _is_open(robot, pose):
+                exchange = put_goal(robot, goal_body(pose, robot.statement.motion.frame))
+                if exchange.response is not None and exchange.response.ok:
+                    await_none(robot, _ARRIVES_S)
+                    robot.delete_goal()
+                    await_none(robot)
+                return
+
+
+def _is_open(robot: Robot, pose: Pose) -> bool:
+    """Whether the robot knows plain ways from a pose into all directions, and farther ones ahead and back."""
+    around = [pose.ahead(_NEAR_M, math.radians(angle)) for angle in range(60, 360, 60)]
+    for there in (pose.ahead(_FAR_M), pose.ahead(-_FAR_M), *around):
+        _, plan, _ = ask(robot, there, pose)
+        if plan is None or plan.length > 1.2 * pose.distance(there) + 0.1 or not robot.in_arena(there):
+            return False
+    return True

@@ -1,0 +1,138 @@
+"""Judges every plain reading of the robot's state in a run, whichever check asks for it.
+
+A fault that shows once in fifty answers is seen by reading often; all reading that is done anyway counts.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any, Final
+
+from conformance.contract.statement import Limits
+from conformance.robot.geometry import length_of
+from conformance.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, Shape, fault_in, read_json
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+
+_READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
+    "/robot/pose/": ("rest-resources/pose-type", ODOMETRY, "status 200 with a complete nav_msgs/Odometry"),
+    "/robot/velocity/": ("rest-resources/velocity-type", TWIST, "status 200 with a complete geometry_msgs/Twist"),
+    "/robot/velocity/linear/": (
+        "rest-resources/linear-type",
+        VECTOR3,
+        "status 200 with a complete geometry_msgs/Vector3",
+    ),
+}
+_PLAIN_FIELDS: Final = frozenset({"host", "accept", "authorization", "connection"})
+_PLAIN_ACCEPT: Final = frozenset({"", "*/*", "application/json"})
+_UNIT: Final = 1e-3
+_UNAVAILABLE: Final = 503
+_TOO_MANY: Final = 429
+
+
+def observe(session: Session) -> None:
+    """Let a run's readings be judged, once however often it is called."""
+    if session.rest is None or any(isinstance(getattr(one, "__self__", None), Observer) for one in _listeners(session)):
+        return
+    session.connection.listeners.append(Observer(session).see)
+
+
+def _listeners(session: Session) -> list[Any]:
+    return list(session.connection.listeners)
+
+
+class Observer:
+    """Listens to the exchanges of one run."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        rest = session.rest
+        # As HttpClient writes the URLs of its requests.
+        base = f"{rest.scheme}://{rest.authority}{rest.prefix}" if rest else ""
+        self._readings = {base + path: (path, *reading) for path, reading in _READINGS.items()}
+        self._last_stamp: tuple[int, int] | None = None
+        self._last_received = 0.0
+
+    def see(self, exchange: Exchange) -> None:
+        """Judge one exchange, where it is a plain reading."""
+        reading = self._readings.get(exchange.request.url)
+        if reading is None or exchange.request.method != "GET" or not self._plain(exchange):
+            return
+        response = exchange.response
+        if response is None or response.status == _TOO_MANY:
+            return
+        path, id_, shape, expected = reading
+        judge = self._session.judge
+        if path == "/robot/pose/":
+            judge.check(
+                "rest-resources/pose-unavailable",
+                response.status != _UNAVAILABLE or bool(response.header("retry-after")),
+                exchange,
+                "Retry-After with 503",
+            )
+        if response.status == _UNAVAILABLE:
+            return
+        value: Any
+        value, problem = (None, exchange.came) if response.status != 200 else read_json(response)  # noqa: PLR2004 - OK
+        problem = problem or fault_in(value, shape)
+        if not judge.check(id_, not problem, exchange, expected, found=problem):
+            return
+        if path == "/robot/pose/":
+            self._odometry(value, exchange, response.elapsed_ms)
+            value = value["twist"]["twist"]
+        elif path == "/robot/velocity/linear/":
+            value = {"linear": value}
+        self._limits(value, exchange)
+
+    def _plain(self, exchange: Exchange) -> bool:
+        """Whether a request is one that has nothing odd about it, and so has to be answered 200."""
+        fields = {name.lower(): value for name, value in exchange.request.headers}
+        # The client shows its own token by this name; a check may send another one, or none, to see it refused.
+        if fields.get("authorization") != ("Bearer $ROAAS_TOKEN" if self._session.connection.token else None):
+            return False
+        return fields.keys() <= _PLAIN_FIELDS and fields.get("accept", "") in _PLAIN_ACCEPT and not exchange.request.raw
+
+    def _odometry(self, odometry: Any, exchange: Exchange, elapsed_ms: float) -> None:
+        judge = self._session.judge
+        length = length_of(odometry["pose"]["pose"]["orientation"])
+        judge.check(
+            "rest-resources/pose-quaternion",
+            abs(length - 1) <= _UNIT,
+            exchange,
+            "an orientation of unit length within 1e-3",
+            found=f"length {length:.6g}",
+        )
+        now = time.monotonic()
+        stamp = (int(odometry["header"]["stamp"]["sec"]), int(odometry["header"]["stamp"]["nanosec"]))
+        # Two answers that crossed on their way say nothing of order.
+        if self._last_stamp is not None and now - elapsed_ms / 1000 >= self._last_received:
+            judge.check(
+                "rest-resources/pose-stamp",
+                stamp >= self._last_stamp,
+                exchange,
+                "a stamp that never runs backwards",
+                found=f"sec, nanosec {stamp} after {self._last_stamp}",
+                cause="runs backwards",
+            )
+        self._last_stamp = max(stamp, self._last_stamp) if self._last_stamp else stamp
+        self._last_received = now
+
+    def _limits(self, twist: Any, exchange: Exchange) -> None:
+        """The measured speed is within the declared limits at any time, also on the robot's own missions."""
+        limits, undeclared = self._session.statement.limits, Limits()
+        for part, declared, default in (
+            ("linear", limits.linear_m_s, undeclared.linear_m_s),
+            ("angular", limits.angular_rad_s, undeclared.angular_rad_s),
+        ):
+            if part not in twist or declared == default:
+                continue
+            fastest = max(abs(float(twist[part][axis])) for axis in "xyz")
+            self._session.judge.check(
+                "safety/limits-hold",
+                fastest <= declared * (1 + limits.tolerance) + limits.tolerance_abs,
+                exchange,
+                f"a measured {part} speed within the limit of {declared:g}",
+                found=f"{fastest:.4g}",
+            )

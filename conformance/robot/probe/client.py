@@ -1,0 +1,175 @@
+"""The suite's end of the ROS probe: starts its process, asks it, and never waits for ever."""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Final
+
+from conformance.robot.delivery import Delivery
+from conformance.robot.robot import Velocity
+
+if TYPE_CHECKING:
+    from conformance.contract.statement import Ros
+    from conformance.engine.session import Session
+
+# Importing rclpy and finding the robot on the graph takes seconds on a small machine, s.
+_START_S: Final = 20.0
+_ANSWER_S: Final = 5.0
+_END_S: Final = 3.0
+_LINES_KEPT: Final = 2000
+
+
+class ProbeError(Exception):
+    """The probe cannot be used; the message says why."""
+
+
+class Probe:
+    """A probe that has been started; await_robot() before anything else.
+
+    Args:
+        ros: the robot's ROS side.
+
+    Raises:
+        ProbeError: no process can be started.
+    """
+
+    def __init__(self, ros: Ros) -> None:
+        command = [sys.executable, "-m", "conformance.robot.probe", "--domain-id", str(ros.domain_id)]
+        command += ["--delivery-topic", ros.delivery_topic, "--cmd-vel-topic", ros.cmd_vel_topic]
+        # A robot that only looks on its own machine hears no multicast: without a word to it directly, the probe would
+        # wait seconds for its next announcement. Robots elsewhere are found as ever.
+        peers = ";".join(filter(None, [os.environ.get("ROS_STATIC_PEERS"), "127.0.0.1"]))
+        # Shared memory that killed processes left behind, or that a container does not share, swallows messages.
+        environment = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"} | os.environ
+        environment |= {"ROS_DOMAIN_ID": str(ros.domain_id), "ROS_STATIC_PEERS": peers}
+        try:
+            # In a session of its own: Ctrl-C is for the suite, which then ends the probe.
+            self._process = subprocess.Popen(  # noqa: S603 - our own program
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+                text=True,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise ProbeError(f"it cannot be started: {error}") from error
+        self._lines: queue.Queue[str] = queue.Queue(_LINES_KEPT)
+        threading.Thread(target=self._listen, daemon=True, name="probe").start()
+        atexit.register(self.close)
+        self.nodes = 0
+
+    def await_robot(self) -> None:
+        """Wait until the probe sees the robot.
+
+        Raises:
+            ProbeError: it does not start, for want of ROS or of the message package, or sees no robot.
+        """
+        try:
+            self.nodes = int(self._answer(_START_S)["nodes"])
+        except ProbeError:
+            self.close()
+            raise
+
+    def deliveries(self) -> list[Delivery]:
+        """The DeliveryRequestMsg that came since this was asked last, in their order."""
+        return [
+            Delivery(int(code), *(float.fromhex(value) for value in values))
+            for code, *values in self._ask("deliveries")["deliveries"]
+        ]
+
+    def velocities(self) -> list[Velocity]:
+        """The velocity commands that came since this was asked last, in their order."""
+        return [Velocity(*map(float.fromhex, values)) for values in self._ask("velocities")["velocities"]]
+
+    def topics(self) -> dict[str, list[str]]:
+        """The types of each topic that somebody publishes, by its full name."""
+        topics: dict[str, list[str]] = self._ask("graph")["topics"]
+        return topics
+
+    def close(self) -> None:
+        """End the process."""
+        atexit.unregister(self.close)
+        with suppress(OSError, ValueError):
+            if self._process.stdin:
+                self._process.stdin.close()
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _listen(self) -> None:
+        if self._process.stdout:
+            for line in self._process.stdout:
+                with suppress(queue.Full):
+                    self._lines.put_nowait(line)
+        with suppress(queue.Full):
+            self._lines.put_nowait("")
+
+    def _ask(self, what: str) -> dict[str, Any]:
+        try:
+            if self._process.stdin:
+                self._process.stdin.write(what + "\n")
+                self._process.stdin.flush()
+        except (OSError, ValueError) as error:
+            raise ProbeError(f"it has ended: {error}") from error
+        return self._answer(_ANSWER_S)
+
+    def _answer(self, within_s: float) -> dict[str, Any]:
+        try:
+            line = self._lines.get(timeout=within_s)
+        except queue.Empty as error:
+            raise ProbeError(f"it does not answer within {within_s:g} s") from error
+        try:
+            answer = json.loads(line)
+        except ValueError as error:
+            raise ProbeError(f"it has ended{f' and said {line.strip()!r}' if line else ''}") from error
+        if not isinstance(answer, dict) or "problem" in answer:
+            raise ProbeError(str(answer["problem"]) if isinstance(answer, dict) else "it answers nonsense")
+        return answer
+
+
+# One probe for each run, by the identity of its session, which is kept with it; or why it cannot be used.
+_PROBES: dict[int, tuple[Session, Probe | ProbeError]] = {}
+_SEEING: set[int] = set()
+
+
+def start_probe(session: Session) -> None:
+    """Start the run's probe, where a domain is given, without waiting for it: finding a robot may take seconds."""
+    if session.statement.ros.domain_id is None or id(session) in _PROBES:
+        return
+    try:
+        _PROBES[id(session)] = (session, Probe(session.statement.ros))
+    except ProbeError as error:
+        _PROBES[id(session)] = (session, error)
+
+
+def probe_of(session: Session) -> Probe:
+    """The run's probe.
+
+    Raises:
+        ProbeError: no domain is given, or it cannot be used.
+    """
+    if session.statement.ros.domain_id is None:
+        raise ProbeError("no ROS domain is given (--ros-domain-id)")
+    start_probe(session)
+    _, probe = _PROBES[id(session)]
+    if isinstance(probe, ProbeError):
+        raise probe
+    if id(session) not in _SEEING:
+        try:
+            probe.await_robot()
+        except ProbeError as error:
+            _PROBES[id(session)] = (session, error)
+            raise
+        _SEEING.add(id(session))
+    return probe

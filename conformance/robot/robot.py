@@ -1,0 +1,202 @@
+"""A robot as the checks of its domain see it: read, driven, and judged by the shape of all that it answers."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from conformance.contract.statement import Limits
+from conformance.robot.geometry import Pose, pose_of
+from conformance.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, Shape, body_of, pruned, read_as
+from conformance.robot.observer import observe
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange
+
+POSE: Final = "/robot/pose/"
+VELOCITY: Final = "/robot/velocity/"
+LINEAR: Final = "/robot/velocity/linear/"
+SENSORS: Final = "/robot/sensors/"
+SERVICES: Final = "/robot/navigation/services/"
+GOAL_PATH: Final = "/robot/navigation/action/goal/"
+PLAN: Final = "/robot/navigation/service/plan"
+DELIVERIES: Final = "/robot/app/delivery/"
+ACCEPT_JSON: Final = (("Accept", "application/json"),)
+JSON_BODY: Final = (("Content-Type", "application/json"), ("Accept", "application/json"))
+
+
+class Velocity(NamedTuple):
+    """A geometry_msgs/Twist: m/s and rad/s."""
+
+    linear_x: float = 0.0
+    linear_y: float = 0.0
+    linear_z: float = 0.0
+    angular_x: float = 0.0
+    angular_y: float = 0.0
+    angular_z: float = 0.0
+
+    @classmethod
+    def of(cls, twist: Mapping[str, Any]) -> Velocity:
+        """From JSON."""
+        return cls(*(float(twist[part][axis]) for part in ("linear", "angular") for axis in "xyz"))
+
+    @property
+    def linear(self) -> dict[str, float]:
+        """The linear part as JSON."""
+        return dict(zip("xyz", self[:3], strict=True))
+
+    @property
+    def twist(self) -> dict[str, dict[str, float]]:
+        """As JSON."""
+        return {"linear": self.linear, "angular": dict(zip("xyz", self[3:], strict=True))}
+
+    def __str__(self) -> str:
+        shown = [f"{name.replace('_', '.')} {value:.4g}" for name, value in self._asdict().items() if value]
+        return ", ".join(shown) or "zero"
+
+
+STILL: Final = Velocity()
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """One reading of the odometry.
+
+    Attributes:
+        sent, received: when it was asked for and came, s of the monotonic clock.
+        stamp: the robot's own, s.
+        pose: in the odometry frame.
+        velocity: in the robot's frame.
+        exchange: the evidence.
+    """
+
+    sent: float
+    received: float
+    stamp: float
+    pose: Pose
+    velocity: Velocity
+    exchange: Exchange
+
+
+class Robot:
+    """One robot, over REST.
+
+    Whoever makes one also sets the observers going that judge every plain reading of the run.
+    """
+
+    def __init__(self, session: Session) -> None:
+        if session.rest is None:
+            raise ValueError("a robot without a REST interface")
+        self.rest = session.rest
+        self.judge = session.judge
+        self.statement = session.statement
+        self.limits = session.statement.limits
+        # A ceiling on the rate of requests makes a robot as slow as one that answers slowly.
+        self.usual_s = max(session.effort.usual_ms / 1000, 1 / (session.connection.request_rate or 1e9))
+        # How long what must not happen is watched for, in relation to standard effort.
+        self.watchfulness = 0.5 if session.effort.name == "quick" else 1.0
+        observe(session)
+
+    @property
+    def limits_declared(self) -> bool:
+        """Whether the statement says how fast the robot can be, so that beyond it is known."""
+        undeclared = Limits()
+        return (self.limits.linear_m_s, self.limits.angular_rad_s) != (undeclared.linear_m_s, undeclared.angular_rad_s)
+
+    @property
+    def settle_s(self) -> float:
+        """How long to wait before a velocity that is not reached is held against the robot, s.
+
+        A quarter more than declared and a quarter of a second, for a loaded machine and a network between.
+        """
+        return 1.25 * self.limits.settle_s + 0.25 + 4 * self.usual_s
+
+    def get(self, path: str) -> Exchange:
+        """GET as JSON."""
+        return self.rest.send("GET", path, headers=ACCEPT_JSON)
+
+    def read(self, path: str, shape: Shape) -> tuple[Any, Exchange]:
+        """GET a message, without what a robot adds to it; None where the answer is something else."""
+        exchange = self.get(path)
+        value, problem = read_as(exchange.response, shape)
+        return (None if problem else pruned(value, shape)), exchange
+
+    def put(self, path: str, value: Mapping[str, Any]) -> Exchange:
+        """PUT as JSON."""
+        return self.rest.send("PUT", path, headers=JSON_BODY, body=body_of(value))
+
+    def odometry(self) -> Odometry | None:
+        """The odometry, or None where it cannot be read (which the observers have judged)."""
+        sent = time.monotonic()
+        message, exchange = self.read(POSE, ODOMETRY)
+        if message is None:
+            return None
+        stamp = message["header"]["stamp"]
+        return Odometry(
+            sent,
+            time.monotonic(),
+            stamp["sec"] + stamp["nanosec"] * 1e-9,
+            pose_of(message["pose"]["pose"]),
+            Velocity.of(message["twist"]["twist"]),
+            exchange,
+        )
+
+    def velocity(self) -> tuple[Velocity | None, Exchange]:
+        """The measured velocity, or None where it cannot be read."""
+        twist, exchange = self.read(VELOCITY, TWIST)
+        return (None if twist is None else Velocity.of(twist)), exchange
+
+    def linear(self) -> tuple[Velocity | None, Exchange]:
+        """The linear part of the measured velocity, as a velocity that does not turn."""
+        vector, exchange = self.read(LINEAR, VECTOR3)
+        return (None if vector is None else Velocity(*(float(vector[axis]) for axis in "xyz"))), exchange
+
+    def put_velocity(self, velocity: Velocity) -> Exchange:
+        """Command a velocity."""
+        return self.put(VELOCITY, velocity.twist)
+
+    def put_linear(self, velocity: Velocity) -> Exchange:
+        """Command the linear part of a velocity."""
+        return self.put(LINEAR, velocity.linear)
+
+    def goal(self) -> tuple[Any, Exchange]:
+        """The active goal as JSON, or None."""
+        exchange = self.get(GOAL_PATH)
+        return read_as(exchange.response, GOAL)[0], exchange
+
+    def delete_goal(self) -> Exchange:
+        """Cancel the goal."""
+        return self.rest.send("DELETE", GOAL_PATH)
+
+    def map_pose(self) -> Pose | None:
+        """Where the robot is in the frame of goals and plans, by the statement's transform."""
+        odometry = self.odometry()
+        return self.in_map(odometry.pose) if odometry else None
+
+    def in_map(self, pose: Pose) -> Pose:
+        """A pose of the odometry in the frame of goals and plans."""
+        return pose.seen_from(Pose(*self.statement.motion.odom_to_map))
+
+    def in_arena(self, pose: Pose) -> bool:
+        """Whether the statement lets the robot be driven to a pose in the frame of goals."""
+        arena = self.statement.motion.arena
+        return arena is None or (arena[0] <= pose.x <= arena[2] and arena[1] <= pose.y <= arena[3])
+
+    def near(self, measured: Velocity, wanted: Velocity, factor: float = 1.0) -> bool:
+        """Whether each component is what was wanted, within ``factor`` times the tolerance."""
+        return all(
+            abs(one - other) <= factor * (self.limits.tolerance_abs + self.limits.tolerance * abs(other))
+            for one, other in zip(measured, wanted, strict=True)
+        )
+
+    def limit_of(self, component: int) -> float:
+        """The declared limit of a component by its place in Velocity, m/s or rad/s."""
+        return self.limits.linear_m_s if component < len("xyz") else self.limits.angular_rad_s
+
+    def actuated(self, component: int) -> bool:
+        """Whether the statement says that the robot can actuate a component."""
+        return Velocity._fields[component].replace("_", ".") in self.statement.motion.actuated

@@ -1,0 +1,93 @@
+"""The robot's SOAP services as the checks of its domain ask them: deliveries are sent, states read as JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+from xml.sax.saxutils import escape
+
+from conformance.documents.xml_names import local
+from conformance.robot.delivery import COFFEE, Delivery
+from conformance.robot.message_shapes import NUMBER, Items, Leaf, Shape
+from conformance.soap.envelope import Envelope, elements, read_answer, text_of
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+    from conformance.soap.service import SoapService
+    from conformance.transport.exchange import Exchange
+
+_ENVELOPE: Final = "http://schemas.xmlsoap.org/soap/envelope/"
+_NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
+# In the order of the contract's XSD.
+_SEQUENCE: Final = ("depot_x", "depot_y", "destination_x", "destination_y", "message_code", "source_x", "source_y")
+
+
+def message(operation: str, content: str = "") -> bytes:
+    """A request of an operation, with its children as XML."""
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>'
+        f'<s:Envelope xmlns:s="{_ENVELOPE}" xmlns:t="{_NAMESPACE}"><s:Body>'
+        f"<t:{operation}>{content}</t:{operation}></s:Body></s:Envelope>"
+    ).encode()
+
+
+def send_delivery(publishers: SoapService, delivery: Delivery, *, coffee: bool = False) -> Exchange:
+    """Send a delivery once, on a connection of its own so that nothing is sent again.
+
+    Args:
+        publishers: the service.
+        delivery: its values.
+        coffee: by ExecuteCoffeeRequest, which knows the code by itself.
+    """
+    values = delivery._asdict() | ({"message_code": COFFEE} if coffee else {})
+    children = "".join(f"<{name}>{values[name]!r}</{name}>" for name in _SEQUENCE)
+    operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
+    return publishers.post(message(operation, f"<arg0>{children}</arg0>"), fresh=True)
+
+
+def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> Exchange:
+    """Ask the subscribers service; parameters in the order of the contract's XSD."""
+    content = "".join(
+        f"<{name}>{escape(value) if isinstance(value, str) else repr(float(value))}</{name}>"
+        for name, value in parameters.items()
+    )
+    return subscribers.post(message(operation, content))
+
+
+def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
+    """The ``return`` elements of a response, and what is wrong where it is none."""
+    read: Envelope | None = read_answer(exchange)
+    if exchange.response is None or not exchange.response.ok or read is None or read.first is None or read.fault:
+        return [], f"no SOAP response: {exchange.came}"
+    return [child for child in elements(read.first) if local(str(child.tag)) == "return"], ""
+
+
+def value_of(parent: etree._Element, shape: Shape) -> Any:
+    """An element as the JSON of a shape: fields by their local names; None for what is not there or no number."""
+    if isinstance(shape, Leaf):
+        text = text_of(parent)
+        if shape is NUMBER or shape.expected.startswith("an integer"):
+            return _number(text)
+        return text
+    if isinstance(shape, Items):
+        return [value_of(item, shape.shape) for item in elements(parent)]
+    children: dict[str, list[etree._Element]] = {}
+    for child in elements(parent):
+        children.setdefault(local(str(child.tag)), []).append(child)
+    value: dict[str, Any] = {}
+    for name, part in shape.items():
+        found = children.get(name, [])
+        if isinstance(part, Items):
+            value[name] = [value_of(item, part.shape) for item in found]
+        elif found:
+            value[name] = value_of(found[0], part)
+    return value
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text.strip())
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

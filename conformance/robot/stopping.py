@@ -1,0 +1,146 @@
+"""Bringing a robot to rest: before a check that needs it there, and at the end of every run."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+from conformance.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as, read_json
+from conformance.transport.client import HttpClient, NoAnswerError
+
+if TYPE_CHECKING:
+    from conformance.engine.session import Session
+    from conformance.transport.exchange import Exchange, Response
+
+_GOAL: Final = "/robot/navigation/action/goal/"
+_VELOCITY: Final = "/robot/velocity/"
+_POSE: Final = "/robot/pose/"
+_STILL: Final = body_of({part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")})
+_JSON: Final = (("Content-Type", "application/json"),)
+_ACCEPT: Final = (("Accept", "application/json"),)
+_NOT_FOUND: Final = 404
+# A robot with a queue of missions starts the next one when the first is cancelled: cancel again for so long, s.
+_CANCEL_S: Final = 3.0
+# Beyond the settle time, which a loaded machine and a far network may stretch, s.
+_GRACE_S: Final = 1.5
+_STEP_S: Final = 0.02
+# At the end of a run a robot that does not answer must not keep the user waiting, s.
+_LAST_TIMEOUT_S: Final = 0.7
+_LAST_S: Final = 3.0
+
+
+def bring_to_rest(session: Session) -> str:
+    """Cancel what the robot is doing and wait until it stands still.
+
+    Sends PUT and DELETE: only for checks that may move the robot. Whatever a robot answers or not, nothing is raised.
+
+    Returns:
+        Empty when the robot is at rest (as far as it can be read), else why it is not.
+    """
+    if session.rest is None or not session.contract.own:
+        return ""
+    still = _Stiller(session.rest, session.statement.limits.tolerance_abs)
+    limits = session.statement.limits
+    return still.bring(_CANCEL_S, limits.settle_s + _GRACE_S + 8 * session.effort.usual_ms / 1000)
+
+
+def leave_at_rest(session: Session) -> None:
+    """Stop the robot at the end of a run, also one that was interrupted, and also a robot that hardly answers.
+
+    Does nothing where the robot could not have been moved. Bounded to a few seconds; raises nothing.
+    """
+    if session.rest is None or not session.allow_motion or not session.contract.own:
+        return
+    try:
+        # A client of its own: no listener judges any more, and an endpoint that hung once is asked again all the same.
+        timeout_s = min(_LAST_TIMEOUT_S + 3 * session.effort.usual_ms / 1000, session.connection.timeout_s)
+        connection = replace(session.connection, timeout_s=timeout_s, listeners=[])
+        client = HttpClient(session.rest.base_url, connection)
+        try:
+            _Stiller(client, session.statement.limits.tolerance_abs).bring(_LAST_S, _LAST_S)
+        finally:
+            client.close()
+    except Exception:  # noqa: BLE001 - the run is over: what was found must be reported whatever happens here
+        return
+
+
+def _shows(answer: Response) -> bool:
+    """Whether an answer shows anything that may be a goal."""
+    value, problem = read_json(answer)
+    return not problem and isinstance(value, dict) and bool(value)
+
+
+class _Stiller:
+    """Stops one robot.
+
+    Args:
+        client: its REST interface.
+        tolerance: the greatest speed, m/s or rad/s, that counts as rest.
+    """
+
+    def __init__(self, client: HttpClient, tolerance: float) -> None:
+        self._client = client
+        self._tolerance = tolerance
+        self._silent = ""
+
+    def bring(self, cancel_s: float, settle_s: float) -> str:
+        """Cancel and stop; what bring_to_rest() says of it."""
+        cancelled = self._no_goal_left(time.monotonic() + cancel_s)
+        # Also where the goal could not be cancelled: a robot that takes velocities meanwhile stops for a moment.
+        self._ask("PUT", _VELOCITY, _JSON, _STILL)
+        if not cancelled:
+            return f"its goal is still active after {cancel_s:g} s of cancelling it"
+        return self._wait(time.monotonic() + settle_s)
+
+    def _no_goal_left(self, until: float) -> bool:
+        while True:
+            cancelled = self._ask("DELETE", _GOAL)
+            current = self._ask("GET", _GOAL, _ACCEPT)
+            # Anything but a goal that can be read: there is none, or no such resource, or no telling. Whether the robot
+            # moves is seen by its velocity.
+            if current is None or current.response is None or not current.response.ok or not _shows(current.response):
+                return True
+            if time.monotonic() > until:
+                return False
+            if cancelled is None or cancelled.response is None or not cancelled.response.ok:
+                time.sleep(_STEP_S)
+
+    def _wait(self, until: float) -> str:
+        calm = 0
+        while True:
+            speed, problem = self._speed()
+            if problem:
+                return problem
+            calm = calm + 1 if speed <= self._tolerance else 0
+            if calm > 1:
+                return ""
+            if time.monotonic() > until:
+                return f"it still moves with {speed:.3g} m/s or rad/s"
+            time.sleep(_STEP_S if calm == 0 else 0.002)
+
+    def _speed(self) -> tuple[float, str]:
+        """The greatest component of the measured velocity, and why it cannot be told."""
+        read = self._ask("GET", _VELOCITY, _ACCEPT)
+        if read is not None and read.response is not None and read.response.status == _NOT_FOUND:
+            return 0.0, ""  # a robot without this resource: nothing says that it moves
+        twist: Any
+        odometry: Any
+        twist, problem = read_as(read.response, TWIST) if read else (None, self._silent)
+        if problem:
+            # What the velocity does not say, the odometry may.
+            read = self._ask("GET", _POSE, _ACCEPT)
+            odometry, unread = read_as(read.response, ODOMETRY) if read else (None, self._silent)
+            if unread:
+                return 0.0, f"its velocity cannot be read: {problem}"
+            twist = odometry["twist"]["twist"]
+        return max(abs(twist[part][axis]) for part in ("linear", "angular") for axis in "xyz"), ""
+
+    def _ask(
+        self, method: str, path: str, headers: tuple[tuple[str, str], ...] = (), body: bytes = b""
+    ) -> Exchange | None:
+        try:
+            return self._client.send(method, path, headers=headers, body=body)
+        except NoAnswerError as none:
+            self._silent = f"no answer to {method} {path}: {none}"
+            return None

@@ -1,0 +1,47 @@
+"""What the walks of a state machine share: they end together, by a refutation, by an unreachable robot, or by the clock."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from conformance.robot.drive import BusyError, Drive
+from conformance.transport.client import NoAnswerError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.robot.robot import Robot
+
+
+class Walk:
+    """What all walks of one check share.
+
+    Attributes:
+        robot: that walks.
+        drive: its velocity.
+        ended: why no further step is made: a requirement was refuted, the time is up, the robot is busy.
+        unreachable: the request that was not answered, if that ended it.
+    """
+
+    def __init__(self, robot: Robot, budget_s: float) -> None:
+        self.robot = robot
+        self.drive = Drive(robot)
+        self.ended = ""
+        self.unreachable: NoAnswerError | None = None
+        self._until = time.monotonic() + budget_s
+
+    def step(self, act: Callable[[], bool]) -> None:
+        """Make one step, unless the walk has ended; ``act`` tells whether all was well."""
+        if self.ended:
+            return
+        if time.monotonic() > self._until:
+            self.ended = "the time is up"
+            return
+        try:
+            if not act():
+                self.ended = "refuted"
+        except NoAnswerError as none:
+            self.unreachable, self.ended = none, str(none)
+        except BusyError as busy:
+            self.ended = str(busy)

@@ -1,0 +1,155 @@
+"""One certification as part of a self-test: in a process of its own, so that nothing is left of it for the next."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import multiprocessing
+import os
+import tempfile
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection as Pipe
+
+# What every run imports: loaded once, and inherited by the processes that are forked from there.
+_PRELOADED = ["conformance.selftest.preloaded"]
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is judged, and how.
+
+    Attributes:
+        statement: file of the robot's statement.
+        rest: REST's base URL; publishers and subscribers: their WSDLs.
+        classes: classes to claim, in place of the statement's; empty: those of the statement.
+        requirements: ids to judge, so that only their checks run; empty: all of the classes.
+        effort: quick, standard or deep.
+        seed: of everything random.
+        domain_id: ROS domain for the probe, or None for none.
+        token: bearer token to send, or empty.
+        endpoints: further endpoint options (ca_file, request_rate).
+        timeout_s: after which the run is given up.
+    """
+
+    statement: Path
+    rest: str
+    publishers: str
+    subscribers: str
+    classes: tuple[str, ...] = ()
+    requirements: tuple[str, ...] = ()
+    effort: str = "quick"
+    seed: int = 0
+    domain_id: int | None = None
+    token: str = ""
+    endpoints: dict[str, Any] = field(default_factory=dict)
+    timeout_s: float = 120.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of it.
+
+    Attributes:
+        exit_code: as roaas certify's; -1 when the run was given up.
+        verdicts: by requirement.
+        reasons: by requirement, where it is not pass.
+        requests: how many were sent.
+        seconds: how long it took.
+    """
+
+    exit_code: int
+    verdicts: dict[str, str]
+    reasons: dict[str, str]
+    requests: int
+    seconds: float
+
+    def caught(self) -> tuple[str, ...]:
+        """Requirements that say fail or warn."""
+        return tuple(id_ for id_, verdict in self.verdicts.items() if verdict in {"fail", "warn"})
+
+
+def judge(job: Job) -> Outcome:
+    """Run a certification and wait for it; a run that takes too long is given up, and has caught nothing."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(_PRELOADED)
+    ours, theirs = context.Pipe(duplex=False)
+    started = time.monotonic()
+    process = context.Process(target=_run, args=(job, theirs), daemon=True)
+    process.start()
+    theirs.close()
+    given_up = Outcome(-1, {}, {}, 0, job.timeout_s)
+    try:
+        if not ours.poll(job.timeout_s):
+            return given_up
+        found: dict[str, Any] = ours.recv()
+    except EOFError:
+        return given_up
+    finally:
+        process.join(0.5)
+        if process.is_alive():
+            process.kill()
+            process.join()
+        ours.close()
+    return Outcome(**found, seconds=time.monotonic() - started)
+
+
+def _run(job: Job, answer: Pipe) -> None:
+    """Certify, in the child, and send what came of it."""
+    from conformance.engine.certification import certify  # noqa: PLC0415 - in the child, where it is preloaded
+
+    with tempfile.TemporaryDirectory() as folder, Path(os.devnull).open("w", encoding="utf-8") as nowhere:
+        with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(io.StringIO()):
+            certification = certify(session_of(job, Path(folder)), Path(folder), progress=None)
+        document = certification.document
+        wanted = set(job.requirements)
+        items = [item for item in document["requirements"] if not wanted or item["id"] in wanted]
+        answer.send(
+            {
+                "exit_code": certification.exit_code,
+                "verdicts": {item["id"]: item["verdict"] for item in items},
+                "reasons": {item["id"]: item["reason"] for item in items if item["verdict"] != "pass"},
+                "requests": document["requests"],
+            }
+        )
+
+
+def session_of(job: Job, folder: Path) -> Any:
+    """The session that a job describes; ``folder`` is for its token."""
+    from conformance.contract.files import Contract  # noqa: PLC0415 - see _run
+    from conformance.contract.statement import load_statement  # noqa: PLC0415 - see _run
+    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - see _run
+    from conformance.engine.session import Session  # noqa: PLC0415 - see _run
+    from conformance.verdict.effort import Effort  # noqa: PLC0415 - see _run
+
+    statement = load_statement(job.statement)
+    given = dict(job.endpoints)
+    if job.token:
+        (folder / "token").write_text(job.token, encoding="utf-8")
+        given["token_file"] = str(folder / "token")
+    where = replace(
+        statement.endpoints,
+        rest=job.rest,
+        publishers_wsdl=job.publishers,
+        subscribers_wsdl=job.subscribers,
+        **given,
+    )
+    claims = job.classes or statement.claims
+    statement = replace(statement, endpoints=where, claims=claims, ros=replace(statement.ros, domain_id=job.domain_id))
+    contract = Contract.load()
+    if job.requirements:
+        # A ledger of these alone: checks that judge none of them are not run.
+        vars(contract)["ledger"] = {id_: contract.ledger[id_] for id_ in job.requirements}
+    return Session(
+        statement=statement,
+        contract=contract,
+        claims=statement.claimed(),
+        allow_motion=True,
+        seed=job.seed,
+        effort=Effort(job.effort),
+        connection=connection_of(where),
+    )

@@ -1,0 +1,137 @@
+"""False alarms: good robots, over many seeds and in many circumstances, none of which may be blamed."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from conformance.selftest.certifying import Job, Outcome, judge
+from conformance.selftest.proxy import Proxy
+from conformance.selftest.robots import Robot, running, statement_of
+from conformance.selftest.variants import CertificateError, Variant, certificate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+# A robot that takes 300 ms for everything needs its time.
+_TIMEOUT_S = 900.0
+
+
+@dataclass(frozen=True)
+class Acquittal:
+    """What was said of a good robot.
+
+    Attributes:
+        robot: which; variant: in which circumstances, or empty.
+        seed: of the run.
+        outcome: what came of it, or None when it was not tried.
+        unseen: why it was not tried, or empty.
+    """
+
+    robot: str
+    variant: str
+    seed: int
+    outcome: Outcome | None
+    unseen: str = ""
+
+    @property
+    def blamed(self) -> dict[str, str]:
+        """MUST requirements that a good robot was said to fail, with what was said."""
+        if self.outcome is None:
+            return {}
+        return {id_: self.outcome.reasons[id_] for id_, value in self.outcome.verdicts.items() if value == "fail"}
+
+    @property
+    def unjudged(self) -> dict[str, str]:
+        """Requirements that could not be judged although they are claimed, with the reason."""
+        if self.outcome is None:
+            return {}
+        return {
+            id_: self.outcome.reasons[id_] for id_, value in self.outcome.verdicts.items() if value in {"skip", "error"}
+        }
+
+    @property
+    def acquitted(self) -> bool:
+        """Whether the robot was found conformant (or was not tried)."""
+        return self.outcome is None or (self.outcome.exit_code == 0 and not self.blamed)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One robot to try: in which circumstances, with which seed."""
+
+    robot: str
+    variant: Variant | None
+    seed: int
+
+
+def acquit(
+    cases: list[Case], *, effort: str, parallel: int, domain_id: int, tell: Callable[[Acquittal], None]
+) -> list[Acquittal]:
+    """Judge good robots, each case on a robot of its own; ``tell`` is called as each is done."""
+    lock = threading.Lock()
+    domains = list(range(domain_id, domain_id + parallel))
+
+    def one(case: Case) -> Acquittal:
+        with lock:
+            domain = domains.pop()
+        try:
+            found = _try(case, effort, domain)
+        finally:
+            with lock:
+                domains.append(domain)
+        with lock:
+            tell(found)
+        return found
+
+    with ThreadPoolExecutor(parallel) as pool:
+        return list(pool.map(one, cases))
+
+
+def _try(case: Case, effort: str, domain: int) -> Acquittal:
+    with running(case.robot, domain) as robot, tempfile.TemporaryDirectory() as folder:
+        job = Job(
+            statement_of(case.robot),
+            robot.rest,
+            robot.soap,
+            robot.soap.replace("publisher", "subscriber"),
+            effort=effort,
+            seed=case.seed,
+            timeout_s=_TIMEOUT_S,
+            domain_id=robot.domain_id,
+        )
+        if case.variant is None:
+            return Acquittal(case.robot, "", case.seed, judge(job))
+        return _vary(case, case.variant, robot, job, Path(folder))
+
+
+def _vary(case: Case, variant: Variant, robot: Robot, job: Job, folder: Path) -> Acquittal:
+    endpoints = dict(variant.endpoints)
+    tls = None
+    if variant.tls:
+        try:
+            tls, ca_file = certificate(folder)
+        except CertificateError as error:
+            return Acquittal(case.robot, variant.name, case.seed, None, str(error))
+        endpoints["ca_file"] = str(ca_file)
+    try:
+        proxy = Proxy(robot.rest, robot.soap, host=variant.host, tls=tls, prefix=variant.prefix)
+    except OSError as error:
+        return Acquittal(case.robot, variant.name, case.seed, None, f"{variant.host} cannot be listened on: {error}")
+    try:
+        proxy.change = variant.make()
+        varied = replace(
+            job,
+            rest=proxy.rest,
+            publishers=proxy.wsdl("publisher"),
+            subscribers=proxy.wsdl("subscriber"),
+            token=variant.token,
+            endpoints=endpoints,
+        )
+        return Acquittal(case.robot, variant.name, case.seed, judge(varied))
+    finally:
+        proxy.close()

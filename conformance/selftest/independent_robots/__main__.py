@@ -1,0 +1,35 @@
+"""Starts one of the strangers: ``python -m conformance.selftest.independent_robots NAME``."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import threading
+from importlib import import_module
+
+NAMES = ("plain", "baroque", "legacy")
+
+
+def main() -> int:
+    """Serve until SIGTERM or SIGINT. Returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m conformance.selftest.independent_robots", description=__doc__)
+    parser.add_argument("name", choices=NAMES)
+    parser.add_argument("--rest-port", type=int, default=0, help="0: a free one")
+    parser.add_argument("--soap-port", type=int, default=0, help="0: a free one")
+    given = parser.parse_args()
+    ended = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: ended.set())
+    rest, soap, stop = import_module(f"conformance.selftest.independent_robots.{given.name}").serve(
+        given.rest_port, given.soap_port
+    )
+    sys.stdout.write(f"ready rest={rest} soap={soap}\n")
+    sys.stdout.flush()
+    ended.wait()
+    stop()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,154 @@
+"""Robots whose plans lead elsewhere."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qsl, urlencode
+
+from conformance.selftest.mutants.changes import PLAN, altered, becomes, rest, rewritten, status, values
+from conformance.selftest.mutants.mutant import Fault
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.selftest.wire import Answer, Ask
+
+_GET = rest("GET", PLAN)
+
+
+def _poses(edit: Callable[[list[Any]], list[Any]]) -> Callable[[Answer], object]:
+    def apply(value: Any) -> None:
+        value["plan"]["poses"] = edit(value["plan"]["poses"])
+
+    return values(apply)
+
+
+def _moved(pose: Any, x: float, y: float) -> Any:
+    at = pose["pose"]["position"]
+    return {**pose, "pose": {**pose["pose"], "position": {**at, "x": at["x"] + x, "y": at["y"] + y}}}
+
+
+def _detour(poses: list[Any]) -> list[Any]:
+    middle = len(poses) // 2
+    return [*poses[:middle], _moved(poses[middle], 25.0, -25.0), *poses[middle:]]
+
+
+def _turned(poses: list[Any]) -> list[Any]:
+    last = poses[-1]
+    q = last["pose"]["orientation"]
+    yaw = 2 * math.atan2(q["z"], q["w"]) + 1.0
+    q.update(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+    return poses
+
+
+def _ask(edit: Callable[[dict[str, str]], None]) -> Callable[[Ask], None]:
+    def apply(ask: Ask) -> None:
+        given = dict(parse_qsl(ask.query, keep_blank_values=True))
+        edit(given)
+        ask.target = f"{ask.path}?{urlencode(given)}"
+
+    return apply
+
+
+def _no_start(given: dict[str, str]) -> None:
+    for name in ("start_x", "start_y", "start_yaw"):
+        given.pop(name, None)
+
+
+def _quarter(given: dict[str, str]) -> None:
+    given.setdefault("yaw", "1.5707963")
+
+
+def _emptied(answer: Answer) -> None:
+    answer.status, answer.reason = 200, ""
+    answer.body = b'{"plan":{"header":{"stamp":{"sec":1,"nanosec":0},"frame_id":"map"},"poses":[]}}'
+    answer.put("Content-Type", "application/json")
+
+
+def _frame(value: Any) -> None:
+    for pose in value["plan"]["poses"][1:]:
+        pose["header"]["frame_id"] = "base_link"
+
+
+def _fault(name: str, says: str, id_: str, make: Any) -> Fault:
+    return Fault(name, says, (f"rest-resources/{id_}",), "rest", make)
+
+
+FAULTS = (
+    _fault(
+        "plan-without-stamps",
+        "Poses of a plan have no header.",
+        "plan-type",
+        altered(_GET, _poses(lambda poses: [{"pose": one["pose"]} for one in poses])),
+    ),
+    _fault(
+        "plan-bare",
+        "The answer is the path, not a response that holds it.",
+        "plan-type",
+        altered(_GET, values(lambda value: value["plan"])),
+    ),
+    _fault(
+        "plan-from-elsewhere",
+        "A plan begins 60 cm beside the robot.",
+        "plan-start",
+        altered(_GET, _poses(lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])),
+    ),
+    _fault(
+        "plan-ignores-start", "A given start is not looked at.", "plan-given-start", rewritten(_GET, _ask(_no_start))
+    ),
+    _fault(
+        "plan-falls-short",
+        "A plan ends 50 cm before the pose that was asked for.",
+        "plan-end",
+        altered(_GET, _poses(lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])),
+    ),
+    _fault(
+        "plan-heading-ignored",
+        "A plan ends with a heading that is one radian off.",
+        "plan-yaw",
+        altered(_GET, _poses(_turned)),
+    ),
+    _fault(
+        "plan-jumps",
+        "In the middle of a plan there is a leap of 35 m.",
+        "plan-continuous",
+        altered(_GET, _poses(_detour)),
+    ),
+    _fault(
+        "plan-jumps-sometimes",
+        "One plan in 50 has a leap in it.",
+        "plan-continuous",
+        altered(_GET, _poses(_detour), nth=50),
+    ),
+    _fault(
+        "plan-mixed-frames",
+        "Only the first pose is in the frame of the path.",
+        "plan-frame",
+        altered(_GET, values(_frame)),
+    ),
+    _fault(
+        "plan-frameless",
+        "The path's header has no frame.",
+        "plan-frame",
+        altered(_GET, values(lambda value: value["plan"]["header"].update(frame_id=""))),
+    ),
+    _fault(
+        "plan-other-defaults",
+        "A yaw that is left out counts as a quarter turn.",
+        "plan-defaults",
+        rewritten(_GET, _ask(_quarter)),
+    ),
+    _fault(
+        "plan-none-empty",
+        "Where there is no plan, an empty one is sent.",
+        "plan-none",
+        altered(_GET, _emptied, status(404, 422)),
+    ),
+    _fault(
+        "plan-none-crash",
+        "Where there is no plan, the answer is 500.",
+        "plan-none",
+        altered(_GET, becomes(500), status(404, 422)),
+    ),
+)

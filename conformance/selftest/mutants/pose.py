@@ -1,0 +1,233 @@
+"""Robots that do not know, or do not say, where they are."""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import TYPE_CHECKING, Any
+
+from conformance.selftest.mutants.changes import (
+    POSE,
+    altered,
+    instead,
+    parsed,
+    plain,
+    problem,
+    remembering,
+    rest,
+    values,
+)
+from conformance.selftest.mutants.mutant import Fault
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.selftest.proxy import Change
+    from conformance.selftest.wire import Answer, Ask
+
+_AT = rest("GET", POSE)
+
+
+def _position(odometry: Any) -> Any:
+    return odometry["pose"]["pose"]["position"]
+
+
+def _scaled(factor: float) -> Callable[[Any], None]:
+    def edit(odometry: Any) -> None:
+        for axis in "xy":
+            _position(odometry)[axis] *= factor
+
+    return edit
+
+
+def _turned(change: Callable[[float], float]) -> Callable[[Any], None]:
+    def edit(odometry: Any) -> None:
+        q = odometry["pose"]["pose"]["orientation"]
+        yaw = change(2 * math.atan2(q["z"], q["w"]))
+        q["z"], q["w"] = math.sin(yaw / 2), math.cos(yaw / 2)
+
+    return edit
+
+
+def _lengthened(odometry: Any) -> None:
+    q = odometry["pose"]["pose"]["orientation"]
+    for axis in "xyzw":
+        q[axis] *= 1.01
+
+
+def _swapped(odometry: Any) -> None:
+    at = _position(odometry)
+    at["x"], at["y"] = at["y"], at["x"]
+
+
+def _in_degrees(odometry: Any) -> None:
+    odometry["twist"]["twist"]["angular"]["z"] = math.degrees(odometry["twist"]["twist"]["angular"]["z"])
+
+
+class _Frozen:
+    """Keeps parts of the first pose for ever."""
+
+    def __init__(self, *parts: str) -> None:
+        self._parts = parts
+        self._first: Any = None
+
+    def __call__(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
+        answer = forward(ask)
+        value = parsed(answer.body) if _AT(ask) and answer.status == 200 else None
+        if isinstance(value, dict):
+            self._first = self._first or copy.deepcopy(value)
+            values(lambda now: now.update({part: self._first[part] for part in self._parts}))(answer)
+        return answer
+
+
+class _Backwards:
+    """Each fifth stamp lies a second back."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def __call__(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
+        answer = forward(ask)
+        if _AT(ask) and answer.status == 200:
+            self._count += 1
+            if self._count % 5 == 0:
+                values(_earlier)(answer)
+        return answer
+
+
+def _earlier(odometry: Any) -> None:
+    odometry["header"]["stamp"]["sec"] -= 1
+
+
+class _NotYet:
+    """The first ten times there is no odometry."""
+
+    def __init__(self) -> None:
+        self._left = 10
+
+    def __call__(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
+        if _AT(ask) and self._left:
+            self._left -= 1
+            return problem(503, "no odometry yet")(ask)
+        return forward(ask)
+
+
+def _renewed() -> Change:
+    """Everything of the first pose but its stamp."""
+    return _Frozen("pose", "twist")
+
+
+FAULTS = (
+    Fault(
+        "pose-short-covariance",
+        "The pose's covariance has 35 values.",
+        ("rest-resources/pose-type",),
+        "rest",
+        altered(_AT, values(lambda value: value["pose"].update(covariance=value["pose"]["covariance"][:35]))),
+    ),
+    Fault(
+        "pose-without-child-frame",
+        "The pose lacks child_frame_id.",
+        ("rest-resources/pose-type",),
+        "rest",
+        altered(_AT, values(lambda value: value.pop("child_frame_id") and None)),
+    ),
+    Fault(
+        "pose-numbers-as-text",
+        "One pose in 50 has its x as a string.",
+        ("rest-resources/pose-type",),
+        "rest",
+        altered(_AT, values(lambda value: _position(value).update(x=str(_position(value)["x"]))), nth=50),
+    ),
+    Fault(
+        "pose-without-retry-after",
+        "Before the first odometry, the pose is 503 without Retry-After.",
+        ("rest-resources/pose-unavailable",),
+        "rest",
+        remembering(_NotYet),
+    ),
+    Fault(
+        "pose-quaternion-long",
+        "The orientation's quaternion is 1 percent too long.",
+        ("rest-resources/pose-quaternion",),
+        "rest",
+        altered(_AT, values(_lengthened)),
+    ),
+    Fault(
+        "pose-quaternion-zero",
+        "The orientation is four zeros.",
+        ("rest-resources/pose-quaternion",),
+        "rest",
+        altered(_AT, values(lambda value: value["pose"]["pose"].update(orientation=dict.fromkeys("xyzw", 0.0)))),
+    ),
+    Fault(
+        "pose-stamp-frozen",
+        "The pose's header is for ever the first one's.",
+        ("rest-resources/pose-stamp",),
+        "rest",
+        remembering(lambda: _Frozen("header")),
+    ),
+    Fault(
+        "pose-stamp-backwards",
+        "Each fifth pose has a stamp a second back.",
+        ("rest-resources/pose-stamp",),
+        "rest",
+        remembering(_Backwards),
+    ),
+    Fault(
+        "pose-stale",
+        "The pose is for ever the first one, with a new stamp.",
+        ("rest-resources/pose-motion", "rest-resources/pose-rotation"),
+        "rest",
+        remembering(_renewed),
+    ),
+    Fault(
+        "pose-in-centimetres",
+        "The position is in centimetres.",
+        ("rest-resources/pose-motion",),
+        "rest",
+        altered(_AT, values(_scaled(100))),
+    ),
+    Fault(
+        "pose-mirrored",
+        "The position's x and y are swapped.",
+        ("rest-resources/pose-motion",),
+        "rest",
+        altered(_AT, values(_swapped)),
+    ),
+    Fault(
+        "pose-clockwise",
+        "The heading counts clockwise.",
+        ("rest-resources/pose-rotation",),
+        "rest",
+        altered(_AT, values(_turned(lambda yaw: -yaw))),
+    ),
+    Fault(
+        "pose-half-turn",
+        "The heading turns at half the rate.",
+        ("rest-resources/pose-rotation",),
+        "rest",
+        altered(_AT, values(_turned(lambda yaw: yaw / 2))),
+    ),
+    Fault(
+        "odometry-in-degrees",
+        "The odometry's turning rate is in degrees per second.",
+        ("rest-resources/velocity-odometry",),
+        "rest",
+        altered(_AT, values(_in_degrees)),
+    ),
+    Fault(
+        "pose-gone",
+        "There is no pose: 404.",
+        ("rest-resources/pose-type",),
+        "rest",
+        instead(_AT, problem(404, "there is no pose")),
+    ),
+    Fault(
+        "pose-no-content",
+        "The pose is 204.",
+        ("rest-resources/pose-type",),
+        "rest",
+        instead(_AT, plain(204)),
+    ),
+)

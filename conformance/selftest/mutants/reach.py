@@ -1,0 +1,82 @@
+"""Robots of which an interface is not there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from conformance.selftest.mutants.changes import instead, plain
+from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.proxy import HangUpError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.selftest.proxy import Change
+    from conformance.selftest.wire import Answer, Ask
+
+_REST_CLASSES = ("rest-resources", "rest-delivery", "http", "safety", "equivalence", "strict-input")
+_LOST = plain(404, b"<html><body>It works!</body></html>", "text/html")
+
+
+def _hung_up() -> Change:
+    def change(ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
+        if ask.side == "rest":
+            raise HangUpError
+        return forward(ask)
+
+    return change
+
+
+def _service(name: str) -> Callable[[Ask], bool]:
+    return lambda ask: ask.side == "soap" and name in ask.path
+
+
+def _nothing_there() -> Change:
+    def change(ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:  # noqa: ARG001 - a change has a way forward
+        if ask.side == "rest":
+            raise HangUpError
+        return _LOST(ask)
+
+    return change
+
+
+FAULTS = (
+    *(
+        Fault(
+            f"rest-silent-{name}",
+            f"REST closes every connection without an answer (seen by class {name}).",
+            (f"{name}/reachable",),
+            "rest",
+            _hung_up,
+        )
+        for name in _REST_CLASSES
+    ),
+    Fault(
+        "publishers-elsewhere",
+        "Nothing is at the address of the publishers service but somebody else's web server.",
+        ("soap-delivery/reachable", "equivalence/reachable"),
+        "soap",
+        instead(_service("publisher"), _LOST),
+    ),
+    Fault(
+        "subscribers-elsewhere",
+        "Nothing is at the address of the subscribers service but somebody else's web server.",
+        ("soap-subscribers/reachable", "strict-input/reachable"),
+        "soap",
+        instead(_service("subscriber"), _LOST),
+    ),
+    Fault(
+        "soap-elsewhere",
+        "No SOAP service is where it should be.",
+        ("soap-basic-profile/reachable",),
+        "soap",
+        instead(_service(""), _LOST),
+    ),
+    Fault(
+        "nothing-elsewhere",
+        "REST hangs up, and SOAP is somebody else's web server.",
+        ("xml-security/reachable",),
+        "both",
+        _nothing_there,
+    ),
+)

@@ -1,0 +1,306 @@
+"""Robots that are dangerous: they go on, go too fast, or start by themselves."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from conformance.selftest.mutants.changes import (
+    GOAL,
+    LINEAR,
+    VELOCITY,
+    altered,
+    inputs,
+    parsed,
+    plain,
+    rest,
+    rewritten,
+    success,
+    values,
+)
+from conformance.selftest.mutants.goal_memory import active
+from conformance.selftest.mutants.input_effects import drive, goal_ahead, sent
+from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.wire import Ask
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.selftest.wire import Answer
+
+    Forward = Callable[[Ask], Answer]
+
+_PUT = rest("PUT", VELOCITY)
+_PUTS = rest("PUT", VELOCITY, LINEAR)
+_DELETE = rest("DELETE", GOAL)
+_ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+_AXES = (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y"))
+
+
+def moving(ask: Ask) -> bool:
+    """Whether a velocity is asked for that is not zero."""
+    value = parsed(ask.body)
+    try:
+        return bool(value["linear"]["x"] or value["angular"]["z"])
+    except (TypeError, KeyError):
+        return False
+
+
+class _Relentless:
+    """A velocity is renewed by the robot itself, for ten seconds, until another one comes."""
+
+    def __init__(self) -> None:
+        self._turn = 0
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        if _PUT(ask) or rest("PUT", GOAL)(ask):
+            self._turn += 1
+        answer = forward(ask)
+        if _PUT(ask) and success(answer) and moving(ask):
+            threading.Thread(target=self._renew, args=(self._turn, ask.copy(), forward), daemon=True).start()
+        return answer
+
+    def _renew(self, turn: int, ask: Ask, forward: Forward) -> None:
+        until = time.monotonic() + 10
+        value = parsed(ask.body)
+        while time.monotonic() < until:
+            time.sleep(0.15)
+            if self._turn != turn:
+                return
+            try:
+                sent(ask, forward, "PUT", VELOCITY, value)
+            except Exception:  # noqa: BLE001 - the run may be over
+                return
+
+
+class _ShortOfBreath:
+    """A velocity ends after 0.15 s."""
+
+    def __init__(self) -> None:
+        self._turn = 0
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        answer = forward(ask)
+        if _PUT(ask) and success(answer):
+            self._turn += 1
+            threading.Thread(target=self._end, args=(self._turn, ask.copy(), forward), daemon=True).start()
+        return answer
+
+    def _end(self, turn: int, ask: Ask, forward: Forward) -> None:
+        time.sleep(0.15)
+        if self._turn == turn:
+            try:
+                drive(ask, forward, 0.0)
+            except Exception:  # noqa: BLE001 - the run may be over
+                return
+
+
+class _Once:
+    """The same velocity again is answered, and not passed on."""
+
+    def __init__(self) -> None:
+        self._last: Any = None
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        if _PUT(ask):
+            value = parsed(ask.body)
+            if value is not None and value == self._last and moving(ask):
+                return plain(204)(ask)
+            answer = forward(ask)
+            self._last = value if success(answer) else self._last
+            return answer
+        return forward(ask)
+
+
+class _SlowCancel:
+    """A cancelled goal is gone at once, and the robot drives on for three seconds."""
+
+    def __init__(self) -> None:
+        self._until = 0.0
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        gone = time.monotonic() < self._until
+        if _DELETE(ask) and not gone and active(forward, ask) is not None:
+            self._until = time.monotonic() + 3.0
+            threading.Thread(target=self._later, args=(ask.copy(), forward), daemon=True).start()
+            return plain(204)(ask)
+        if gone and rest("GET DELETE", GOAL)(ask):
+            body = b'{"status": 404, "detail": "there is no goal"}'
+            return plain(404, body, "application/problem+json")(ask)
+        return forward(ask)
+
+    def _later(self, ask: Ask, forward: Forward) -> None:
+        time.sleep(3.0)
+        try:
+            sent(ask, forward, "DELETE", GOAL)
+        except Exception:  # noqa: BLE001 - the run may be over
+            return
+
+
+def _second_wind(ask: Ask, forward: Forward) -> Answer:
+    """A second after its goal was cancelled, the robot drives again."""
+    answer = forward(ask)
+    if _DELETE(ask) and answer.status == 204:
+        later = ask.copy()
+
+        def again() -> None:
+            try:
+                goal_ahead(later, forward, 0.8)
+            except Exception:  # noqa: BLE001 - the run may be over
+                return
+
+        threading.Timer(1.0, again).start()
+    return answer
+
+
+def _clamped(twist: Any) -> None:
+    for part, axis, limit in (("linear", "x", 0.25), ("angular", "z", 1.0)):
+        value = twist[part][axis]
+        if isinstance(value, int | float):
+            twist[part][axis] = max(-limit, min(limit, value))
+
+
+def _clamped_vector(vector: Any) -> None:
+    if isinstance(vector.get("x"), int | float):
+        vector["x"] = max(-0.25, min(0.25, vector["x"]))
+
+
+def _two_wheeled(twist: Any) -> None:
+    for part, axis in _AXES:
+        if isinstance(twist[part][axis], int | float):
+            twist[part][axis] = 0.0
+
+
+def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
+    def apply(value: Any) -> None:
+        try:
+            edit(value)
+        except (TypeError, KeyError, AttributeError):
+            return
+
+    return apply
+
+
+def _too_fast(twist: Any) -> None:
+    """What is measured is four times what is driven, above a crawl."""
+    for part, axis in (("linear", "x"), ("angular", "z")):
+        if abs(twist[part][axis]) > 0.15:
+            twist[part][axis] *= 4
+
+
+def _stopping(ask: Ask, forward: Forward) -> Answer:
+    """A refused velocity stops the robot."""
+    answer = forward(ask)
+    if _PUTS(ask) and answer.status in {400, 422}:
+        drive(ask, forward, 0.0)
+    return answer
+
+
+class _Stubborn:
+    """A velocity of zero is answered, and the velocity before it goes on for three seconds."""
+
+    def __init__(self) -> None:
+        self._last: Any = None
+        self._turn = 0
+
+    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+        """See proxy.Change."""
+        if not _PUT(ask):
+            return forward(ask)
+        self._turn += 1
+        if moving(ask):
+            answer = forward(ask)
+            self._last = parsed(ask.body) if success(answer) else self._last
+            return answer
+        if self._last is None or not _zero(parsed(ask.body)):
+            return forward(ask)
+        last, self._last = self._last, None
+        threading.Thread(target=self._go_on, args=(self._turn, last, ask.copy(), forward), daemon=True).start()
+        return plain(204)(ask)
+
+    def _go_on(self, turn: int, last: Any, ask: Ask, forward: Forward) -> None:
+        until = time.monotonic() + 3
+        while time.monotonic() < until and self._turn == turn:
+            try:
+                sent(ask, forward, "PUT", VELOCITY, last)
+            except Exception:  # noqa: BLE001 - the run may be over
+                return
+            time.sleep(0.15)
+
+
+def _zero(value: Any) -> bool:
+    try:
+        return not any(value[part][axis] for part in ("linear", "angular") for axis in "xyz")
+    except (TypeError, KeyError):
+        return False
+
+
+def _torn_drive() -> Callable[[str, bytes, Forward], None]:
+    """A request that ends in the middle is carried out with what had come."""
+
+    def torn(side: str, _got: bytes, forward: Forward) -> None:
+        if side == "rest":
+            drive(Ask("rest", "PUT", VELOCITY), forward, 0.2)
+
+    return torn
+
+
+def _unchanged() -> Callable[[Ask, Forward], Answer]:
+    return lambda ask, forward: forward(ask)
+
+
+def _fault(name: str, says: str, ids: tuple[str, ...], make: Any, **more: Any) -> Fault:
+    return Fault(name, says, tuple(f"safety/{id_}" for id_ in ids), "rest", make, **more)
+
+
+FAULTS = (
+    _fault("safety-relentless", "A velocity holds for ten seconds.", ("watchdog",), _Relentless),
+    _fault("safety-short-of-breath", "A velocity holds for 0.15 s.", ("hold",), _ShortOfBreath),
+    _fault("safety-no-renewal", "The same velocity again does not renew it.", ("renewal",), _Once),
+    _fault(
+        "safety-no-stop",
+        "A velocity of zero is answered, and the robot goes on for three seconds.",
+        ("stop",),
+        _Stubborn,
+    ),
+    _fault(
+        "safety-clamped",
+        "A velocity beyond the limits is cut to them.",
+        ("limits-refused",),
+        rewritten(
+            _PUTS, inputs(_guarded(lambda value: _clamped(value) if "linear" in value else _clamped_vector(value)))
+        ),
+    ),
+    _fault(
+        "safety-unactuated-ignored",
+        "Components that the robot does not have are ignored.",
+        ("unactuated-refused",),
+        rewritten(_PUT, inputs(_guarded(_two_wheeled))),
+    ),
+    _fault(
+        "safety-too-fast",
+        "The robot drives at four times its speed.",
+        ("limits-hold",),
+        altered(rest("GET", VELOCITY), values(_too_fast)),
+    ),
+    _fault("safety-refused-stops", "A refused velocity stops the robot.", ("refused-keeps",), lambda: _stopping),
+    _fault("safety-slow-cancel", "After DELETE the robot drives on for three seconds.", ("cancel",), _SlowCancel),
+    _fault(
+        "safety-second-wind", "A second after DELETE the robot drives again.", ("cancel-stays",), lambda: _second_wind
+    ),
+    _fault(
+        "safety-torn-drives",
+        "A request that ends in the middle moves the robot.",
+        ("client-vanished",),
+        _unchanged,
+        torn=_torn_drive,
+    ),
+    _fault(
+        "safety-one-at-a-time",
+        "A request that is never completed keeps all others waiting.",
+        ("half-request",),
+        _unchanged,
+        serial=True,
+    ),
+)

@@ -1,0 +1,311 @@
+"""Robots whose WSDL is not the contract's, or breaks WS-I Basic Profile 1.1."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from lxml import etree
+
+from conformance.selftest.mutants.changes import TNS, altered, named, plain, text, tree, wsdls
+from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.proxy import HangUpError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.selftest.wire import Answer, Ask
+
+    Forward = Callable[[Ask], Answer]
+
+_WSDL = "http://schemas.xmlsoap.org/wsdl/"
+_XSD = "http://www.w3.org/2001/XMLSchema"
+_SOAP = "http://schemas.xmlsoap.org/wsdl/soap/"
+_W, _S, _X = f"{{{_WSDL}}}", f"{{{_SOAP}}}", f"{{{_XSD}}}"
+
+
+def _description(ask: Ask) -> bool:
+    return wsdls(ask) and ask.query.lower() == "wsdl"
+
+
+def _edited(edit: Callable[[Any], object]) -> Callable[[], Any]:
+    """Alter the WSDL; ``edit`` gets its root."""
+    return altered(_description, tree(edit))
+
+
+def _typed(edit: Callable[[Any], object]) -> Callable[[], Any]:
+    """Alter schemas, inline or in documents of their own; ``edit`` gets each schema that declares something."""
+
+    def apply(root: Any) -> None:
+        for schema in root.iter(f"{_X}schema"):
+            if len(schema) and schema.find(f"{_X}import") is None:
+                edit(schema)
+
+    return altered(wsdls, tree(apply))
+
+
+def _all(path: str, edit: Callable[[Any], object]) -> Callable[[Any], None]:
+    def apply(root: Any) -> None:
+        for node in root.findall(path):
+            edit(node)
+
+    return apply
+
+
+def _first(path: str, edit: Callable[[Any], object]) -> Callable[[Any], None]:
+    def apply(root: Any) -> None:
+        node = root.find(path)
+        if node is not None:
+            edit(node)
+
+    return apply
+
+
+def _set(name: str, value: str) -> Callable[[Any], None]:
+    return lambda node: node.set(name, value)
+
+
+def _removed(node: Any) -> None:
+    node.getparent().remove(node)
+
+
+def _twice(node: Any) -> None:
+    node.addnext(etree.fromstring(etree.tostring(node)))
+
+
+def _broken_import(ask: Ask, forward: Forward) -> Answer:
+    """The documents that the WSDL refers to are not there."""
+    answer = forward(ask)
+    if _description(ask):
+        imported = f'<x:schema xmlns:x="{_XSD}"><x:import namespace="{TNS}" schemaLocation="gone.xsd"/></x:schema>'
+        body = re.sub(rb"<([\w]+:)?schema\b.*</([\w]+:)?schema>", imported.encode(), answer.body, flags=re.DOTALL)
+        answer.body = body
+    elif wsdls(ask) or ask.path.endswith("gone.xsd"):
+        return plain(404, b"gone", "text/plain")(ask)
+    return answer
+
+
+def _operation_lost(root: Any) -> None:
+    for node in (root.find(_OPERATION), root.find(f"{_BINDING}/{_W}operation")):
+        _removed(node)
+
+
+def _typed_part(node: Any) -> None:
+    node.attrib.pop("element", None)
+    node.set("type", f"{_prefix(node)}:deliveryRequestMessage")
+
+
+def _prefix(node: Any) -> str:
+    return next((key for key, value in node.nsmap.items() if key and "soap.turtlebot" in value), "tns")
+
+
+def _import_in_types(root: Any) -> None:
+    types = root.find(f"{_W}types")
+    made = etree.Element(f"{_X}import")
+    made.set("namespace", "http://soap.turtlebot.mybot.org/")
+    types.insert(0, made)
+
+
+def _strange(root: Any) -> None:
+    etree.SubElement(root, f"{_W}robot").set("name", "turtlebot")
+
+
+def _same_element(root: Any) -> None:
+    parts = [part for part in root.iter(f"{_W}part") if not part.get("element", "").endswith("Response")]
+    if len(parts) > 1:
+        parts[1].set("element", parts[0].get("element"))
+
+
+def _two_parts(root: Any) -> None:
+    for message in root.findall(f"{_W}message")[:1]:
+        second = etree.SubElement(message, f"{_W}part")
+        second.set("name", "more")
+        second.set("element", message[0].get("element"))
+    for body in list(root.iter(f"{_S}body"))[:1]:
+        body.set("parts", "parameters more")
+
+
+def _soap12(answer: Answer) -> None:
+    answer.body = answer.body.replace(_SOAP.encode(), b"http://schemas.xmlsoap.org/wsdl/soap12/")
+
+
+def _latin(answer: Answer) -> None:
+    body = re.sub(rb"^\s*<\?xml.*?\?>", b"", answer.body)
+    answer.body = b'<?xml version="1.0" encoding="ISO-8859-1"?><!-- \xe9 -->' + body
+    answer.put("Content-Type", "text/xml; charset=iso-8859-1")
+
+
+def _first_double(value: str) -> Callable[[Any], None]:
+    def edit(schema: Any) -> None:
+        for node in schema.iter(f"{_X}element"):
+            if node.get("type", "").endswith("double"):
+                node.set("type", re.sub("double", value, node.get("type")))
+                return
+
+    return edit
+
+
+def _reordered(schema: Any) -> None:
+    for sequence in schema.iter(f"{_X}sequence"):
+        if len(sequence) > 2:
+            sequence.append(sequence[0])
+            return
+
+
+def _optional(schema: Any) -> None:
+    for sequence in schema.iter(f"{_X}sequence"):
+        if len(sequence) > 2:
+            sequence[0].set("minOccurs", "0")
+            return
+
+
+def _silent(ask: Ask, forward: Forward) -> Answer:
+    if wsdls(ask):
+        raise HangUpError
+    return forward(ask)
+
+
+def _elsewhere(answer: Answer) -> None:
+    answer.body = re.sub(rb'location="http://[^"]*"', b'location="http://127.0.0.1:9/turtlesim"', answer.body)
+
+
+def _inline_no_target(root: Any) -> None:
+    """A schema of its own in wsdl:types, which declares an element in no namespace at all."""
+    for schema in named(root, "schema")[:1]:
+        made = etree.Element(f"{_X}schema")
+        etree.SubElement(made, f"{_X}element").set("name", "homeless")
+        schema.addnext(made)
+
+
+def _fault(name: str, says: str, id_: str, make: Any) -> Fault:
+    return Fault(name, says, (f"describe/{id_}",), "soap", make)
+
+
+_OPERATION = f"{_W}portType/{_W}operation"
+_BINDING = f"{_W}binding"
+_TRANSPORT = f"{_BINDING}/{_S}binding"
+
+FAULTS = (
+    _fault(
+        "wsdl-gone",
+        "There is no WSDL: 404.",
+        "wsdl",
+        lambda: lambda ask, forward: plain(404)(ask) if wsdls(ask) else forward(ask),
+    ),
+    _fault("wsdl-silent", "Asked for its WSDL, the robot hangs up.", "wsdl", lambda: _silent),
+    _fault("wsdl-broken", "The WSDL is not closed.", "wsdl", altered(_description, text(r"</[\w:]+>\s*$", ""))),
+    _fault("wsdl-import-gone", "What the WSDL imports is not there.", "wsdl", lambda: _broken_import),
+    _fault(
+        "wsdl-service-name",
+        "The service has another name.",
+        "wsdl-names",
+        _edited(_all(f"{_W}service", _set("name", "TurtlebotOfficeService"))),
+    ),
+    _fault(
+        "wsdl-port-name",
+        "The port has another name.",
+        "wsdl-names",
+        _edited(_all(f"{_W}service/{_W}port", _set("name", "Port"))),
+    ),
+    _fault(
+        "wsdl-namespace",
+        "The target namespace is the second listing's.",
+        "wsdl-names",
+        _edited(_set("targetNamespace", "http://ros-ws.org")),
+    ),
+    _fault(
+        "wsdl-operation-lost",
+        "The WSDL lacks an operation.",
+        "wsdl-operations",
+        _edited(_operation_lost),
+    ),
+    _fault(
+        "wsdl-part-name",
+        "A message's part has another name.",
+        "wsdl-operations",
+        _edited(_all(f"{_W}message/{_W}part", _set("name", "body"))),
+    ),
+    _fault("wsdl-float", "A double is a float in the schema.", "wsdl-types", _typed(_first_double("float"))),
+    _fault("wsdl-order", "The schema has its elements in another order.", "wsdl-types", _typed(_reordered)),
+    _fault("wsdl-optional", "An element is optional in the schema.", "wsdl-types", _typed(_optional)),
+    _fault(
+        "wsdl-action",
+        "wsam:Action is something else.",
+        "wsdl-action",
+        altered(_description, text(r'(:Action=["\'])[^"\']*', r"\1urn:drive")),
+    ),
+    _fault("wsdl-address", "The address in the WSDL leads nowhere.", "wsdl-address", altered(_description, _elsewhere)),
+    _fault("wsdl-import-in-types", "xsd:import stands in wsdl:types itself.", "wsdl-R2003", _edited(_import_in_types)),
+    _fault("wsdl-strange-element", "The WSDL has an element that WSDL does not know.", "wsdl-R2028", _edited(_strange)),
+    _fault(
+        "wsdl-no-target",
+        "A schema has no targetNamespace.",
+        "wsdl-R2105",
+        altered(_description, tree(_inline_no_target)),
+    ),
+    _fault("wsdl-two-parts", "A body names two parts.", "wsdl-R2201", _edited(_two_parts)),
+    _fault(
+        "wsdl-type-part",
+        "A part has a type in place of an element.",
+        "wsdl-R2204",
+        _edited(_first(f"{_W}message/{_W}part", _typed_part)),
+    ),
+    _fault(
+        "wsdl-part-of-nothing",
+        "A part refers to an element that does not exist.",
+        "wsdl-R2206",
+        _edited(_first(f"{_W}message/{_W}part", lambda node: node.set("element", f"{_prefix(node)}:NothingAtAll"))),
+    ),
+    _fault(
+        "wsdl-operation-twice", "A port type has an operation twice.", "wsdl-R2304", _edited(_first(_OPERATION, _twice))
+    ),
+    _fault("wsdl-soap12", "The binding is one of SOAP 1.2.", "wsdl-R2401", altered(_description, _soap12)),
+    _fault(
+        "wsdl-no-transport",
+        "The binding names no transport.",
+        "wsdl-R2701",
+        _edited(_all(_TRANSPORT, lambda node: node.attrib.pop("transport", None))),
+    ),
+    _fault(
+        "wsdl-smtp",
+        "The transport is SMTP.",
+        "wsdl-R2702",
+        _edited(_all(_TRANSPORT, _set("transport", "http://schemas.xmlsoap.org/soap/smtp"))),
+    ),
+    _fault(
+        "wsdl-mixed-styles",
+        "One operation is of style rpc.",
+        "wsdl-R2705",
+        _edited(_first(f"{_BINDING}/{_W}operation/{_S}operation", _set("style", "rpc"))),
+    ),
+    _fault(
+        "wsdl-encoded",
+        "A body is encoded.",
+        "wsdl-R2706",
+        _edited(_first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("use", "encoded"))),
+    ),
+    _fault("wsdl-same-signature", "Two operations have the same element.", "wsdl-R2710", _edited(_same_element)),
+    _fault(
+        "wsdl-body-namespace",
+        "A body has a namespace attribute.",
+        "wsdl-R2716",
+        _edited(
+            _first(
+                f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("namespace", "http://soap.turtlebot.mybot.org/")
+            )
+        ),
+    ),
+    _fault(
+        "wsdl-binding-short",
+        "The binding lacks an operation of its port type.",
+        "wsdl-R2718",
+        _edited(_first(f"{_BINDING}/{_W}operation", _removed)),
+    ),
+    _fault(
+        "wsdl-old-schema",
+        "Types are described in XML Schema of 1999.",
+        "wsdl-R2801",
+        altered(wsdls, text(re.escape(_XSD), "http://www.w3.org/1999/XMLSchema")),
+    ),
+    _fault("wsdl-latin", "The WSDL is ISO 8859-1.", "wsdl-R4003", altered(_description, _latin)),
+)

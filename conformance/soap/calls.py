@@ -1,0 +1,115 @@
+"""Asking a service, and what an answer comes to: taken, refused, or neither."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from conformance.documents.xml_node import Node
+from conformance.soap.envelope import Envelope, Fault, NotSoapError, envelope, read
+
+if TYPE_CHECKING:
+    from conformance.soap.service import SoapService
+    from conformance.transport.exchange import Exchange
+
+_SHOWN = 200
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a service answered.
+
+    Attributes:
+        exchange: request and response.
+        envelope: the message in the response, or None.
+        problem: why there is no message; empty where there is one.
+    """
+
+    exchange: Exchange
+    envelope: Envelope | None
+    problem: str
+
+    @property
+    def status(self) -> int:
+        """HTTP status."""
+        return self.exchange.response.status if self.exchange.response else 0
+
+    @property
+    def fault(self) -> Fault | None:
+        """The fault, or None."""
+        return self.envelope.fault if self.envelope else None
+
+    @property
+    def code(self) -> str:
+        """The standard code of the fault (SOAP 1.1, 4.4.1); empty without a fault, or with a code of another kind."""
+        return self.fault.standard if self.fault else ""
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the answer says that all is well: 2xx, and no fault."""
+        return 200 <= self.status < 300 and self.fault is None  # noqa: PLR2004 - RFC 9110 15.3
+
+    @property
+    def taken(self) -> bool:
+        """Whether the request was accepted: success, told by a message. A page in its place is none."""
+        return self.succeeded and self.envelope is not None
+
+    @property
+    def refused(self) -> bool:
+        """Whether the request was refused: by a fault, or by 4xx."""
+        return self.fault is not None or 400 <= self.status < 500  # noqa: PLR2004 - RFC 9110 15.5
+
+    @property
+    def payload(self) -> str | None:
+        """Tag of the first child of the response's Body; None without one."""
+        first = self.envelope.first if self.envelope else None
+        return None if first is None else str(first.tag)
+
+    @property
+    def told(self) -> str:
+        """What came, in words for a finding."""
+        came = f"status {self.status}"
+        if self.fault is not None:
+            return f"{came}, fault {self.fault.code or '(no code)'}: {self.fault.string[:_SHOWN]!r}"
+        if self.envelope is None:
+            return f"{came}, {self.problem}"
+        return f"{came}, {self.payload or 'an empty Body'}"
+
+
+def read_exchange(exchange: Exchange) -> Answer:
+    """What an exchange comes to."""
+    if exchange.response is None:
+        return Answer(exchange, None, exchange.problem)
+    if not exchange.response.body:
+        return Answer(exchange, None, "an empty body")
+    try:
+        return Answer(exchange, read(exchange.response.body), "")
+    except NotSoapError as error:
+        return Answer(exchange, None, str(error))
+
+
+def ask(service: SoapService, message: Node | bytes | str, **how: Any) -> Answer:
+    """Send a message and read the answer.
+
+    Args:
+        service: whom to ask.
+        message: an Envelope as a node, or a document as it is.
+        how: as SoapService.post().
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    if isinstance(message, Node):
+        message = message.written()
+    elif isinstance(message, str):
+        message = message.encode()
+    return read_exchange(service.post(message, **how))
+
+
+def call(service: SoapService, *payload: Node, headers: tuple[Node, ...] | None = None, **how: Any) -> Answer:
+    """Ask with an envelope of the given children of Body and Header.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    return ask(service, envelope(payload, headers), **how)

@@ -1,0 +1,108 @@
+"""Messages that a robot takes: what mutations start from, and what shows that it still answers.
+
+A contract may limit values beyond its schema. So a message is not believed to be valid before the robot has taken it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+from conformance.documents.xml_names import XSD, XSI, clark, namespace
+from conformance.documents.xsd_lexical import FLOATS, INTEGERS, bounds
+from conformance.soap import delivery_messages as paper
+from conformance.soap.calls import call
+from conformance.soap.messages import ordinary, simple_leaves, with_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conformance.documents.wsdl import Operation
+    from conformance.documents.xml_node import Node
+    from conformance.documents.xsd_shapes import Element
+    from conformance.soap.service import SoapService
+
+# Whole numbers tried where a contract takes only some, such as codes.
+_NUMBERS: Final = (0, 1, 2, 3, 4, 5)
+
+
+def example(service: SoapService, operation: Operation) -> Node | None:
+    """A message that the robot takes for the operation, found once; None where it takes none of those tried.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+        DescriptionError: the contract cannot be used.
+    """
+    if operation.name not in service.examples:
+        service.examples[operation.name] = _found(service, operation)
+    return service.examples[operation.name]
+
+
+def _found(service: SoapService, operation: Operation) -> Node | None:
+    declared = service.contract.shape(operation.request) if operation.request else None
+    if declared is None:
+        return None
+    tried: set[bytes] = set()
+    for candidate in candidates(service, operation, declared):
+        document = candidate.written()
+        if document not in tried and call(service, candidate).taken:
+            return candidate
+        tried.add(document)
+    return None
+
+
+def candidates(service: SoapService, operation: Operation, declared: Element) -> Iterator[Node]:
+    """Messages of an operation to try, likeliest first, at least one.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    if service.contract.target_namespace == paper.NAMESPACE:
+        yield from paper.examples(service, operation)
+    for optional in (False, True):
+        yield ordinary(declared, optional=optional)
+    full = ordinary(declared, optional=True)
+    for number in _NUMBERS:
+        made = full
+        for path, simple in simple_leaves(declared, full):
+            if simple.builtin in FLOATS and not simple.enumeration:
+                made = with_text(made, path, f"{number}.0")
+            elif simple.builtin in INTEGERS and not simple.enumeration:
+                low, high = bounds(simple)
+                made = with_text(made, path, str(min(max(number, low), high)))
+        yield made
+
+
+def quiet_example(service: SoapService) -> tuple[Operation, Node] | None:
+    """The first operation of the service with a message that the robot takes; None where there is none.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+        DescriptionError: the contract cannot be used.
+    """
+    # The operation that asks for least is the one that is least likely to be refused.
+    for operation in sorted(service.contract.operations, key=lambda item: _size(service, item)):
+        message = example(service, operation)
+        if message is not None:
+            return operation, message
+    return None
+
+
+def _size(service: SoapService, operation: Operation) -> int:
+    declared = service.contract.shape(operation.request) if operation.request else None
+    return len(ordinary(declared, optional=True).paths()) if declared is not None else 1000
+
+
+def typed(message: Node, declared: Element, payload: Node) -> bytes:
+    """A message in which each value of the payload says its type by xsi:type, as RPC-encoded SOAP did."""
+    made = payload
+    for path, simple in simple_leaves(declared, payload):
+        attribute = (clark(XSI, "type"), f"xs:{simple.builtin}")
+        if path:
+            made = made.changed(path, lambda leaf, new=attribute: (replace(leaf, attributes=(new,)),))  # type: ignore[misc] # a default argument binds the loop's value
+    if made == payload:
+        made = replace(payload, attributes=((clark(XSI, "type"), f"tns:{payload.name}"),))
+    body = message.children[-1]
+    whole = replace(message, children=(*message.children[:-1], replace(body, children=(made,))))
+    bindings = f' xmlns:xs="{XSD}" xmlns:tns="{namespace(payload.tag)}" xmlns:'.encode()
+    return whole.written().replace(b" xmlns:", bindings, 1)

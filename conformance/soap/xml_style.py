@@ -1,0 +1,202 @@
+"""One message in many spellings: what XML and its namespaces let a writer choose, and a reader must not care about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+from xml.sax.saxutils import escape
+
+from hypothesis import strategies as st
+
+from conformance.documents.xml_names import ENVELOPE, XSI, local, namespace
+
+if TYPE_CHECKING:
+    from hypothesis.strategies import SearchStrategy
+
+    from conformance.documents.xml_node import Node
+
+DECLARATIONS: Final = (
+    "",
+    '<?xml version="1.0"?>',
+    '<?xml version="1.0" encoding="UTF-8"?>\n',
+    "<?xml version='1.0' encoding='utf-8' standalone='yes'?>",
+)
+TEXTS: Final = ("plain", "cdata", "reference", "hexadecimal", "comment", "split")
+_PREFIXES: Final = ("soapenv", "S", "SOAP-ENV", "_", "x.1-y")
+
+
+@dataclass(frozen=True)
+class Syntax:
+    """The choices of a writer.
+
+    Attributes:
+        envelope_prefix: for SOAP's namespace; empty: it is the default namespace there.
+        payload_prefix: for the namespaces of the payload; empty: default namespaces.
+        early: whether prefixes are bound at the root rather than where they are used first.
+        declaration: XML declaration.
+        quote: around attribute values.
+        indent: whether elements stand on lines of their own.
+        comments: whether comments stand between elements.
+        text: how texts are written (TEXTS).
+        empty_tags: whether an empty element is written as one tag.
+        location: whether the payload carries xsi:schemaLocation.
+        header: whether there is an empty Header where the message has none.
+    """
+
+    envelope_prefix: str = "soapenv"
+    payload_prefix: str = "ns"
+    early: bool = True
+    declaration: str = ""
+    quote: str = '"'
+    indent: bool = False
+    comments: bool = False
+    text: str = "plain"
+    empty_tags: bool = True
+    location: bool = False
+    header: bool = False
+
+
+def single_changes() -> tuple[tuple[str, Syntax], ...]:
+    """Spellings that differ from the plain one in one choice each, with a name for the choice."""
+    return (
+        ("plain", Syntax()),
+        ("other prefixes", Syntax(envelope_prefix="S", payload_prefix="a")),
+        ("prefixes of other characters", Syntax(envelope_prefix="SOAP-ENV", payload_prefix="x.1-y")),
+        ("SOAP as default namespace", Syntax(envelope_prefix="")),
+        ("a default namespace on the wrapper, undone on its children", Syntax(payload_prefix="", early=False)),
+        ("namespaces bound where they are used", Syntax(early=False)),
+        *((f"declaration {text.strip()}", Syntax(declaration=text)) for text in DECLARATIONS[1:]),
+        ("single quotes", Syntax(quote="'")),
+        ("white space between elements", Syntax(indent=True)),
+        ("comments between elements", Syntax(comments=True)),
+        *((f"texts: {text}", Syntax(text=text)) for text in TEXTS[1:]),
+        ("start and end tags for empty elements", Syntax(empty_tags=False)),
+        ("xsi:schemaLocation", Syntax(location=True)),
+        ("an empty Header", Syntax(header=True)),
+    )
+
+
+def syntaxes() -> SearchStrategy[Syntax]:
+    """Any combination of choices."""
+    return st.builds(
+        Syntax,
+        envelope_prefix=st.sampled_from(("", *_PREFIXES)),
+        payload_prefix=st.sampled_from(("", "ns", "ns2", "_a", "tns")),
+        early=st.booleans(),
+        declaration=st.sampled_from(DECLARATIONS),
+        quote=st.sampled_from("\"'"),
+        indent=st.booleans(),
+        comments=st.booleans(),
+        text=st.sampled_from(TEXTS),
+        empty_tags=st.booleans(),
+        location=st.booleans(),
+        header=st.booleans(),
+    )
+
+
+@dataclass
+class _Writer:
+    syntax: Syntax
+    prefixes: dict[str, str] = field(default_factory=dict)
+
+    def prefix(self, space: str) -> str:
+        """The prefix of a namespace; the same one wherever it is asked for."""
+        if space not in self.prefixes:
+            given = self.syntax.envelope_prefix if space == ENVELOPE else self.syntax.payload_prefix
+            number = sum(1 for other in self.prefixes if other != ENVELOPE)
+            self.prefixes[space] = given if space == ENVELOPE or not given or not number else f"{given}{number}"
+        return self.prefixes[space]
+
+    def element(self, node: Node, bound: dict[str, str], depth: int, *, root: bool = False) -> str:
+        """Write an element; ``bound`` is what each prefix stands for here, the default namespace under an empty one."""
+        scope = dict(bound)
+        space = namespace(node.tag)
+        attributes = self._bindings(node, scope, root=root)
+        name = local(node.tag)
+        if space and self.prefix(space):
+            name = f"{self.prefix(space)}:{name}"
+        attributes += [
+            f"{self._attribute(key, scope, attributes)}={self._quoted(value)}" for key, value in node.attributes
+        ]
+        start = " ".join([name, *attributes])
+        line = "\n" + "  " * depth if self.syntax.indent else ""
+        note = "<!-- <a> & -- -->".replace(" -- ", " - ") if self.syntax.comments else ""
+        inside = "".join(f"{line}  {note}" + self.element(child, scope, depth + 1) for child in node.children)
+        inside += f"{note}{line}" if node.children else self._text(node.text)
+        if not inside and self.syntax.empty_tags:
+            return f"<{start}/>"
+        return f"<{start}>{inside}</{name}>"
+
+    def _bindings(self, node: Node, scope: dict[str, str], *, root: bool) -> list[str]:
+        wanted = {namespace(node.tag)}
+        if root and self.syntax.early:
+            wanted |= _all_namespaces(node)
+        made: list[str] = []
+        for space in sorted(wanted):
+            if not space:
+                # An unqualified element under a default namespace has to take it back.
+                if scope.get("") and not namespace(node.tag):
+                    scope[""] = ""
+                    made.append(f"xmlns={self._quoted('')}")
+                continue
+            prefix = self.prefix(space)
+            if scope.get(prefix) == space or (not prefix and space != namespace(node.tag)):
+                continue
+            scope[prefix] = space
+            made.append(f"xmlns{':' if prefix else ''}{prefix}={self._quoted(space)}")
+        if self.syntax.location and scope and namespace(node.tag) not in {"", ENVELOPE} and "xsi" not in scope:
+            scope["xsi"] = XSI
+            made.append(f"xmlns:xsi={self._quoted(XSI)}")
+            made.append(f"xsi:schemaLocation={self._quoted(namespace(node.tag) + ' nowhere.xsd')}")
+        return made
+
+    def _attribute(self, key: str, scope: dict[str, str], made: list[str]) -> str:
+        """The name of an attribute; a qualified one needs a prefix, whatever the default namespace is."""
+        space = namespace(key)
+        if not space:
+            return key
+        for prefix, bound in scope.items():
+            if prefix and bound == space:
+                return f"{prefix}:{local(key)}"
+        prefix = f"at{len(scope)}"
+        scope[prefix] = space
+        made.append(f"xmlns:{prefix}={self._quoted(space)}")
+        return f"{prefix}:{local(key)}"
+
+    def _quoted(self, value: str) -> str:
+        quote = self.syntax.quote
+        return quote + escape(value, {quote: "&#34;" if quote == '"' else "&#39;", "\n": "&#10;", "\t": "&#9;"}) + quote
+
+    def _text(self, text: str) -> str:
+        if not text:
+            return ""
+        half = len(text) // 2
+        forms = {
+            "cdata": f"<![CDATA[{text}]]>",
+            "reference": "".join(f"&#{ord(char)};" for char in text),
+            "hexadecimal": "".join(f"&#x{ord(char):X};" for char in text),
+            "comment": f"{escape(text)}<!-- 1 -->",
+            "split": f"{escape(text[:half])}<![CDATA[{text[half:]}]]>",
+        }
+        return forms.get(self.syntax.text, escape(text))
+
+
+def _all_namespaces(node: Node) -> set[str]:
+    found = {namespace(node.tag)}
+    for child in node.children:
+        found |= _all_namespaces(child)
+    return found
+
+
+def spell(message: Node, syntax: Syntax) -> str:
+    """Write a message (an Envelope) in one of its spellings."""
+    if syntax.header and not any(child.name == "Header" for child in message.children):
+        message = type(message)(
+            message.tag,
+            message.text,
+            (type(message)(f"{{{namespace(message.tag)}}}Header"), *message.children),
+            message.attributes,
+        )
+    before = "<!-- before -->" if syntax.comments else ""
+    after = "<!-- after -->" if syntax.comments else ""
+    return syntax.declaration + before + _Writer(syntax).element(message, {}, 0, root=True) + after

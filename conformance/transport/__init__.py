@@ -1,0 +1,1 @@
+"""One request and its answer: exchange, client, deadlines, raw sockets."""

@@ -1,0 +1,277 @@
+"""The HTTP client of the suite: every exchange bounded, recorded and shown to those who watch."""
+
+from __future__ import annotations
+
+import re
+import ssl
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import httpcore
+
+from conformance.transport.deadlines import MAX_ANSWER, DeadlineBackend, set_deadline, tls_context
+from conformance.transport.exchange import Exchange, Request, Response
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
+
+Headers = tuple[tuple[str, str], ...]
+# An endpoint that has let this many deadlines pass is not asked again: a hang costs its deadline twice at most.
+_HANGS = 2
+# A server may close an idle connection at any time (RFC 9112 9.3.1): a request that met the end of one is sent again.
+# From a server that has kept connections open this often, so many closed ones are dropped requests, and told as such.
+_KEPT = 10
+_DROPS = 3
+
+
+class NoAnswerError(Exception):
+    """A request was sent and no HTTP response came.
+
+    Attributes:
+        exchange: the request, with ``problem`` saying what happened instead.
+        kind: "refused", "timeout", "closed", "garbage", "tls" or "unasked" (the endpoint hung before).
+    """
+
+    def __init__(self, exchange: Exchange, kind: str) -> None:
+        super().__init__(exchange.problem)
+        self.exchange = exchange
+        self.kind = kind
+
+
+@dataclass
+class Connection:
+    """What all clients of one run share.
+
+    Attributes:
+        timeout_s: deadline of one exchange.
+        ca_file: authorities to trust instead of the system's.
+        token: bearer token, or None.
+        request_rate: ceiling in requests per second, or None.
+        listeners: called with every exchange, also those without an answer.
+        sent: how many requests have been sent.
+    """
+
+    timeout_s: float = 10.0
+    ca_file: Path | None = None
+    token: str | None = None
+    request_rate: float | None = None
+    listeners: list[Callable[[Exchange], None]] = field(default_factory=list)
+    sent: int = 0
+    _next_slot: float = 0.0
+
+    def tls(self) -> ssl.SSLContext:
+        """See transport.tls_context."""
+        return tls_context(self.ca_file)
+
+    def take_slot(self) -> None:
+        """Wait until the rate ceiling lets one more request through, and count it."""
+        self.sent += 1
+        if not self.request_rate:
+            return
+        now = time.monotonic()
+        if self._next_slot > now:
+            time.sleep(self._next_slot - now)
+        self._next_slot = max(now, self._next_slot) + 1 / self.request_rate
+
+
+class HttpClient:
+    """Sends requests to one base URL.
+
+    Args:
+        base_url: where the interface is; its path is put in front of every path that is asked for.
+        connection: deadline, credentials, ceiling and listeners.
+    """
+
+    def __init__(self, base_url: str, connection: Connection) -> None:
+        self.base_url = base_url.rstrip("/")
+        self.connection = connection
+        parts = urlsplit(self.base_url)
+        self.scheme = parts.scheme
+        self.host = parts.hostname or ""
+        self.port = parts.port or (443 if parts.scheme == "https" else 80)
+        self.prefix = parts.path
+        self.authority = parts.netloc.rsplit("@", 1)[-1]
+        self._hangs: Counter[str] = Counter()
+        self._kept = 0
+        self._dropped = 0
+        self._pool = self._new_pool()
+
+    def _new_pool(self) -> httpcore.ConnectionPool:
+        return httpcore.ConnectionPool(
+            ssl_context=self.connection.tls() if self.scheme == "https" else None,
+            max_keepalive_connections=2,
+            keepalive_expiry=3.0,
+            network_backend=DeadlineBackend(),
+        )
+
+    def close(self) -> None:
+        """Close the connections that are open."""
+        self._pool.close()
+
+    def send(
+        self,
+        method: str,
+        path: str,
+        *,
+        headers: Iterable[tuple[str, str]] = (),
+        body: bytes = b"",
+        fresh: bool = False,
+        authorized: bool = True,
+        timeout_s: float | None = None,
+    ) -> Exchange:
+        """Send one request and wait for its whole answer.
+
+        Args:
+            method: any token.
+            path: target below the base URL, sent octet by octet as given.
+            headers: further fields, after Host; Accept: */* is added, and ("Accept", "") leaves it out.
+            body: octets; Content-Length is added for it, and for every PUT, POST and PATCH.
+            fresh: use a connection of its own, closed afterwards: nothing is ever sent twice.
+            authorized: whether to send the token, where there is one.
+            timeout_s: another deadline than the run's.
+
+        Raises:
+            NoAnswerError: no HTTP response came.
+        """
+        fields = self._fields(method, tuple(headers), body, close=fresh)
+        shown = tuple((name, value) for name, value in fields if name != "Connection")
+        sent = list(fields)
+        if authorized and self.connection.token and not any(name.lower() == "authorization" for name, _ in fields):
+            sent.append(("Authorization", f"Bearer {self.connection.token}"))
+            shown += (("Authorization", "Bearer $ROAAS_TOKEN"),)
+        request = Request(method, f"{self.scheme}://{self.authority}{self.prefix}{path}", shown, body)
+        endpoint = f"{method} {_shape(path)}"
+        if self._hangs[endpoint] >= _HANGS:
+            raise NoAnswerError(
+                Exchange(request, None, f"not asked: {endpoint} has not answered {_HANGS} times"), "unasked"
+            )
+        deadline = timeout_s or self.connection.timeout_s
+        try:
+            response = self._exchange(method, path, sent, body, deadline, fresh=fresh)
+        except NoAnswerError as none:
+            if none.kind == "timeout":
+                self._hangs[endpoint] += 1
+            exchange = Exchange(request, None, none.exchange.problem)
+            self._tell(exchange)
+            raise NoAnswerError(exchange, none.kind) from none
+        exchange = Exchange(request, response)
+        self._tell(exchange)
+        return exchange
+
+    def _tell(self, exchange: Exchange) -> None:
+        for listener in self.connection.listeners:
+            listener(exchange)
+
+    def _fields(self, method: str, headers: Headers, body: bytes, *, close: bool) -> Headers:
+        names = {name.lower() for name, _ in headers}
+        fields: list[tuple[str, str]] = [] if "host" in names else [("Host", self.authority)]
+        fields += headers
+        if "accept" not in names:
+            fields.append(("Accept", "*/*"))
+        needs_length = body or method in {"PUT", "POST", "PATCH"}
+        if needs_length and not names & {"content-length", "transfer-encoding"}:
+            fields.append(("Content-Length", str(len(body))))
+        if close:
+            fields.append(("Connection", "close"))
+        # An empty Accept given by the caller means: send none at all.
+        return tuple(pair for pair in fields if pair != ("Accept", ""))
+
+    def _exchange(
+        self, method: str, path: str, fields: list[tuple[str, str]], body: bytes, deadline: float, *, fresh: bool
+    ) -> Response:
+        url = httpcore.URL(
+            scheme=self.scheme.encode(),
+            host=self.host.encode("idna"),
+            port=self.port,
+            target=(self.prefix + path).encode("utf-8", "surrogateescape") or b"/",
+        )
+        request_headers = [(name.encode("latin-1"), value.encode("utf-8")) for name, value in fields]
+        opened: list[str] = []
+        for attempt in (1, 2):
+            self.connection.take_slot()
+            set_deadline(deadline)
+            opened.clear()
+            started = time.perf_counter()
+            pool = self._new_pool() if fresh or attempt > 1 else self._pool
+            try:
+                answer = pool.handle_request(
+                    httpcore.Request(
+                        method,
+                        url,
+                        headers=request_headers,
+                        content=body,
+                        extensions={
+                            "timeout": dict.fromkeys(("connect", "read", "write", "pool"), deadline),
+                            "trace": lambda event, _info: opened.append(event) if "connect_tcp" in event else None,
+                        },
+                    )
+                )
+                content = _read(answer)
+                self._kept += not opened
+                return Response(
+                    answer.status,
+                    tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in answer.headers),
+                    content,
+                    (time.perf_counter() - started) * 1000,
+                    answer.extensions.get("http_version", b"HTTP/1.1").decode("latin-1"),
+                )
+            except Exception as error:
+                none = _no_answer(error, deadline)
+                if none.kind == "closed" and not opened and attempt == 1 and not self._drops_requests():
+                    continue
+                raise none from error
+            finally:
+                if pool is not self._pool:
+                    pool.close()
+        raise AssertionError("unreachable: the second attempt returns or raises")
+
+    def _drops_requests(self) -> bool:
+        """Count a connection that ended with a request on it, and say whether that is this server's habit."""
+        self._dropped += 1
+        return self._kept >= _KEPT and self._dropped >= _DROPS
+
+
+def _read(answer: httpcore.Response) -> bytes:
+    chunks: list[bytes] = []
+    size = 0
+    try:
+        for chunk in answer.iter_stream():
+            size += len(chunk)
+            if size > MAX_ANSWER:
+                raise httpcore.RemoteProtocolError(f"an answer of more than {MAX_ANSWER} octets")
+            chunks.append(chunk)
+    finally:
+        answer.close()
+    return b"".join(chunks)
+
+
+def _no_answer(error: Exception, deadline: float) -> NoAnswerError:
+    """Sort what went wrong on the wire; anything that is no network error is the suite's own and is raised again."""
+    nothing = Request("", "")
+    text = str(error) or type(error).__name__
+    if isinstance(error, httpcore.TimeoutException):
+        return NoAnswerError(Exchange(nothing, None, f"no answer within {deadline:g} s"), "timeout")
+    if isinstance(error, httpcore.RemoteProtocolError):
+        if "disconnected" in text:
+            return NoAnswerError(Exchange(nothing, None, "connection closed without an answer"), "closed")
+        return NoAnswerError(Exchange(nothing, None, f"the answer is no HTTP: {text}"), "garbage")
+    if isinstance(error, httpcore.ConnectError):
+        kind = "tls" if "SSL" in text or "certificate" in text.lower() else "refused"
+        return NoAnswerError(Exchange(nothing, None, f"no connection: {text}"), kind)
+    if isinstance(error, ssl.SSLError):
+        return NoAnswerError(Exchange(nothing, None, f"no connection: {text}"), "tls")
+    if isinstance(error, httpcore.NetworkError | OSError):
+        return NoAnswerError(Exchange(nothing, None, f"connection broken: {text}"), "closed")
+    raise error
+
+
+def _shape(path: str) -> str:
+    """A path with its values taken out, so that one endpoint is one whatever it is asked with."""
+    return "/".join(
+        "*" if re.search(r"\d|%|NaN|Infinity", part) or len(part) > 40 else part  # noqa: PLR2004 - a long segment is a value
+        for part in path.split("?", 1)[0].split("/")
+    )

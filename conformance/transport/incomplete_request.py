@@ -1,0 +1,79 @@
+"""Requests that are never completed: begun on a socket by hand, then left open or broken off."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import struct
+from typing import TYPE_CHECKING, Final, Self
+
+from conformance.transport.client import NoAnswerError
+from conformance.transport.exchange import Exchange, Request
+
+if TYPE_CHECKING:
+    from conformance.transport.client import HttpClient
+
+# l_onoff 1, l_linger 0: close() sends RST instead of FIN.
+_RESET: Final = struct.pack("ii", 1, 0)
+
+
+class PartialRequest:
+    """One request of which a part has been sent.
+
+    Args:
+        client: the interface to send it to.
+        method, path: as for HttpClient.send().
+        sent: the octets of the body that are sent.
+        promised: Content-Length, or None for a chunked body whose last chunk never comes.
+        head_only: how many octets of the head to send, without any body; None for the whole request.
+
+    Raises:
+        NoAnswerError: there is no connection.
+    """
+
+    def __init__(
+        self,
+        client: HttpClient,
+        method: str,
+        path: str,
+        *,
+        sent: bytes = b"",
+        promised: int | None = None,
+        head_only: int | None = None,
+    ) -> None:
+        head = [f"{method} {client.prefix}{path} HTTP/1.1", f"Host: {client.authority}"]
+        if sent or promised:
+            head.append("Content-Type: application/json")
+        head.append("Transfer-Encoding: chunked" if promised is None and sent else f"Content-Length: {promised or 0}")
+        shown = "\r\n".join(head)
+        if client.connection.token:
+            head.append(f"Authorization: Bearer {client.connection.token}")
+        body = f"{len(sent):x}\r\n".encode() + sent + b"\r\n" if promised is None and sent else sent
+        octets = "\r\n".join(head).encode() + b"\r\n\r\n" + body
+        if head_only is not None:
+            octets = octets[:head_only]
+        url = f"{client.scheme}://{client.authority}{client.prefix}{path}"
+        self.request = Request(method, url, (), b"", f"{shown}\r\n\r\n".encode()[: len(octets)] + body)
+        client.connection.take_slot()
+        try:
+            self._socket = socket.create_connection((client.host, client.port), client.connection.timeout_s)
+            if client.scheme == "https":
+                self._socket = client.connection.tls().wrap_socket(self._socket, server_hostname=client.host)
+            self._socket.sendall(octets)
+        except OSError as error:
+            problem = f"no connection: {error}"
+            raise NoAnswerError(Exchange(self.request, None, problem), "refused") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.vanish()
+
+    def vanish(self, *, reset: bool = True) -> None:
+        """Break the connection off: by a reset, or by an end in the middle, as when a client's process is killed."""
+        with contextlib.suppress(OSError):
+            if reset:
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+        with contextlib.suppress(OSError):
+            self._socket.close()

@@ -1,0 +1,178 @@
+"""The judge: checks tell it what they saw, and it keeps the evidence, requirement by requirement."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from conformance.transport.exchange import Exchange
+
+# Findings of one requirement that are shown; more causes than this are the same story.
+MAX_FINDINGS = 5
+
+
+class RefutedError(AssertionError):
+    """A property does not hold: tells Hypothesis to look for a smaller case. The judge has the evidence already."""
+
+
+@dataclass
+class Finding:
+    """One cause for which a requirement is not met.
+
+    Attributes:
+        message: what was found.
+        expected: what the requirement asks for.
+        exchange: the smallest failing request with its answer, or None where none was sent.
+        seen: how often it was found.
+    """
+
+    message: str
+    expected: str
+    exchange: Exchange | None
+    seen: int = 1
+
+
+@dataclass
+class Evidence:
+    """What is known of one requirement.
+
+    Attributes:
+        cases: how many cases were judged.
+        findings: causes of failure, by cause.
+        skips: reasons why something could not be judged that had to be.
+        errors: reasons why judging broke off.
+        notes: remarks that change no verdict.
+        checks: names of the checks that judged it.
+        unclaimed: why it does not apply to a robot for which no classes were named.
+    """
+
+    cases: int = 0
+    findings: dict[str, Finding] = field(default_factory=dict)
+    skips: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    checks: set[str] = field(default_factory=set)
+    unclaimed: str = ""
+
+
+class Judge:
+    """Collects evidence from checks and observers.
+
+    Args:
+        known: ids of the requirements that there are.
+    """
+
+    def __init__(self, known: set[str]) -> None:
+        self.evidence: dict[str, Evidence] = {id_: Evidence() for id_ in sorted(known)}
+        self.check_name = ""
+        # What a check is about to risk: said before a hostile request, so that a robot that dies of it has failed it.
+        self.at_risk: tuple[str, ...] = ()
+
+    def check(
+        self,
+        requirement: str,
+        holds: bool,  # noqa: FBT001 - reads as a sentence: judge.check(id, answer.status == 200, ...)
+        exchange: Exchange | None,
+        expected: str,
+        *,
+        found: str = "",
+        cause: str = "",
+    ) -> bool:
+        """Judge one case, and go on whatever comes of it.
+
+        Args:
+            requirement: its id; one that the contract at hand does not have is ignored.
+            holds: whether the case meets it.
+            exchange: the evidence.
+            expected: what the requirement asks for here, in a few words.
+            found: what was found instead; by default what came.
+            cause: failures of the same cause are one finding; by default the texts without their numbers.
+
+        Returns:
+            ``holds``.
+        """
+        evidence = self.evidence.get(requirement)
+        if evidence is None:
+            return holds
+        evidence.cases += 1
+        evidence.checks.add(self.check_name)
+        if holds:
+            return True
+        message = found or (exchange.came if exchange else "not so")
+        key = cause or re.sub(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"", "#", f"{expected}|{message}")
+        known = evidence.findings.get(key)
+        if known is None:
+            if len(evidence.findings) < MAX_FINDINGS:
+                evidence.findings[key] = Finding(message, expected, exchange)
+            else:
+                next(iter(evidence.findings.values())).seen += 1
+            return False
+        known.seen += 1
+        if exchange and known.exchange and exchange.request.size < known.exchange.request.size:
+            known.message, known.expected, known.exchange = message, expected, exchange
+        return False
+
+    def require(
+        self,
+        requirement: str,
+        holds: bool,  # noqa: FBT001 - as check()
+        exchange: Exchange | None,
+        expected: str,
+        *,
+        found: str = "",
+        cause: str = "",
+    ) -> None:
+        """Judge one case of a property: like check(), but a case that fails ends the example.
+
+        Raises:
+            RefutedError: it does not hold.
+        """
+        if not self.check(requirement, holds, exchange, expected, found=found, cause=cause):
+            raise RefutedError(f"{requirement}: expected {expected}, found {found or (exchange and exchange.came)}")
+
+    def skip(self, requirement: str, reason: str) -> None:
+        """Say that something which had to be judged could not be, and why."""
+        self._say(requirement, reason, lambda evidence: evidence.skips)
+
+    def error(self, requirement: str, reason: str) -> None:
+        """Say that judging broke off, and why."""
+        self._say(requirement, reason, lambda evidence: evidence.errors)
+
+    def note(self, requirement: str, remark: str) -> None:
+        """Add a remark that changes no verdict."""
+        self._say(requirement, remark, lambda evidence: evidence.notes)
+
+    def unclaimed(self, requirement: str, reason: str) -> None:
+        """Say that the requirement does not apply: it needs an interface that nobody said was there."""
+        if requirement in self.evidence:
+            self.evidence[requirement].unclaimed = reason
+
+    def _say(self, requirement: str, text: str, where: Callable[[Evidence], list[str]]) -> None:
+        evidence = self.evidence.get(requirement)
+        if evidence is not None and text not in where(evidence):
+            where(evidence).append(text)
+
+    def refuted(self) -> dict[str, int]:
+        """How many failures each requirement that has any has seen so far."""
+        return {
+            id_: sum(finding.seen for finding in evidence.findings.values())
+            for id_, evidence in self.evidence.items()
+            if evidence.findings
+        }
+
+    def counts(self, ids: Iterable[str]) -> dict[str, int]:
+        """How many cases each of the requirements has."""
+        return {id_: self.evidence[id_].cases for id_ in ids if id_ in self.evidence}
+
+    def told(self, requirement: str) -> str:
+        """The findings of one requirement in words, with a command that shows each."""
+        lines = []
+        for finding in self.evidence[requirement].findings.values():
+            lines.append(f"{requirement}: expected {finding.expected}; found: {finding.message} (seen {finding.seen}x)")
+            if finding.exchange:
+                lines.append(f"  {finding.exchange.request.curl()[:2000]}")
+        return "\n".join(lines)

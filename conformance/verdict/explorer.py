@@ -1,0 +1,120 @@
+"""Hypothesis as the maker and shrinker of cases; the judge, not Hypothesis, keeps what was found."""
+
+from __future__ import annotations
+
+import time
+import zlib
+from typing import TYPE_CHECKING, Any
+
+from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
+from hypothesis.errors import Flaky
+from hypothesis.stateful import RuleBasedStateMachine, run_state_machine_as_test
+
+from conformance.transport.client import NoAnswerError
+from conformance.verdict.evidence import RefutedError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hypothesis.strategies import SearchStrategy
+
+    from conformance.verdict.effort import Effort
+
+
+class Explorer:
+    """Runs properties with cases that depend on nothing but the seed and the check's name.
+
+    Args:
+        run_seed: the run's seed.
+        name: of the check.
+        effort: how much to try.
+    """
+
+    def __init__(self, run_seed: int, name: str, effort: Effort) -> None:
+        self._run_seed = run_seed
+        self._name = name
+        self._effort = effort
+        self._count = 0
+
+    def __call__(self, strategy: SearchStrategy[Any], try_case: Callable[[Any], None], *, cases: int) -> None:
+        """Try ``try_case`` on values of ``strategy``; a case that fails is made smaller.
+
+        Args:
+            strategy: makes values.
+            try_case: sends requests and asks the judge; judge.require() ends it when a case fails.
+            cases: how many at standard effort.
+
+        Raises:
+            NoAnswerError: the robot did not answer.
+        """
+        until = time.monotonic() + self._effort.budget_s
+        silence: list[NoAnswerError] = []
+
+        def bounded(value: Any) -> None:
+            if time.monotonic() > until or silence:
+                return
+            try:
+                try_case(value)
+            except NoAnswerError as none:
+                silence.append(none)
+
+        prop = seed(self._next_seed())(self._settings(cases)(given(strategy)(bounded)))
+        _swallow_refuted(prop)
+        if silence:
+            raise silence[0]
+
+    def machine(self, factory: Callable[[], RuleBasedStateMachine], *, cases: int, steps: int) -> None:
+        """Run a state machine: ``cases`` walks of up to ``steps`` rules at standard effort.
+
+        Raises:
+            NoAnswerError: the robot did not answer.
+        """
+        # Walks are not made smaller: with a robot that moves, each try would cost seconds.
+        # Walks are not made smaller: with a robot that moves, each try would cost seconds.
+        chosen = settings(self._settings(cases), stateful_step_count=steps, phases=(Phase.generate,))
+        seeded: Any = seed(self._next_seed())(_Machine(factory))
+        _swallow_refuted(lambda: run_state_machine_as_test(seeded, settings=chosen))
+
+    def _next_seed(self) -> int:
+        self._count += 1
+        return zlib.crc32(f"{self._run_seed}/{self._name}/{self._count}".encode())
+
+    def _settings(self, cases: int) -> settings:
+        return settings(
+            max_examples=self._effort.cases(cases),
+            database=None,
+            deadline=None,
+            derandomize=False,
+            phases=(Phase.explicit, Phase.generate, Phase.shrink),
+            suppress_health_check=list(HealthCheck),
+            report_multiple_bugs=False,
+            print_blob=False,
+            verbosity=Verbosity.quiet,
+        )
+
+
+class _Machine:
+    """A factory that Hypothesis can put a seed on."""
+
+    def __init__(self, factory: Callable[[], RuleBasedStateMachine]) -> None:
+        self._factory = factory
+
+    def __call__(self) -> RuleBasedStateMachine:
+        return self._factory()
+
+
+def _swallow_refuted(run: Callable[[], object]) -> None:
+    """Run a property whose failures the judge has seen.
+
+    An intermittent failure does not come again when Hypothesis looks at it once more; it was one all the same.
+    """
+    try:
+        run()
+    except RefutedError:
+        return
+    except Flaky:
+        return
+    except BaseExceptionGroup as group:
+        _, rest = group.split((RefutedError, Flaky))
+        if rest is not None:
+            raise

@@ -1,0 +1,135 @@
+"""What one simulated user holds: its connections and clients; it performs arrivals and records them."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import gevent
+
+from loadtests.clients.endpoint import Endpoint
+from loadtests.clients.failures import CallError, answer_error
+from loadtests.clients.library import OrdinaryRest, OrdinarySoap
+from loadtests.clients.payloads import Values, variants
+from loadtests.clients.wire import Connection, Request, now_ns
+
+if TYPE_CHECKING:
+    from loadtests.clients.robot import Robot
+
+_DURATION = re.compile(rb"([\w-]+)\s*;[^,]*?dur\s*=\s*\"?([0-9.]+)")
+_OK = 200
+_REDIRECT = 300
+
+
+def server_ns(timing: bytes | None) -> int:
+    """The time that a robot says it spent (Server-Timing, W3C), in ns; -1 where it says nothing.
+
+    The metric called `total` if there is one, else the longest: metrics may overlap, so no sum is taken.
+    """
+    if not timing:
+        return -1
+    found = {name.lower(): float(value) for name, value in _DURATION.findall(timing) if value.count(b".") <= 1}
+    if not found:
+        return -1
+    return int(found.get(b"total", max(found.values())) * 1e6)
+
+
+class Workload:
+    """What all users of a process share: requests built beforehand, values, parsed WSDLs.
+
+    Args:
+        operations: names, in the order in which arrivals number them.
+        documents: parsed WSDLs by operation, for zeep.
+    """
+
+    def __init__(self, robot: Robot, operations: tuple[str, ...], seed: int, documents: dict[str, Any]) -> None:
+        self.robot = robot
+        self.operations = operations
+        self.documents = documents
+        self.values: list[list[Values]] = [variants(name, seed) for name in operations]
+        self.requests: dict[str, list[list[Request]]] = {
+            interface: [robot.requests(interface, name, seed) for name in operations] for interface in ("rest", "soap")
+        }
+
+
+class Caller:
+    """One user. Connections are opened at the first request and kept."""
+
+    def __init__(self, workload: Workload, recorder: Any) -> None:
+        self.workload = workload
+        self.recorder = recorder
+        self._wires: dict[tuple[str, int], Connection] = {}
+        self._rest: OrdinaryRest | None = None
+        self._soap: OrdinarySoap | None = None
+
+    def _wire(self, interface: str, operation: int) -> Connection:
+        """The connection for an operation; those of one origin share it, as any HTTP client does."""
+        known = self._wires.get((interface, operation))
+        if known is None:
+            robot = self.workload.robot
+            endpoint = Endpoint.parse(robot.address(interface, self.workload.operations[operation]) or "")
+            for (other, _), connection in self._wires.items():
+                there = connection.endpoint
+                if other == interface and (there.scheme, there.host, there.port) == (
+                    endpoint.scheme,
+                    endpoint.host,
+                    endpoint.port,
+                ):
+                    known = connection
+            known = known or Connection(endpoint, robot.timeout_s, robot.tls)
+            self._wires[interface, operation] = known
+        return known
+
+    def perform(
+        self, segment: int, interface: str, client: str, operation: int, payload: int, due: int, *, queued: bool
+    ) -> bool:
+        """Make a request and record it, whatever comes of it; returns whether it succeeded."""
+        recorder = self.recorder
+        start = now_ns()
+        try:
+            if client == "wire":
+                connection = self._wires.get((interface, operation)) or self._wire(interface, operation)
+                request = self.workload.requests[interface][operation][payload]
+                connects = connection.connects
+                built = now_ns()
+                answer = connection.call(request)
+                if not (_OK <= answer.status < _REDIRECT and request.expects in answer.body):
+                    raise _judged(answer.status, answer.headers.get(b"location"), answer.body, request.expects)
+                done = now_ns()
+                received, timing = answer.received_ns, answer.headers.get(b"server-timing")
+                if connection.connects != connects:
+                    recorder.count("connects")
+            else:
+                timed = self._ordinary(interface, operation, payload)
+                done = now_ns()
+                built, received, timing = timed.built_ns, timed.received_ns, timed.timing
+        except CallError as error:
+            recorder.failed(segment, operation, error, due)
+            return False
+        recorder.record(segment, operation, due, start, built, received, done, server_ns(timing), queued=queued)
+        return True
+
+    def _ordinary(self, interface: str, operation: int, payload: int) -> Any:
+        workload = self.workload
+        name, values = workload.operations[operation], workload.values[operation][payload]
+        try:
+            with gevent.Timeout(workload.robot.timeout_s):  # requests has no deadline for a body that drips
+                if interface == "rest":
+                    if self._rest is None:
+                        self._rest = OrdinaryRest(workload.robot)
+                    return self._rest.call(name, values)
+                if self._soap is None:
+                    self._soap = OrdinarySoap(workload.robot, workload.documents)
+                return self._soap.call(name, values)
+        except gevent.Timeout:
+            raise CallError("timeout", f"no complete answer within {workload.robot.timeout_s:g} s") from None
+
+    def close(self) -> None:
+        """Close all connections."""
+        for connection in self._wires.values():
+            connection.close()
+
+
+def _judged(status: int, location: bytes | None, body: bytes, expects: bytes) -> CallError:
+    where = location.decode("latin-1") if location else None
+    return answer_error(status, where, body, expects) or CallError("content", f"status {status}")

@@ -1,0 +1,221 @@
+"""The ordinary clients: what a user's program would write, with its cost.
+
+SOAP through zeep: one Document (the parsed WSDL) for each process, for it takes milliseconds to build, and a
+transport for each user. REST through `requests`. Both pass through one urllib3 adapter that counts what is put
+on the wire: a request that was sent twice for one call is a silent resend, and the run says so.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import requests
+import zeep
+from requests.adapters import HTTPAdapter
+from urllib3.connection import HTTPConnection, HTTPSConnection
+from zeep.transports import Transport
+from zeep.wsdl import Document
+
+from loadtests.clients.failures import CallError, answer_error, connect_error
+from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
+
+if TYPE_CHECKING:
+    from loadtests.clients.robot import Robot
+
+now_ns = time.monotonic_ns
+
+
+@dataclass(slots=True)
+class Timed:
+    """A call's moments: request built, answer received; and the robot's Server-Timing header, if any."""
+
+    built_ns: int
+    received_ns: int
+    timing: bytes | None
+
+
+class Sent:
+    """Requests put on the wire by all ordinary clients of this process, and calls that asked for them."""
+
+    requests = 0
+    calls = 0
+
+
+class _CountingHTTP(HTTPConnection):
+    def request(self, *args: Any, **kwargs: Any) -> None:
+        Sent.requests += 1
+        super().request(*args, **kwargs)
+
+
+class _CountingHTTPS(HTTPSConnection):
+    def request(self, *args: Any, **kwargs: Any) -> None:
+        Sent.requests += 1
+        super().request(*args, **kwargs)
+
+
+class _CountingAdapter(HTTPAdapter):
+    """Counts sends below urllib3's retrying."""
+
+    def init_poolmanager(self, *args: Any, **kwargs: Any) -> None:
+        super().init_poolmanager(*args, **kwargs)
+        classes = self.poolmanager.pool_classes_by_scheme
+        http, https = classes["http"], classes["https"]
+        self.poolmanager.pool_classes_by_scheme = {
+            "http": type("CountingHTTPPool", (http,), {"ConnectionCls": _CountingHTTP}),
+            "https": type("CountingHTTPSPool", (https,), {"ConnectionCls": _CountingHTTPS}),
+        }
+
+
+def new_session(robot: Robot) -> requests.Session:
+    """A `requests` session as a user would set it up for this robot."""
+    session = requests.Session()
+    session.trust_env = False  # a proxy from the environment would be measured in the robot's place
+    session.mount("http://", _CountingAdapter())
+    session.mount("https://", _CountingAdapter())
+    if robot.ca_file:
+        session.verify = robot.ca_file
+    if robot.token:
+        session.headers["Authorization"] = f"Bearer {robot.token}"
+    return session
+
+
+def request_error(error: requests.RequestException, where: str, timeout_s: float) -> CallError:
+    """What `requests` could not do, in our kinds."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and not isinstance(cause, requests.RequestException):
+            break
+        arguments = [argument for argument in cause.args if isinstance(argument, BaseException)]
+        reason = getattr(cause, "reason", None)
+        following = reason if isinstance(reason, BaseException) else (arguments[0] if arguments else None)
+        cause = following or cause.__cause__ or cause.__context__
+    if isinstance(error, requests.ConnectTimeout):
+        return connect_error(TimeoutError(), where)
+    if isinstance(error, requests.ReadTimeout) or isinstance(cause, TimeoutError):
+        return CallError("timeout", f"no complete answer within {timeout_s:g} s")
+    if isinstance(cause, ConnectionResetError | BrokenPipeError):
+        return CallError("closed", f"the robot broke the connection off: {cause}")
+    if isinstance(cause, OSError):
+        return connect_error(cause, where)
+    if "RemoteDisconnected" in repr(error) or "IncompleteRead" in repr(error):
+        return CallError("closed", "the robot closed the connection before its answer was complete")
+    return CallError("network", f"{where}: {error}")
+
+
+class _TimedTransport(Transport):
+    """zeep's transport, noting when a message leaves it and when the answer is back."""
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(  # type: ignore[no-untyped-call]  # zeep annotates the class, not its constructor
+            session=new_session(robot), timeout=robot.timeout_s, operation_timeout=robot.timeout_s
+        )
+        self.timed = Timed(0, 0, None)
+
+    def post(self, address: str, message: bytes, headers: dict[str, str]) -> Any:
+        self.timed.built_ns = now_ns()
+        response = super().post(address, message, headers)  # type: ignore[no-untyped-call]  # as above
+        self.timed.received_ns = now_ns()
+        timing = response.headers.get("Server-Timing")
+        self.timed.timing = timing.encode("latin-1") if timing else None
+        return response
+
+
+def read_document(location: str, robot: Robot) -> Document:
+    """Parse a WSDL for zeep.
+
+    Raises:
+        Exception: whatever zeep and lxml find wrong with it; the caller words it.
+    """
+    transport: Any = Transport(session=new_session(robot), timeout=robot.timeout_s)  # zeep annotates the class itself
+    return Document(location, transport, settings=zeep.Settings())
+
+
+class OrdinarySoap:
+    """A user's zeep client.
+
+    Args:
+        documents: the parsed WSDL by operation, shared within the process.
+    """
+
+    def __init__(self, robot: Robot, documents: dict[str, Document]) -> None:
+        self._robot = robot
+        self._transport = _TimedTransport(robot)
+        self._methods = {}
+        for operation, document in documents.items():
+            client = zeep.Client(document, transport=self._transport)
+            address = robot.address("soap", operation)
+            service = client.create_service(_binding(document), address)
+            self._methods[operation] = service[CATALOGUE[operation].element]
+
+    def call(self, operation: str, values: Values) -> Timed:
+        """Call an operation.
+
+        Raises:
+            CallError: the robot answered with a fault, or not at all.
+        """
+        Sent.calls += 1
+        where = self._robot.address("soap", operation) or ""
+        try:
+            answer = self._methods[operation](**({"arg0": values} if values else {}))
+        except requests.RequestException as error:
+            raise request_error(error, where, self._robot.timeout_s) from None
+        except zeep.exceptions.Fault as error:
+            raise CallError("fault", f"SOAP fault: {error.message}") from None
+        except zeep.exceptions.TransportError as error:
+            raise CallError("status", f"status {error.status_code}: {error.message}") from None
+        except zeep.exceptions.Error as error:
+            raise CallError("content", f"zeep cannot read the answer: {error}") from None
+        if not values and answer is None:
+            raise CallError("content", "zeep found nothing in the answer")
+        return self._transport.timed
+
+
+def _binding(document: Document) -> str:
+    """The name of the contract's binding, whatever port names the robot chose."""
+    for name in document.bindings:
+        if name.startswith(f"{{{NAMESPACE}}}"):
+            return str(name)
+    raise CallError("content", f"the WSDL has no binding in {NAMESPACE}")
+
+
+class OrdinaryRest:
+    """A user's REST client: requests, and the answer's JSON."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._session = new_session(robot)
+        self._base = (robot.rest or "").rstrip("/")
+
+    def call(self, operation: str, values: Values) -> Timed:
+        """Call an operation.
+
+        Raises:
+            CallError: the answer is an error, or there is none.
+        """
+        Sent.calls += 1
+        kind = CATALOGUE[operation]
+        timed = Timed(0, 0, None)
+        request = self._session.prepare_request(
+            requests.Request(kind.method, self._base + rest_path(values), headers={"Accept": "application/json"})
+        )
+        timed.built_ns = now_ns()
+        try:
+            response = self._session.send(request, timeout=self._robot.timeout_s, allow_redirects=False)
+        except requests.RequestException as error:
+            raise request_error(error, self._base, self._robot.timeout_s) from None
+        timed.received_ns = now_ns()
+        failure = answer_error(
+            response.status_code, response.headers.get("Location"), response.content, kind.rest_expects
+        )
+        if failure is not None:
+            raise failure
+        if response.content:
+            try:
+                response.json()
+            except requests.JSONDecodeError as error:
+                raise CallError("content", f"the answer is no JSON: {error}") from None
+        timing = response.headers.get("Server-Timing")
+        timed.timing = timing.encode("latin-1") if timing else None
+        return timed

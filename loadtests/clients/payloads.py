@@ -1,0 +1,154 @@
+"""What is sent: the same calls as octets for REST and for SOAP, built before the clock runs.
+
+Delivery is the paper's example (section on the delivery application) with its coordinates varied by lot; 64
+variants, so that no cache on the way answers for the robot.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from lxml import etree
+
+from loadtests.clients.wire import Request
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from loadtests.clients.endpoint import Endpoint
+
+VARIANTS = 64
+NAMESPACE = "http://soap.turtlebot.mybot.org/"
+ENVELOPE = "http://schemas.xmlsoap.org/soap/envelope/"
+COURIER, COFFEE = 3, 4  # the paper's message codes
+
+#: Fields of deliveryRequestMessage in the order of the schema's sequence.
+FIELDS = ("depot_x", "depot_y", "destination_x", "destination_y", "message_code", "source_x", "source_y")
+#: The same in the order of the REST path, with the path's names.
+PATH = (
+    ("depot_x", "depot_x"), ("depot_y", "depot_y"), ("dest_x", "destination_x"), ("dest_y", "destination_y"),
+    ("source_x", "source_x"), ("source_y", "source_y"),
+)  # fmt: skip
+_EXAMPLE = {
+    "depot_x": 68.269, "depot_y": 38.718, "destination_x": 60.633, "destination_y": 37.51,
+    "source_x": 76.02, "source_y": 41.35,
+}  # fmt: skip
+
+Values = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Operation:
+    """An operation's name on each side.
+
+    Attributes:
+        element: the SOAP request's wrapper element.
+        code: message code of a delivery; None for a read.
+        service: which SOAP service has it, `publishers` or `subscribers`.
+        method: the REST method.
+        rest_expects, soap_expects: octets that a good answer holds.
+    """
+
+    element: str
+    code: int | None
+    service: str
+    method: str
+    rest_expects: bytes
+    soap_expects: bytes
+
+
+CATALOGUE = {
+    "delivery": Operation(
+        "ExecuteDeliveryRequest", COURIER, "publishers", "PUT", b"", b"ExecuteDeliveryRequestResponse"
+    ),
+    "coffee": Operation("ExecuteCoffeeRequest", COFFEE, "publishers", "PUT", b"", b"ExecuteCoffeeRequestResponse"),
+    "pose": Operation("GetPose", None, "subscribers", "GET", b'"pose"', b"GetPoseResponse"),
+}
+
+
+def variants(operation: str, seed: int) -> list[Values]:
+    """The values of each variant; a read has none."""
+    code = CATALOGUE[operation].code
+    if code is None:
+        return [{} for _ in range(VARIANTS)]
+    lot = np.random.default_rng([seed, 5])
+    return [
+        {name: value + float(lot.uniform(-5, 5)) for name, value in _EXAMPLE.items()} | {"message_code": code}
+        for _ in range(VARIANTS)
+    ]
+
+
+def rest_path(values: Values) -> str:
+    """The resource's path below the base URL (Table 1 and the delivery application)."""
+    if not values:
+        return "/robot/pose/"
+    places = "".join(f"/{name}/{values[field]!r}" for name, field in PATH)
+    return f"/robot/app/delivery/{int(values['message_code'])}{places}"
+
+
+def soap_envelope(operation: str, values: Values) -> bytes:
+    """The SOAP 1.1 request, document/literal wrapped; the wrapper's child is the unqualified `arg0`."""
+    texts = {field: repr(int(value) if field == "message_code" else value) for field, value in values.items()}
+    inner = "".join(f"<{field}>{texts[field]}</{field}>" for field in FIELDS if field in texts)
+    argument = f"<arg0>{inner}</arg0>" if values else ""
+    element = CATALOGUE[operation].element
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?><soap:Envelope xmlns:soap="{ENVELOPE}"><soap:Body>'
+        f'<tns:{element} xmlns:tns="{NAMESPACE}">{argument}</tns:{element}></soap:Body></soap:Envelope>'
+    ).encode()
+
+
+def _authorization(token: str | None) -> str:
+    return f"Authorization: Bearer {token}\r\n" if token else ""  # RFC 6750 section 2.1
+
+
+def rest_request(endpoint: Endpoint, operation: str, values: Values, token: str | None) -> Request:
+    """A REST request as octets."""
+    kind = CATALOGUE[operation]
+    length = "Content-Length: 0\r\n" if kind.method == "PUT" else ""
+    head = (
+        f"{kind.method} {endpoint.path}{rest_path(values)} HTTP/1.1\r\nHost: {endpoint.authority}\r\n"
+        f"Accept: application/json\r\n{_authorization(token)}{length}\r\n"
+    )
+    return Request(head.encode("ascii"), kind.rest_expects)
+
+
+def soap_request(endpoint: Endpoint, operation: str, values: Values, token: str | None) -> Request:
+    """A SOAP request as octets."""
+    body = soap_envelope(operation, values)
+    head = (
+        f"POST {endpoint.path} HTTP/1.1\r\nHost: {endpoint.authority}\r\nAccept: text/xml\r\n"
+        f'Content-Type: text/xml; charset=utf-8\r\nSOAPAction: ""\r\n{_authorization(token)}'
+        f"Content-Length: {len(body)}\r\n\r\n"
+    )
+    return Request(head.encode("ascii") + body, CATALOGUE[operation].soap_expects)
+
+
+BUILDERS: dict[str, Callable[[Endpoint, str, Values, str | None], Request]] = {
+    "rest": rest_request,
+    "soap": soap_request,
+}
+
+
+def differences(operation: str, rest: Request, soap: Request) -> str | None:
+    """Whether two requests, read back from their octets, ask for the same: None, or what differs.
+
+    Doubles are compared bit for bit, after each has been through its own text form.
+    """
+    if CATALOGUE[operation].code is None:
+        return None
+    parts = rest.octets.split(b" ", 2)[1].decode().rsplit("/robot/app/delivery/", 1)[1].split("/")
+    over_rest = {field: float(parts[2 * index + 2]) for index, (_, field) in enumerate(PATH)}
+    over_rest["message_code"] = int(parts[0])
+    body = soap.octets.split(b"\r\n\r\n", 1)[1]
+    argument = etree.fromstring(body, etree.XMLParser(resolve_entities=False, no_network=True)).find(".//arg0")
+    if argument is None:
+        return "the SOAP request carries no arg0"
+    over_soap = {child.tag: float(child.text or "nan") for child in argument}
+    for field in FIELDS:
+        if struct.pack("<d", over_rest[field]) != struct.pack("<d", over_soap.get(field, float("nan"))):
+            return f"{field} is {over_rest[field]!r} over REST and {over_soap.get(field)!r} over SOAP"
+    return None

@@ -1,0 +1,97 @@
+"""Reading a service's address from its WSDL (WSDL 1.1 section 3.8, soap:address)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit, urlunsplit
+
+import requests
+from lxml import etree
+
+from loadtests.clients.endpoint import Endpoint, EndpointError
+from loadtests.clients.library import new_session, request_error
+from loadtests.clients.payloads import NAMESPACE
+
+if TYPE_CHECKING:
+    from loadtests.clients.robot import Robot
+
+_WSDL = "http://schemas.xmlsoap.org/wsdl/"
+_SOAP = "http://schemas.xmlsoap.org/wsdl/soap/"
+_MOST = 4 * 1024 * 1024
+_ELSEWHERE = frozenset({"0.0.0.0", "::", "localhost", "127.0.0.1", "::1"})  # noqa: S104 -- compared with, not bound to
+
+
+class WsdlError(ValueError):
+    """A WSDL that cannot be used; the message says what is wrong with it."""
+
+
+def fetch(location: str, robot: Robot) -> bytes:
+    """A WSDL's octets, from a file or a URL.
+
+    Raises:
+        WsdlError: no such file, or the answer is no document.
+        CallError: nobody answers at the URL.
+    """
+    if not location.startswith(("http://", "https://")):
+        try:
+            return Path(location).read_bytes()
+        except OSError as error:
+            raise WsdlError(f"WSDL {location!r}: {error.strerror or error}") from None
+    try:
+        with new_session(robot) as session:
+            answer = session.get(location, timeout=robot.timeout_s)
+    except requests.RequestException as error:
+        raise request_error(error, location, robot.timeout_s) from None
+    if answer.status_code != requests.codes.ok:
+        raise WsdlError(f"WSDL {location!r}: status {answer.status_code} instead of a document")
+    return answer.content
+
+
+def address_in(content: bytes, location: str, element: str) -> str:
+    """The address of the service whose port type offers an operation.
+
+    Args:
+        content: the WSDL.
+        location: where it came from, for messages and for its host.
+        element: the operation's name.
+
+    Raises:
+        WsdlError: no XML, no WSDL, another service's WSDL, or no address in it.
+    """
+    if len(content) > _MOST:
+        raise WsdlError(f"WSDL {location!r} is longer than {_MOST} octets")
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+    try:
+        root = etree.fromstring(content, parser)
+    except etree.XMLSyntaxError as error:
+        raise WsdlError(f"WSDL {location!r} is no XML: {error}") from None
+    if root.tag != f"{{{_WSDL}}}definitions":
+        raise WsdlError(f"{location!r} is no WSDL 1.1: its root element is {root.tag!r}")
+    offered = {found.get("name") for found in root.iter(f"{{{_WSDL}}}operation")}
+    imports = root.findall(f"{{{_WSDL}}}import")
+    if element not in offered and not imports:
+        raise WsdlError(
+            f"WSDL {location!r} has no operation {element!r} (it has {', '.join(sorted(map(str, offered))) or 'none'})"
+        )
+    if root.get("targetNamespace") != NAMESPACE and not imports:
+        raise WsdlError(
+            f"WSDL {location!r}: its target namespace is {root.get('targetNamespace')!r}, not {NAMESPACE!r}"
+        )
+    for address in root.iter(f"{{{_SOAP}}}address"):
+        url = address.get("location") or ""
+        try:
+            Endpoint.parse(url)
+        except EndpointError as error:
+            raise WsdlError(f"WSDL {location!r}: its soap:address cannot be used: {error}") from None
+        return _reachable(url, location)
+    raise WsdlError(f"WSDL {location!r} holds no soap:address: say where the service is with --…-endpoint URL")
+
+
+def _reachable(url: str, location: str) -> str:
+    """An address that names the robot's own loopback, in a WSDL fetched from elsewhere, means that elsewhere."""
+    there, here = urlsplit(url), urlsplit(location)
+    if here.scheme in {"http", "https"} and there.hostname in _ELSEWHERE and here.hostname not in _ELSEWHERE:
+        host = f"[{here.hostname}]" if ":" in (here.hostname or "") else here.hostname
+        return urlunsplit(there._replace(netloc=f"{host}:{there.port}" if there.port else str(host)))
+    return url

@@ -1,0 +1,210 @@
+"""A Locust master and its workers as a crew: processes of this machine, or of others."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+import gevent
+from locust.exception import RPCError
+
+from loadtests.clients.failures import CrewError
+from loadtests.measuring.executor import LEAD_S, Member, boot_id, new_environment, now_ns
+from loadtests.measuring.recorder import Recorder
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from loadtests.clients.robot import Robot
+    from loadtests.schedule.plan import Plan
+
+_NS = 1_000_000_000
+_READY_S = 60.0
+#: Beyond a plan's end and its requests' deadline: how long a worker may take to report for the last time.
+_GRACE_S = 15.0
+
+
+class LedCrew:
+    """Workers led by a Locust master.
+
+    Args:
+        host, port: where the master listens for workers; port 0 picks a free one.
+        processes: workers to start on this machine.
+        expected: workers to wait for in all; those beyond `processes` come from elsewhere.
+        tell: says how things stand, for the terminal.
+        stopped: whether somebody wants an end; asked while waiting for workers.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        processes: int,
+        expected: int,
+        tell: Callable[[str], None],
+        stopped: Callable[[], bool],
+    ) -> None:
+        self.environment = new_environment()
+        try:
+            self.runner = self.environment.create_master_runner(host, port)
+        except (SystemExit, RPCError) as error:
+            raise CrewError(
+                f"the master cannot listen on {host}:{port}: choose another --master-port ({error})"
+            ) from None
+        self.recorder = Recorder()
+        self.members: list[Member] = []
+        self.pacing = ""
+        self.tell = tell
+        self.stopped = stopped
+        self._host, self._port = host, self.runner.server.port if port == 0 else port
+        self._processes = processes
+        self._expected = max(expected, processes)
+        self._children: dict[int, subprocess.Popen[bytes]] = {}
+        self._by_client: dict[str, Member] = {}
+        self._refusals: list[str] = []
+        self._prepared = 0
+        self._began = 0
+        self.runner.register_message("roaas_ready", self._on_ready)
+        self.runner.register_message("roaas_done", self._on_done)
+        self.environment.events.worker_report.add_listener(self._on_report)
+
+    @property
+    def workers(self) -> int:
+        """How many processes share the work."""
+        return self._expected
+
+    def prepare(self, robot: Robot, operations: tuple[str, ...], seed: int, *, zeep: bool, users: int) -> None:
+        """Start the workers of this machine, wait for all, and have their users come up.
+
+        Raises:
+            CrewError: a worker could not get ready.
+        """
+        here = "127.0.0.1" if self._host in {"*", "0.0.0.0"} else self._host  # noqa: S104 -- compared with, not bound to
+        for _ in range(self._processes):
+            child = subprocess.Popen(  # noqa: S603 -- this very program
+                [sys.executable, "-m", "loadtests.measuring.worker", here, str(self._port)], stdin=subprocess.PIPE
+            )
+            self._children[child.pid] = child
+            if child.stdin is not None:
+                child.stdin.write(json.dumps({"token": robot.token}).encode() + b"\n")
+                child.stdin.close()
+        if self._expected > self._processes:
+            self.tell(
+                f"master on {self._host}:{self._port}: waiting for {self._expected - self._processes} more workers"
+            )
+        self._wait(lambda: self.runner.worker_count >= self._expected, "workers connected")
+        job = {
+            "robot": asdict(replace(robot, token=None)),  # a token does not travel: each worker has its own
+            "operations": list(operations),
+            "seed": seed,
+            "zeep": zeep,
+        }
+        self.runner.send_message("roaas_prepare", job)
+        self._wait(lambda: self._prepared >= self._expected or bool(self._refusals), "workers are ready")
+        if self._refusals:
+            raise CrewError(f"a worker cannot work: {self._refusals[0]}")
+        self.runner.start(users, spawn_rate=users)
+
+    def _wait(self, reached: Callable[[], bool], what: str) -> None:
+        deadline = time.monotonic() + (_READY_S if self._expected <= self._processes else 10 * _READY_S)
+        while not reached():
+            gevent.sleep(0.02)
+            if self.stopped():
+                raise CrewError("interrupted while waiting for workers")
+            dead = [child.returncode for child in self._children.values() if child.poll() is not None]
+            if dead:
+                raise CrewError(f"a worker process ended at once, with exit code {dead[0]}")
+            if time.monotonic() > deadline:
+                raise CrewError(f"{self.runner.worker_count} of {self._expected} {what} in time")
+
+    def _on_ready(self, environment: Any, msg: Any) -> None:
+        del environment
+        if msg.data["error"]:
+            self._refusals.append(msg.data["error"])
+            return
+        self._prepared += 1
+        self.pacing = msg.data["pacing"]
+        member = Member(str(len(self.members) + 1), host=msg.data["host"], pid=msg.data["pid"])
+        self.members.append(member)
+        self._by_client[msg.node_id] = member
+
+    def _on_report(self, client_id: str, data: dict[str, Any]) -> None:
+        report, member = data.get("roaas"), self._by_client.get(client_id)
+        if report is None or member is None:
+            return
+        for packed in report["recorded"]:
+            part = Recorder.unpack(packed)
+            self.recorder.merge(part)
+            requests = sum(cell.service.total + cell.errors for cell in part.cells.values())
+            member.requests += requests
+            member.accounted += requests + sum(cell.dropped for cell in part.cells.values())
+        member.cpu_share = report["cpu_share"]
+        member.last_report_s = (now_ns() - self._began) / _NS
+
+    def _on_done(self, environment: Any, msg: Any) -> None:
+        del environment
+        self._on_report(msg.node_id, msg.data)
+        member = self._by_client.get(msg.node_id)
+        if member is not None:
+            member.done = True
+
+    def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
+        """Carry out a plan with the workers that are left; returns with what they reported."""
+        present = [(client, member) for client, member in self._by_client.items() if member.state != "lost"]
+        if not present:
+            return
+        plan = replace(plan, workers=len(present))
+        origin = now_ns() + int(LEAD_S * _NS)
+        self._began = self._began or origin
+        self._send_off(present, plan, origin, ceiling)
+        deadline = plan.length_s + plan.timeout_s + _GRACE_S
+        stopped = False
+        while any(not member.done for _, member in present):
+            gevent.sleep(0.05)
+            elapsed = (now_ns() - origin) / _NS
+            self._look_for_lost(present, overdue=elapsed > deadline)
+            if not stopped and watch(elapsed):
+                stopped = True
+                deadline = elapsed + plan.timeout_s + _GRACE_S
+                for client, member in present:
+                    if member.state != "lost":
+                        self.runner.send_message("roaas_stop", None, client)
+
+    def _send_off(self, present: list[tuple[str, Member]], plan: Plan, origin: int, ceiling: float | None) -> None:
+        for number, (client, member) in enumerate(present):
+            member.done = False
+            job = {
+                "plan": plan.as_message(),
+                "worker": number,
+                "boot": boot_id(),
+                "origin_ns": origin,
+                "lead_s": LEAD_S,
+                "ceiling": ceiling / len(present) if ceiling else None,
+            }
+            self.runner.send_message("roaas_begin", job, client)
+
+    def _look_for_lost(self, present: list[tuple[str, Member]], *, overdue: bool) -> None:
+        """Give up members whose process has ended, whose heartbeat has stopped, or that are overdue."""
+        for client, member in present:
+            if member.done:
+                continue
+            child = self._children.get(member.pid)
+            node = self.runner.clients.get(client)
+            ended = child is not None and child.poll() is not None
+            if overdue or ended or node is None or node.state == "missing":
+                member.state, member.done, member.lost_at_s = "lost", True, (now_ns() - self._began) / _NS
+                self.tell(f"worker {member.id} ({member.host}) was lost {member.lost_at_s:.1f} s into the run")
+
+    def close(self) -> None:
+        """Let the workers go."""
+        self.runner.quit()
+        for child in self._children.values():
+            try:
+                child.wait(5)
+            except subprocess.TimeoutExpired:
+                child.kill()
+                child.wait()

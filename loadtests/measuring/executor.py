@@ -1,0 +1,156 @@
+"""Who does the work: this process, or workers that a Locust master leads.
+
+Both carry out plans one after the other and end up with one recorder. Workers rebuild the plan from a message,
+take their share of its schedule, and report what they recorded once a second; a worker that is lost takes with
+it what it had not yet reported, and the result says so.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import gevent
+from locust import User, task
+from locust.env import Environment
+from locust.event import Events
+
+from loadtests.clients.failures import CrewError
+from loadtests.measuring.recorder import Recorder
+from loadtests.measuring.user_session import Session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from loadtests.clients.robot import Robot
+    from loadtests.schedule.plan import Plan
+
+_NS = 1_000_000_000
+LEAD_S = 0.3  # from the message to the plan's beginning
+now_ns = time.monotonic_ns
+
+
+class RobotUser(User):
+    """A user of the robot: takes requests from the pacer of its process and makes them."""
+
+    @task
+    def work(self) -> None:
+        """Work until killed."""
+        self.environment.roaas_session.work()
+
+
+@dataclass(slots=True)
+class Member:
+    """A process of the crew, as the result tells of it.
+
+    Attributes:
+        accounted: arrivals of its share that its reports speak of.
+    """
+
+    id: str
+    host: str = ""
+    pid: int = 0
+    state: str = "finished"
+    requests: int = 0
+    cpu_share: float | None = None
+    lost_at_s: float | None = None
+    last_report_s: float | None = None
+    accounted: int = 0
+    done: bool = True
+
+
+class Crew(Protocol):
+    """Carries out plans."""
+
+    recorder: Recorder
+    members: list[Member]
+    pacing: str
+    environment: Any
+
+    @property
+    def workers(self) -> int:
+        """How many processes share the work."""
+
+    def prepare(self, robot: Robot, operations: tuple[str, ...], seed: int, *, zeep: bool, users: int) -> None:
+        """Get ready: clients built, users waiting."""
+
+    def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
+        """Carry out a plan; `watch` is called with the seconds since its start, and True from it ends the plan."""
+
+    def close(self) -> None:
+        """Let everybody go."""
+
+
+def new_environment() -> Any:
+    """Locust's environment with our user."""
+    return Environment(user_classes=[RobotUser], events=Events(), stop_timeout=0)
+
+
+def busiest(crew: Crew) -> float | None:
+    """The busiest process's share of a core in the plan that was carried out last."""
+    return max((member.cpu_share for member in crew.members if member.cpu_share is not None), default=None)
+
+
+def boot_id() -> str:
+    """Which running system this is: processes of one share CLOCK_MONOTONIC. Empty where unknown."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip()
+    except OSError:
+        return ""
+
+
+class LocalCrew:
+    """This process alone."""
+
+    def __init__(self) -> None:
+        self.environment = new_environment()
+        self.runner = self.environment.create_local_runner()
+        self.recorder = Recorder()
+        self.members = [Member("1", host="localhost")]
+        self.pacing = ""
+        self._session: Session | None = None
+
+    @property
+    def workers(self) -> int:
+        """One."""
+        return 1
+
+    def prepare(self, robot: Robot, operations: tuple[str, ...], seed: int, *, zeep: bool, users: int) -> None:
+        """Get ready: clients built, users waiting."""
+        session = Session(self.environment, robot, operations, seed, zeep=zeep)
+        self._session = self.environment.roaas_session = session
+        self.recorder, self.pacing = session.recorder, session.pacer.pacing
+        self.runner.start(users, spawn_rate=users)
+        with gevent.Timeout(30, CrewError(f"only {session.pacer.waiting} of {users} users came up within 30 s")):
+            while session.pacer.waiting < users:
+                gevent.sleep(0.01)
+
+    def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
+        """Carry out a plan."""
+        session = self._session
+        if session is None:
+            raise CrewError("run before prepare")
+        origin = now_ns() + int(LEAD_S * _NS)
+        work = gevent.spawn(session.run, plan, 0, origin, ceiling)
+        try:
+            while not work.ready():
+                work.join(0.1)
+                if watch((now_ns() - origin) / _NS):
+                    session.stop()
+            work.get()
+        finally:
+            session.stop()
+            work.join()
+            member = self.members[0]
+            member.cpu_share = session.cpu_share
+            member.last_report_s = (now_ns() - origin) / _NS
+            cells = self.recorder.cells.values()
+            member.requests = sum(cell.service.total + cell.errors for cell in cells)
+
+    def close(self) -> None:
+        """Let the users go."""
+        if self._session is not None:
+            self._session.pacer.close()
+        self.runner.quit()

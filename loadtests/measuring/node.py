@@ -1,0 +1,59 @@
+"""A load test's master or one of its workers, as the Locust operator for Kubernetes starts them.
+
+The operator runs one image as `--master ARGS` once and as `--worker --master-host SERVICE ARGS` as often as asked,
+with the same ARGS. Here ARGS are those of `roaas load`; the worker passes over what only the master needs. When the
+master is done it lingers, for its pod and the result in it vanish with it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+
+from loadtests.cli import load
+
+PORT = 5557
+LINGER_S = 600.0
+
+
+def main(words: list[str]) -> None:
+    """Take the role that the words say; ends with the exit code of `roaas load`."""
+    if "--worker" in words:
+        _work(words)
+        return
+    own = [word for word in words if word != "--master"]
+    defaults = ["--master-host", "*", "--master-port", str(PORT), "--processes", "0"]
+    try:
+        load([*defaults, *own], prog_name="roaas load")
+    finally:
+        linger = float(os.environ.get("ROAAS_LINGER_S", LINGER_S))
+        sys.stderr.write(f"the result is kept for {linger:g} s: fetch it now\n")
+        sys.stderr.flush()
+        time.sleep(linger)
+
+
+def _work(words: list[str]) -> None:
+    host = _value(words, "--master-host")
+    if host is None:
+        sys.exit("--worker needs --master-host")
+    token_file = _value(words, "--token-file")
+    token = Path(token_file).read_text("utf-8").strip() if token_file else None
+    from loadtests.measuring.worker import serve  # noqa: PLC0415 -- imports Locust, which patches the process
+
+    serve(host, int(_value(words, "--master-port") or PORT), token)
+
+
+def _value(words: list[str], option: str) -> str | None:
+    """An option's value, in either way of writing it."""
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        if word == option:
+            return following
+        if word.startswith(f"{option}="):
+            return word.split("=", 1)[1]
+    return None
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

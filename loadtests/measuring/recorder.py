@@ -1,0 +1,239 @@
+"""Keeps what happened, in memory that does not grow with the number of requests.
+
+A request is seven integers appended to a buffer; the buffer is binned by NumPy in the quiet gap between blocks.
+A cell holds the histograms of one operation in one segment of the plan (a block): the blocks are what the
+statistics resample, and their sums are the series. The number of segments is bounded by the plan, that of bins
+by the histogram. Cells add, so that those of processes and machines merge into exactly their union.
+"""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from loadtests.statistics.histogram import Histogram, Ints
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+#: A start later than this after its time counts as late.
+LATE_NS = 1_000_000
+_FIELDS = 8
+_BUFFERED = 4096 * _FIELDS
+_MAX_KINDS = 100  # error messages kept apart; further ones are counted under their kind's first
+
+
+@dataclass(slots=True)
+class Cell:
+    """One operation in one segment: histograms of the successful requests, and counts of the others."""
+
+    service: Histogram = field(default_factory=Histogram)
+    response: Histogram = field(default_factory=Histogram)
+    errors: int = 0
+    late: int = 0
+    dropped: int = 0
+
+    def merge(self, other: Cell) -> None:
+        """Add another cell."""
+        self.service.merge(other.service)
+        self.response.merge(other.response)
+        self.errors += other.errors
+        self.late += other.late
+        self.dropped += other.dropped
+
+
+@dataclass(slots=True)
+class Spans:
+    """Where the time of a series went, and how late the generator started it."""
+
+    build: Histogram = field(default_factory=Histogram)
+    wire: Histogram = field(default_factory=Histogram)
+    server: Histogram = field(default_factory=Histogram)
+    parse: Histogram = field(default_factory=Histogram)
+    lag: Histogram = field(default_factory=Histogram)
+
+    def parts(self) -> dict[str, Histogram]:
+        """The histograms by name."""
+        return {name: getattr(self, name) for name in ("build", "wire", "server", "parse", "lag")}
+
+    def merge(self, other: Spans) -> None:
+        """Add another series' spans."""
+        for name, part in self.parts().items():
+            part.merge(getattr(other, name))
+
+
+@dataclass(slots=True)
+class Failure:
+    """One kind of error in one series."""
+
+    message: str
+    count: int
+    first_ns: int
+    last_ns: int
+
+    def merge(self, other: Failure) -> None:
+        """Add another one of the kind."""
+        if other.first_ns < self.first_ns:
+            self.message = other.message
+        self.count += other.count
+        self.first_ns = min(self.first_ns, other.first_ns)
+        self.last_ns = max(self.last_ns, other.last_ns)
+
+
+#: (segment, operation)
+CellKey = tuple[int, int]
+#: (segment's series number, operation, kind)
+FailureKey = tuple[int, int, str]
+
+
+class Recorder:
+    """What happened so far.
+
+    Args:
+        series_of: the series number of each segment (see `Plan.series_of`); spans and errors are kept by series.
+        listener: told of each buffer's response times, by series and operation.
+    """
+
+    def __init__(
+        self, series_of: dict[int, int] | None = None, listener: Callable[[int, int, Histogram], None] | None = None
+    ) -> None:
+        self.series_of = series_of if series_of is not None else {}
+        self.listener = listener
+        self.cells: dict[CellKey, Cell] = {}
+        self.spans: dict[tuple[int, int], Spans] = {}
+        self.failures: dict[FailureKey, Failure] = {}
+        self.counters: dict[str, int] = {}
+        self._buffer = array("q")
+
+    def record(
+        self,
+        segment: int,
+        operation: int,
+        due: int,
+        start: int,
+        built: int,
+        received: int,
+        done: int,
+        server: int,
+        *,
+        queued: bool = False,
+    ) -> None:
+        """Record a successful request (moments in monotonic ns; `server` a duration, -1 when unknown)."""
+        self._buffer.extend(
+            (segment, -1 - operation if queued else operation, due, start, built, received, done, server)
+        )
+        if len(self._buffer) >= _BUFFERED:
+            self.flush()
+
+    def fail(self, segment: int, operation: int, kind: str, message: str, due_ns: int) -> None:
+        """Record a failed request; `due_ns` counts from the run's start."""
+        self.cell(segment, operation).errors += 1
+        key = (self.series_of.get(segment, -1), operation, kind)
+        known = self.failures.get(key)
+        if known is None and len(self.failures) >= _MAX_KINDS:
+            key = (key[0], operation, "other")
+            known = self.failures.get(key)
+        if known is None:
+            self.failures[key] = Failure(message, 1, due_ns, due_ns)
+        else:
+            known.merge(Failure(message, 1, due_ns, due_ns))
+
+    def drop(self, segment: int, operation: int) -> None:
+        """Record an arrival that nobody started before its deadline."""
+        self.cell(segment, operation).dropped += 1
+
+    def count(self, name: str, number: int = 1) -> None:
+        """Count something that belongs to no series."""
+        self.counters[name] = self.counters.get(name, 0) + number
+
+    def cell(self, segment: int, operation: int) -> Cell:
+        """The cell of an operation in a segment."""
+        key = (segment, operation)
+        found = self.cells.get(key)
+        if found is None:
+            found = self.cells[key] = Cell()
+        return found
+
+    def flush(self) -> None:
+        """Bin what is buffered."""
+        if not self._buffer:
+            return
+        rows = np.frombuffer(self._buffer, dtype=np.int64).reshape(-1, _FIELDS).copy()
+        self._buffer = array("q")
+        queued = rows[:, 1] < 0
+        operations = np.where(queued, -1 - rows[:, 1], rows[:, 1])
+        keys = rows[:, 0] * 16 + operations
+        for key in np.unique(keys).tolist():
+            chosen = keys == key
+            self._bin(key // 16, key % 16, rows[chosen], queued[chosen])
+
+    def _bin(self, segment: int, operation: int, rows: Ints, queued: Ints) -> None:
+        due, start, built, received, done, server = (rows[:, column] for column in range(2, _FIELDS))
+        cell = self.cell(segment, operation)
+        cell.service.record(done - start)
+        response = Histogram()
+        response.record(done - due)
+        cell.response.merge(response)
+        if self.listener is not None:
+            self.listener(self.series_of.get(segment, -1), operation, response)
+        cell.late += int(((start - due > LATE_NS) | queued).sum())
+        spans = self.spans.setdefault((self.series_of.get(segment, -1), operation), Spans())
+        told = np.clip(server, 0, received - built)  # the robot's clock may be coarser than ours
+        spans.build.record(built - start)
+        spans.wire.record(received - built - told)
+        spans.server.record(told[server >= 0])
+        spans.parse.record(done - received)
+        spans.lag.record(np.maximum((start - due)[~queued.astype(bool)], 0))
+
+    def merge(self, other: Recorder) -> None:
+        """Add what another recorder holds."""
+        for key, cell in other.cells.items():
+            self.cell(*key).merge(cell)
+        for series, spans in other.spans.items():
+            self.spans.setdefault(series, Spans()).merge(spans)
+        for kind, failure in other.failures.items():
+            known = self.failures.get(kind)
+            if known is None:
+                self.failures[kind] = Failure(failure.message, failure.count, failure.first_ns, failure.last_ns)
+            else:
+                known.merge(failure)
+        for name, number in other.counters.items():
+            self.count(name, number)
+
+    def take(self) -> dict[str, Any]:
+        """Hand over everything in a form that msgpack carries, and begin anew."""
+        self.flush()
+        packed = {
+            "cells": [
+                [*key, cell.service.pack(), cell.response.pack(), cell.errors, cell.late, cell.dropped]
+                for key, cell in self.cells.items()
+            ],
+            "spans": [
+                [*key, {name: part.pack() for name, part in spans.parts().items()}] for key, spans in self.spans.items()
+            ],
+            "failures": [
+                [*key, failure.message, failure.count, failure.first_ns, failure.last_ns]
+                for key, failure in self.failures.items()
+            ],
+            "counters": dict(self.counters),
+        }
+        self.cells, self.spans, self.failures, self.counters = {}, {}, {}, {}
+        return packed
+
+    @classmethod
+    def unpack(cls, packed: dict[str, Any]) -> Recorder:
+        """Read what `take` handed over."""
+        made = cls()
+        for segment, operation, service, response, errors, late, dropped in packed["cells"]:
+            made.cells[segment, operation] = Cell(
+                Histogram.unpack(service), Histogram.unpack(response), errors, late, dropped
+            )
+        for series, operation, parts in packed["spans"]:
+            made.spans[series, operation] = Spans(**{name: Histogram.unpack(part) for name, part in parts.items()})
+        for series, operation, kind, message, count, first, last in packed["failures"]:
+            made.failures[series, operation, kind] = Failure(message, count, first, last)
+        made.counters = dict(packed["counters"])
+        return made

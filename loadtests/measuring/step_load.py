@@ -1,0 +1,76 @@
+"""Carries out the stepped load: up until no interface is left that keeps to the criterion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from loadtests.measuring.executor import busiest
+from loadtests.result.document import asked_of, step_operation
+from loadtests.schedule.plan import Plan
+from loadtests.statistics import steps
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from loadtests.measuring.executor import Crew
+    from loadtests.settings import Settings
+
+
+def climb(
+    first: Plan,
+    crew: Crew,
+    settings: Settings,
+    stopped: Callable[[], bool],
+    announce: Callable[[Plan], None],
+    tell: Callable[[str], None],
+) -> list[dict[str, Any]]:
+    """Step the load up; returns the `steps` of latency.json.
+
+    Args:
+        first: the plan that was carried out before.
+        crew: who carries the steps out.
+        settings: rates, length and thresholds.
+        stopped: whether somebody wants an end.
+        announce: told of each step's plan before it begins.
+        tell: says how things stand.
+    """
+    operation = step_operation(first.operations)
+    criterion = steps.Criterion.of(list(settings.thresholds), first.operations[operation])
+    standing = [name for name in first.interfaces if operation in first.offered(name, "wire")]
+    used = first.first_segment + len(first.segments)
+    found: list[dict[str, Any]] = []
+    for rate in settings.step_rates:
+        if not standing or stopped():
+            break
+        plan = Plan(
+            operations=first.operations,
+            interfaces=tuple(standing),
+            clients=("wire",),
+            rate=rate,
+            users=None,
+            duration_s=settings.step_s,
+            warmup_s=0.0,
+            arrivals=settings.arrivals,
+            seed=settings.seed,
+            timeout_s=settings.timeout_s,
+            workers=first.workers,
+            connections=first.connections,
+            offers={f"{name}/wire": [operation] for name in standing},
+            step_rate=rate,
+            first_segment=used,
+        )
+        used += len(plan.segments)
+        announce(plan)
+        crew.run(plan, None, lambda _: stopped())
+        for interface in list(standing):
+            asked = asked_of(plan, plan.length_s, phase="step", interface=interface)
+            result = steps.step_result(plan, crew.recorder, interface, asked, criterion)
+            found.append(result | {"cpu_share": busiest(crew)})
+            kept = "" if result["meets"] else f": {result['reason']}"
+            tell(
+                f"step {rate:g}/s over {interface}: p50 {result['p50_ms'] or 0:.3f} ms, "
+                f"p99 {result['p99_ms'] or 0:.3f} ms{kept}"
+            )
+            if not result["meets"]:
+                standing.remove(interface)
+    return found

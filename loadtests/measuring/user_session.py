@@ -1,0 +1,154 @@
+"""One process's part in a run: its users, its pacer, its recorder. The same locally and in a worker."""
+
+from __future__ import annotations
+
+import gc
+import time
+from typing import TYPE_CHECKING, Any
+
+import gevent
+
+from loadtests.clients.callers import Caller, Workload
+from loadtests.clients.library import Sent, read_document
+from loadtests.clients.payloads import VARIANTS
+from loadtests.measuring.locust_feed import LocustFeed
+from loadtests.measuring.recorder import Recorder
+from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.pacer import Arrival, Pacer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from loadtests.clients.failures import CallError
+    from loadtests.clients.robot import Robot
+    from loadtests.schedule.plan import Plan, Segment
+
+_NS = 1_000_000_000
+_AFTER_ERROR_S = 0.02  # closed model: users of a dead robot would spin on refused connections
+
+
+class _Sink:
+    """What callers record into: the recorder, with the run's clock for failures and Locust told of them."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.record = session.recorder.record
+        self.count = session.recorder.count
+
+    def failed(self, segment: int, operation: int, error: CallError, due_ns: int) -> None:
+        session = self._session
+        session.recorder.fail(segment, operation, error.kind, str(error), due_ns - session.origin_ns)
+        session.feed.failed(session.series_of.get(segment, -1), operation, error)
+
+
+class Session:
+    """A process's part in a run.
+
+    Args:
+        environment: Locust's environment, whose statistics are fed.
+        robot: what to call.
+        operations: names, in the order in which plans number them.
+        seed: fixes the payloads.
+        zeep: whether plans may use the zeep client.
+    """
+
+    def __init__(self, environment: Any, robot: Robot, operations: tuple[str, ...], seed: int, *, zeep: bool) -> None:
+        self.robot = robot
+        self.series_of: dict[int, int] = {}
+        self.segments: dict[int, Segment] = {}
+        self.feed = LocustFeed(environment, operations)
+        self.recorder = Recorder(self.series_of, self.feed.succeeded)
+        self.origin_ns = 0
+        self.cpu_share: float | None = None
+        self._first = 0
+        self._busy = 0
+        self._cpu: list[tuple[float, float]] = []
+        documents: dict[str, Any] = {}
+        if zeep:
+            parsed: dict[str, Any] = {}
+            for name in operations:
+                wsdl = robot.wsdl(name)
+                if wsdl is not None and robot.offers("soap", "zeep", name):
+                    parsed[wsdl] = parsed.get(wsdl) or read_document(wsdl, robot)
+                    documents[name] = parsed[wsdl]
+        self.workload = Workload(robot, operations, seed, documents)
+        self.pacer = Pacer(int(robot.timeout_s * _NS), self._between, self._dropped)
+        self.after_segment: Callable[[], None] | None = None
+
+    def work(self) -> None:
+        """What a user does until it is killed: take a request, make it, take the next."""
+        caller = Caller(self.workload, _Sink(self))
+        perform, take, segments = caller.perform, self.pacer.take, self.segments
+        try:
+            while True:
+                arrival = take()
+                number = arrival.segment + self._first
+                segment = segments[number]
+                self._busy += 1
+                try:
+                    succeeded = perform(
+                        number,
+                        segment.interface,
+                        segment.client,
+                        arrival.operation,
+                        arrival.payload % VARIANTS,
+                        arrival.due_ns,
+                        queued=arrival.queued,
+                    )
+                finally:
+                    self._busy -= 1
+                if not succeeded and not self.pacer.open_model:
+                    gevent.sleep(_AFTER_ERROR_S)
+        finally:
+            caller.close()
+
+    def run(self, plan: Plan, worker: int, origin_ns: int, ceiling: float | None = None) -> None:
+        """Carry out a share of a plan; returns when its last request has come back, or `stop` was called.
+
+        Args:
+            plan: what to do.
+            worker: this process's number, from 0.
+            origin_ns: when the plan begins (monotonic).
+            ceiling: in the closed model the most starts per second of this process.
+        """
+        self._first = plan.first_segment
+        self.series_of.update(plan.series_of())
+        self.segments.update({plan.first_segment + index: segment for index, segment in enumerate(plan.segments)})
+        self.origin_ns = origin_ns
+        self._cpu = []
+        Sent.requests = Sent.calls = 0  # what was sent to look around is no call of the run
+        gc.collect()
+        gc.freeze()  # what exists now lives on: a collection in mid-run would look like a stall of the robot
+        schedule = Schedule(plan, worker, plan.workers)
+        self.pacer.start(
+            schedule, origin_ns, open_model=plan.open_model, interval_ns=int(_NS / ceiling) if ceiling else 0
+        )
+        self.pacer.done.wait()
+        with gevent.Timeout(self.robot.timeout_s + 1, False):  # noqa: FBT003 -- gevent's way to say: end silently
+            while self._busy:
+                gevent.sleep(0.01)
+        self.recorder.flush()
+        if Sent.requests > Sent.calls:
+            self.recorder.count("resends", Sent.requests - Sent.calls)
+
+    def stop(self) -> None:
+        """End the plan now; requests under way may finish."""
+        self.pacer.stop()
+
+    def _dropped(self, arrival: Arrival) -> None:
+        self.recorder.drop(arrival.segment + self._first, arrival.operation)
+
+    def _between(self, index: int) -> None:
+        """In the gap before a segment: bin what was recorded, and look at the processor's time."""
+        self.recorder.flush()
+        segment = self.segments[index + self._first]
+        now = (time.monotonic(), time.process_time())
+        if self._cpu and segment.phase != "warmup":
+            spent = now[1] - self._cpu[0][1]
+            elapsed = now[0] - self._cpu[0][0]
+            if elapsed > 0:
+                self.cpu_share = min(1.0, spent / elapsed)
+        elif segment.phase != "warmup":
+            self._cpu = [now]
+        if self.after_segment is not None:
+            self.after_segment()

@@ -1,0 +1,1 @@
+"""latency.json and what stands beside it, and the summary for the terminal."""

@@ -1,0 +1,211 @@
+"""latency.json: everything that a run found out, whatever became of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from loadtests import exits
+from loadtests.clients.payloads import CATALOGUE
+from loadtests.measuring.environment import describe
+from loadtests.measuring.preflight import Findings
+from loadtests.measuring.recorder import Recorder
+from loadtests.result.files import FORMAT
+from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.plan import GAP_S, MOVES, Plan
+from loadtests.statistics import steps, summary, verdict
+
+if TYPE_CHECKING:
+    from loadtests.clients.robot import Robot
+    from loadtests.measuring.executor import Crew
+    from loadtests.settings import Settings
+
+CLIENT_WORDS = {
+    "wire": "our own HTTP/1.1 client on gevent and llhttp, the same for both interfaces; requests built beforehand, "
+    "each sent once",
+    "zeep": "as an ordinary user's program calls: zeep over SOAP, the requests library over REST",
+}
+_NS = 1_000_000_000
+
+
+class Gone(Exception):  # noqa: N818 -- an outcome, with its exit code
+    """A run that ends before it measures."""
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+@dataclass
+class Outcome:
+    """What became of a run so far.
+
+    Attributes:
+        findings: of the calls before the run.
+        notes: worth knowing; invalid: makes the run worthless.
+        interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
+        plan: the duel's plan, once there is one; elapsed_s: how much of it was carried out.
+        cpu_share: the busiest worker's share of a core in the duel.
+        steps: results of the stepped load.
+    """
+
+    settings: Settings
+    robot: Robot
+    started: datetime
+    findings: Findings = field(default_factory=Findings)
+    notes: list[str] = field(default_factory=list)
+    invalid: list[str] = field(default_factory=list)
+    interrupted: bool = False
+    dead_at: float | None = None
+    crew: Crew | None = None
+    plan: Plan | None = None
+    elapsed_s: float = 0.0
+    cpu_share: float | None = None
+    steps: list[dict[str, Any]] = field(default_factory=list)
+
+
+def compose(outcome: Outcome, plan: Plan, gone: Gone | None) -> tuple[int, dict[str, Any]]:
+    """Exit code and latency.json.
+
+    Args:
+        outcome: what happened.
+        plan: the duel's plan, carried out or not.
+        gone: why the run ended before it measured, if it did.
+    """
+    crew, settings = outcome.crew, outcome.settings
+    recorder = crew.recorder if crew is not None else Recorder()
+    measured = summary.Measured(plan, recorder)
+    figures = _figures(outcome, measured)
+    pacing = crew.pacing if crew else ""
+    reasons, notes = ([str(gone)], []) if gone else verdict.invalid_because(figures, plan, pacing)
+    reasons = _endings(outcome, plan) + reasons + outcome.invalid
+    workers, losses = _workers(outcome, plan)
+    judged = [] if gone else verdict.judge(measured, list(settings.thresholds))
+    code = _code(outcome, gone, reasons, judged)
+    document = {
+        "format": FORMAT, "valid": not reasons, "invalid_because": reasons, "notes": outcome.notes + notes + losses,
+        "interrupted": outcome.interrupted or outcome.dead_at is not None, "exit_code": code,
+        "started": _stamp(outcome.started), "finished": _stamp(datetime.now(UTC)),
+        "environment": describe(outcome.robot, settings.about, outcome.findings.servers, settings.command),
+        "plan": _plan_words(settings, plan, pacing), "generator": figures, "workers": workers,
+        "series": summary.series(measured, outcome.findings.sizes), "comparisons": summary.comparisons(measured),
+        "noise_floor": summary.noise_floor(measured), "time_series": summary.time_series(measured),
+        "steps": outcome.steps, "knee": _knee(outcome, plan),
+        "errors": summary.errors(recorder, plan.operations) + _early_errors(outcome.findings), "thresholds": judged,
+    }  # fmt: skip
+    return code, document
+
+
+def asked_of(plan: Plan, elapsed_s: float, *, phase: str, interface: str | None = None) -> int:
+    """Arrivals of a phase that were due in the segments that were over by then."""
+    schedule = Schedule(plan, 0, 1)
+    return sum(
+        schedule.total(index)
+        for index, segment in enumerate(plan.segments)
+        if segment.phase == phase
+        and (interface is None or segment.interface == interface)
+        and segment.end_ns <= elapsed_s * _NS + 1
+    )
+
+
+def _figures(outcome: Outcome, measured: summary.Measured) -> dict[str, Any]:
+    plan = measured.plan
+    asked = sum(asked_of(plan, outcome.elapsed_s, phase=phase) for phase in ("duel", "aa"))
+    elapsed_s = max(0.0, outcome.elapsed_s - plan.warmup_s)
+    return verdict.generator_figures(measured, asked, elapsed_s, outcome.cpu_share)
+
+
+def _endings(outcome: Outcome, plan: Plan) -> list[str]:
+    """Why the plan was not carried out to its end."""
+    found = []
+    if outcome.dead_at is not None:
+        found.append(f"no request succeeded from {outcome.dead_at:.1f} s on")
+    if outcome.interrupted:
+        found.append(f"interrupted after {outcome.elapsed_s:.1f} of {plan.length_s:.1f} s")
+    return found
+
+
+def _code(outcome: Outcome, gone: Gone | None, reasons: list[str], judged: list[dict[str, Any]]) -> int:
+    if gone is not None:
+        return gone.code
+    if outcome.interrupted:
+        return exits.INTERRUPTED
+    if reasons:
+        return exits.INCONCLUSIVE
+    outcomes = {entry["outcome"] for entry in judged}
+    if "missed" in outcomes:
+        return exits.MISSED
+    return exits.INCONCLUSIVE if "inconclusive" in outcomes else exits.MET
+
+
+def _early_errors(findings: Findings) -> list[dict[str, Any]]:
+    """Calls that failed before the run."""
+    return [
+        {
+            "operation": operation, "interface": interface, "client": client, "phase": "preflight",
+            "kind": failure.kind, "message": str(failure), "count": 1, "first_s": None, "last_s": None,
+        }
+        for (operation, interface, client), failure in findings.failures.items()
+    ]  # fmt: skip
+
+
+def _workers(outcome: Outcome, plan: Plan) -> tuple[list[dict[str, Any]], list[str]]:
+    """The `workers`, and a sentence on each that was lost."""
+    found, losses = [], []
+    present = outcome.crew.members if outcome.crew else []
+    for number, member in enumerate(present):
+        missing = None
+        if member.state == "lost":
+            arrivals = ""
+            if plan.open_model:
+                schedule = Schedule(plan, number, len(present))
+                share = sum(schedule.share(index) for index in range(schedule.count()))
+                missing = max(0, share - member.accounted)
+                arrivals = f", {missing} of its arrivals were never made or never reported"
+            losses.append(
+                f"worker {member.id} ({member.host}) was lost {member.lost_at_s or 0.0:.1f} s into the run: "
+                f"{member.requests} of its requests are in the result{arrivals}"
+            )
+        found.append(
+            {
+                "id": member.id, "host": member.host, "pid": member.pid, "state": member.state,
+                "requests": member.requests, "cpu_share": summary.rounded(member.cpu_share),
+                "lost_at_s": summary.rounded(member.lost_at_s), "last_report_s": summary.rounded(member.last_report_s),
+                "arrivals_lost": missing if member.state == "lost" else 0,
+            }
+        )  # fmt: skip
+    return found, losses
+
+
+def step_operation(operations: tuple[str, ...]) -> int:
+    """The operation of the stepped load: a read where there is one, for it goes far beyond what is usual."""
+    reads = [number for number, name in enumerate(operations) if name not in MOVES]
+    return reads[0] if reads else 0
+
+
+def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
+    if not outcome.steps:
+        return []
+    operation = plan.operations[step_operation(plan.operations)]
+    criterion = steps.Criterion.of(list(outcome.settings.thresholds), operation)
+    return steps.knee(outcome.steps, plan.interfaces, criterion)
+
+
+def _plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
+    return {
+        "model": "open" if plan.open_model else "closed", "arrivals": plan.arrivals if plan.open_model else None,
+        "rate": plan.rate, "users": plan.users, "duration_s": plan.duration_s, "warmup_s": plan.warmup_s,
+        "block_s": round(plan.block_s, 6), "gap_s": GAP_S, "blocks": plan.blocks, "seed": plan.seed,
+        "timeout_s": plan.timeout_s, "operations": list(plan.operations), "interfaces": list(plan.interfaces),
+        "clients": {name: CLIENT_WORDS[name] for name in plan.clients},
+        "zeep_rate": plan.rate_of("zeep") if plan.open_model and "zeep" in plan.clients else None,
+        "methods": {name: CATALOGUE[name].element for name in plan.operations},
+        "processes": plan.workers, "connections": plan.connections, "pacing": pacing,
+        "limits": {"max_rate": settings.max_rate, "max_duration_s": settings.max_duration_s},
+        "step_rates": list(settings.step_rates), "step_s": settings.step_s if settings.step_rates else None,
+    }  # fmt: skip
+
+
+def _stamp(moment: datetime) -> str:
+    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")

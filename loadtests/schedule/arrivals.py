@@ -1,0 +1,102 @@
+"""When requests start: constant spacing or a Poisson process, fixed by the seed, dealt out to the workers.
+
+Every worker computes the whole schedule and takes its own share of each segment, so that the shares add up to
+the schedule without any message between them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from loadtests.clients.payloads import VARIANTS
+from loadtests.schedule.plan import GAP_S, Plan
+
+_NS = 1_000_000_000
+
+
+class Schedule:
+    """A worker's share of a plan; the pacer's timetable.
+
+    Args:
+        plan: what to do.
+        worker: this worker's number, from 0.
+        workers: how many share the schedule.
+    """
+
+    def __init__(self, plan: Plan, worker: int, workers: int) -> None:
+        if not 0 <= worker < workers:
+            raise ValueError(f"worker {worker} of {workers}")
+        self.plan = plan
+        self.worker = worker
+        self.workers = workers
+        self._counts = self._counted()
+
+    def _counted(self) -> list[int]:
+        """Arrivals of each segment over all workers. Constant: rounding errors do not add up over segments."""
+        plan = self.plan
+        if not plan.open_model and plan.step_rate is None:
+            return [0] * len(plan.segments)
+        if plan.arrivals == "poisson":
+            return [
+                int(self._lot(index, 2).poisson(segment.rate * (segment.end_ns - segment.start_ns) / _NS))
+                for index, segment in enumerate(plan.segments)
+            ]
+        owed: dict[tuple[str, str, str], float] = {}
+        counts = []
+        for segment in plan.segments:
+            key = (segment.phase, segment.interface, segment.client)
+            owed[key] = owed.get(key, 0.5) + segment.rate * (segment.end_ns - segment.start_ns) / _NS
+            counts.append(int(owed[key] + 1e-9))
+            owed[key] -= counts[-1]
+        return counts
+
+    def _lot(self, segment: int, purpose: int) -> np.random.Generator:
+        return np.random.default_rng([self.plan.seed, purpose, self.plan.first_segment + segment])
+
+    def count(self) -> int:
+        """How many segments there are."""
+        return len(self.plan.segments)
+
+    def starts_ns(self, segment: int) -> int:
+        """Offset at which a segment's requests may start: after the quiet gap."""
+        found = self.plan.segments[segment]
+        return found.start_ns + min(int(GAP_S * _NS), (found.end_ns - found.start_ns) // 4)
+
+    def ends_ns(self, segment: int) -> int:
+        """Offset of a segment's end."""
+        return self.plan.segments[segment].end_ns
+
+    def operations(self, segment: int) -> tuple[int, ...]:
+        """The operations that a segment's interface and client offer, by number."""
+        found = self.plan.segments[segment]
+        return self.plan.offered(found.interface, found.client)
+
+    def total(self, segment: int) -> int:
+        """A segment's arrivals over all workers."""
+        return self._counts[segment]
+
+    def share(self, segment: int) -> int:
+        """How many of a segment's arrivals are this worker's."""
+        return len(range((self.worker + segment) % self.workers, self._counts[segment], self.workers))
+
+    def due_ns(self, segment: int) -> list[int]:
+        """The offsets of all arrivals in a segment, over all workers, in order."""
+        count = self._counts[segment]
+        start, end = self.starts_ns(segment), self.ends_ns(segment)
+        lot = self._lot(segment, 3)
+        if self.plan.arrivals == "poisson":
+            places = np.sort(lot.random(count))
+        else:  # a phase by lot, lest the schedule beat with the robot's own clock
+            places = (np.arange(count) + lot.random()) / max(count, 1)
+        due: list[int] = (start + places * (end - start)).astype(np.int64).tolist()
+        return due
+
+    def arrivals(self, segment: int) -> list[tuple[int, int, int]]:
+        """This worker's arrivals in a segment: (offset in ns, operation, payload), in order."""
+        due = self.due_ns(segment)
+        kinds = np.resize(np.array(self.operations(segment)), len(due))
+        lot = self._lot(segment, 4)
+        lot.shuffle(kinds)
+        payloads = lot.integers(VARIANTS, size=len(due)).tolist()
+        mine = slice((self.worker + segment) % self.workers, None, self.workers)
+        return list(zip(due[mine], kinds.tolist()[mine], payloads[mine], strict=True))

@@ -1,0 +1,217 @@
+"""Starts requests at their times.
+
+The pacer runs in gevent's hub, rung by an alarm. In the open model it hands each due arrival to a user that
+waits; when none does, the arrival waits for the next user that becomes free, its response time running on,
+and is dropped (and counted) once its deadline has passed. In the closed model it only opens and closes the
+gate of each segment: every user takes its next request as soon as it has finished the last.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import gevent
+from gevent.event import Event
+from gevent.hub import Waiter
+
+from loadtests.clients.wire import now_ns
+from loadtests.schedule.alarm import make_alarm
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+
+class Arrival(NamedTuple):
+    """One request to make: where it stands in the plan, which operation, which payload, and when (monotonic ns).
+
+    `queued`: no user was free when it was due, so that its delay is the robot's affair and not the pacer's.
+    """
+
+    segment: int
+    operation: int
+    payload: int
+    due_ns: int
+    queued: bool = False
+
+
+class Timetable(Protocol):
+    """What a pacer starts from: segments one after the other."""
+
+    def count(self) -> int:
+        """How many segments there are."""
+
+    def starts_ns(self, segment: int) -> int:
+        """Offset of a segment's start from the run's."""
+
+    def ends_ns(self, segment: int) -> int:
+        """Offset of a segment's end."""
+
+    def arrivals(self, segment: int) -> Sequence[tuple[int, int, int]]:
+        """This worker's arrivals in a segment, in order: (offset from the run's start, operation, payload)."""
+
+    def operations(self, segment: int) -> Sequence[int]:
+        """The operations to go through in turn, in the closed model."""
+
+
+class Pacer:
+    """The gate that users take their requests from.
+
+    Args:
+        timeout_ns: an arrival older than this is dropped.
+        on_segment: called in the quiet gap before each segment, with its index.
+        on_drop: called with an arrival that nobody could start.
+    """
+
+    def __init__(self, timeout_ns: int, on_segment: Callable[[int], None], on_drop: Callable[[Arrival], None]) -> None:
+        self.open_model = True
+        self.interval_ns = 0
+        self.timeout_ns = timeout_ns
+        self.on_segment = on_segment
+        self.on_drop = on_drop
+        self.done = Event()
+        self.scheduled = 0
+        self._timetable: Timetable | None = None
+        self._origin = 0
+        self._free_at = 0
+        self._segment = -1
+        self._closes = 0
+        self._due: Sequence[tuple[int, int, int]] = ()
+        self._position = 0
+        self._turn = 0
+        self._idle: list[Waiter] = []  # a stack: the connection used last is the warmest
+        self._backlog: deque[Arrival] = deque()
+        self._alarm = make_alarm(self._ring)
+        self.pacing = self._alarm.name
+
+    @property
+    def waiting(self) -> int:
+        """Users that are ready to take a request."""
+        return len(self._idle)
+
+    def start(self, timetable: Timetable, origin_ns: int, *, open_model: bool, interval_ns: int = 0) -> None:
+        """Begin a timetable; the one before it must be over.
+
+        Args:
+            timetable: what to start.
+            origin_ns: what its offsets count from (monotonic).
+            open_model: hand out the timetable's arrivals; else open the gate for each segment.
+            interval_ns: in the closed model the least time between two starts: a ceiling on the rate.
+        """
+        self._timetable, self._origin = timetable, origin_ns
+        self.open_model, self.interval_ns = open_model, interval_ns
+        self._segment, self._closes, self._free_at = -1, 0, 0
+        self.done.clear()
+        self._next_segment()
+
+    def stop(self) -> None:
+        """End now; users that wait are left waiting (their runner ends them)."""
+        self._timetable = None
+        self._closes = 0
+        self.done.set()
+
+    def close(self) -> None:
+        """Stop for good."""
+        self.stop()
+        self._backlog.clear()
+        self._alarm.close()
+
+    def take(self) -> Arrival:
+        """Wait for the next request to make. Called by a user."""
+        if self.open_model:
+            while self._backlog:
+                late = self._backlog.popleft()
+                if now_ns() - late.due_ns < self.timeout_ns:
+                    return late
+                self.on_drop(late)
+        else:
+            now = now_ns()
+            if self.interval_ns and now < self._closes:
+                now = self._wait_turn(now)
+            if self._timetable is not None and now < self._closes:
+                return self._in_turn(self._timetable, now)
+        waiter = Waiter()
+        self._idle.append(waiter)
+        try:
+            arrival: Arrival = waiter.get()
+        except BaseException:
+            if waiter in self._idle:
+                self._idle.remove(waiter)
+            raise
+        return arrival
+
+    def _wait_turn(self, now: int) -> int:
+        """Keep the closed model below its ceiling; returns the time at which the caller may go on."""
+        mine = max(self._free_at, now)
+        self._free_at = mine + self.interval_ns
+        if mine > now:
+            gevent.sleep((mine - now) / 1e9)
+        return now_ns()
+
+    def _in_turn(self, timetable: Timetable, now: int) -> Arrival:
+        """The closed model's next request: operations one after the other, payloads likewise."""
+        operations = timetable.operations(self._segment)
+        self._turn += 1
+        self.scheduled += 1
+        return Arrival(self._segment, operations[self._turn % len(operations)], self._turn // len(operations), now)
+
+    def _next_segment(self) -> None:
+        timetable = self._timetable
+        self._segment += 1
+        if timetable is None or self._segment >= timetable.count():
+            self.stop()
+            return
+        self._due = timetable.arrivals(self._segment) if self.open_model else ()
+        self._position = 0
+        self.on_segment(self._segment)
+        self._arm(timetable)
+
+    def _arm(self, timetable: Timetable) -> None:
+        """Set the alarm to what comes next: an arrival, or the end of the segment."""
+        if self._position < len(self._due):
+            at = self._due[self._position][0]
+        elif not self.open_model and self._closes == 0:
+            at = timetable.starts_ns(self._segment)
+        else:
+            at = timetable.ends_ns(self._segment)
+        self._alarm.set(self._origin + at)
+
+    def _ring(self) -> None:
+        timetable = self._timetable
+        if timetable is None:
+            return
+        if self.open_model:
+            self._hand_out(timetable)
+        else:
+            self._open_gate(timetable)
+
+    def _hand_out(self, timetable: Timetable) -> None:
+        due, origin, idle = self._due, self._origin, self._idle
+        count = len(due)
+        if self._position >= count:
+            self._next_segment()
+            return
+        while self._position < count:
+            offset, operation, payload = due[self._position]
+            at = origin + offset
+            if at > now_ns():
+                break
+            self._position += 1
+            self.scheduled += 1
+            if idle:
+                idle.pop().switch(Arrival(self._segment, operation, payload, at))
+            else:
+                self._backlog.append(Arrival(self._segment, operation, payload, at, queued=True))
+        self._arm(timetable)
+
+    def _open_gate(self, timetable: Timetable) -> None:
+        """The closed model: the segment begins, or is over."""
+        if self._closes:
+            self._closes = 0
+            self._next_segment()
+            return
+        self._closes = self._origin + timetable.ends_ns(self._segment)
+        waiting, self._idle = self._idle, []
+        for waiter in waiting:
+            waiter.switch(self._in_turn(timetable, now_ns()))
+        self._arm(timetable)

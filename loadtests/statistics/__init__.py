@@ -1,0 +1,1 @@
+"""From recordings to figures: histograms, intervals, comparisons, thresholds, verdicts."""

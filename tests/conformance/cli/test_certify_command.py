@@ -1,0 +1,170 @@
+"""``roaas certify`` against what is no robot: a verdict and an exit code, never a traceback."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import urlopen
+
+import pytest
+
+from conformance import selftest
+
+_STRANGERS = Path(selftest.__file__).parent / "independent_robots"
+
+
+def _certify(tmp_path, *arguments):
+    command = [sys.executable, "-m", "roaas", "certify", *arguments, "--out", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert "Traceback" not in done.stdout + done.stderr
+    result = tmp_path / "out" / "result.json"
+    return done, json.loads(result.read_text(encoding="utf-8")) if result.exists() else None
+
+
+def test_a_closed_port_is_not_reached(tmp_path, closed_port):
+    done, result = _certify(tmp_path, "--rest", closed_port, "--profile", "full")
+    assert done.returncode == 3
+    assert "could not be reached" in done.stderr
+    assert closed_port.removeprefix("http://127.0.0.1:") in result["target"]["rest"]
+    assert {item["verdict"] for item in result["requirements"]} == {"error"}
+
+
+def test_a_server_that_never_answers_is_not_reached(tmp_path, listening):
+    url = listening(lambda connection: time.sleep(60) or connection)
+    done, result = _certify(tmp_path, "--rest", url, "--timeout", "0.5")
+    assert done.returncode == 3
+    assert "no answer within 0.5 s" in done.stderr
+    assert result["verdict"] == "inconclusive"
+
+
+def test_a_plain_web_server_does_not_conform(tmp_path, web_server):
+    done, result = _certify(tmp_path, "--rest", web_server, "--effort", "quick")
+    assert done.returncode == 1
+    assert result["verdict"] == "not-conformant"
+    assert result["classes"]["rest-resources"] == "fail"
+    failed = next(item for item in result["requirements"] if item["id"] == "rest-resources/pose-type")
+    assert failed["failures"][0]["request"]["curl"].endswith("/robot/pose/")
+    assert (tmp_path / "out" / "certificate.html").exists()
+    assert (tmp_path / "out" / "junit.xml").exists()
+
+
+def test_a_claimed_class_without_its_interface_fails(tmp_path, web_server):
+    _, result = _certify(tmp_path, "--rest", web_server, "--class", "soap-delivery")
+    verdicts = {item["id"]: item["verdict"] for item in result["requirements"]}
+    assert verdicts["soap-delivery/reachable"] == "fail"
+    assert result["classes"]["soap-delivery"] == "fail"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ([], "no robot is named"),
+        (["--rest", "robot:7003"], "'robot:7003'"),
+        (["--rest", "http://127.0.0.1:1", "--contract", "/nowhere"], "/nowhere"),
+        (["--rest", "http://127.0.0.1:1", "--class", "rest"], "'rest'"),
+        (["missing.toml"], "missing.toml"),
+        (["--rest", "http://127.0.0.1:1", "--baseline", "missing.toml"], "missing.toml"),
+    ],
+)
+def test_wrong_usage_is_told_by_name(tmp_path, arguments, named):
+    done, result = _certify(tmp_path, *arguments)
+    assert done.returncode == 2
+    assert named in done.stderr
+    assert result is None
+
+
+def test_a_first_statement_is_written_and_can_be_used(tmp_path, web_server):
+    statement = tmp_path / "robot.toml"
+    command = [sys.executable, "-m", "roaas", "certify", "--init", str(statement), "--rest", web_server]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    done, result = _certify(tmp_path, str(statement), "--effort", "quick")
+    assert done.returncode == 1
+    assert result["target"]["rest"] == web_server
+    again = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert again.returncode == 2
+    assert "exists already" in again.stderr
+
+
+@contextmanager
+def _stranger(name):
+    command = [
+        sys.executable,
+        "-m",
+        "conformance.selftest.independent_robots",
+        name,
+        "--rest-port",
+        "0",
+        "--soap-port",
+        "0",
+    ]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            words = process.stdout.readline().split()
+            assert words[0] == "ready"
+            rest, soap = (word.split("=", 1)[1] for word in words[1:3])
+            where = ["--rest", rest, "--publishers-wsdl", soap]
+            where += ["--subscribers-wsdl", soap.replace("publisher", "subscriber")]
+            yield process, rest, [str(_STRANGERS / name / f"{name}.toml"), *where]
+        finally:
+            process.kill()
+
+
+def _until(process, text):
+    for line in process.stderr:
+        if text in line:
+            return
+    pytest.fail(f"the run ended without {text!r}")
+
+
+def test_a_robot_that_dies_in_mid_run_is_judged_as_far_as_it_came(tmp_path):
+    with _stranger("baroque") as (robot, _, where):
+        command = [sys.executable, "-m", "roaas", "certify", *where, "--allow-motion", "--out", str(tmp_path)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+            _until(run, "motion:")
+            robot.kill()
+            said, errors = run.communicate(timeout=60)
+    assert run.returncode == 4
+    assert "Traceback" not in said + errors
+    result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    verdicts = {item["id"]: item for item in result["requirements"]}
+    assert verdicts["rest-resources/pose-type"]["verdict"] == "pass"
+    assert verdicts["xml-security/doctype"]["verdict"] == "error"
+    assert "stopped answering" in verdicts["xml-security/doctype"]["reason"]
+
+
+def test_an_interrupted_run_keeps_what_it_has_and_stops_the_robot(tmp_path):
+    with _stranger("baroque") as (_, rest, where):
+        command = [sys.executable, "-m", "roaas", "certify", *where, "--allow-motion", "--out", str(tmp_path)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+            _until(run, "motion:")
+            run.send_signal(signal.SIGINT)
+            said, errors = run.communicate(timeout=60)
+        assert run.returncode == 130
+        assert "Traceback" not in said + errors
+        result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+        assert result["interrupted"]
+        verdicts = {item["verdict"] for item in result["requirements"]}
+        assert {"pass", "error"} <= verdicts
+        with pytest.raises(HTTPError) as none:
+            urlopen(rest + "/robot/navigation/action/goal/")  # noqa: S310 - our own robot
+        assert none.value.code == 404
+        with urlopen(rest + "/robot/velocity/") as answer:  # noqa: S310 - our own robot
+            twist = json.load(answer)
+        assert max(abs(value) for part in ("linear", "angular") for value in twist[part].values()) < 0.02
+
+
+def test_the_suite_runs_in_somebody_elses_project(tmp_path):
+    (tmp_path / "test_own.py").write_text("def test_own(): pass\n", encoding="utf-8")
+    with _stranger("plain") as (_, rest, _):
+        command = [sys.executable, "-m", "pytest", "-q", "--pyargs", "conformance", "test_own.py"]
+        command += ["--robot-rest", rest, "--robot-class", "rest-formats", "--robot-effort", "quick"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "passed" in done.stdout

@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from conformance.engine.session import Session
+from conformance.rest.observers import Observer, watch
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange, Request, Response
+
+BASE = "http://robot:7003/r2"
+TWIST = {part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")}
+DATE = ("Date", "Fri, 20 Nov 2026 23:00:00 GMT")
+VARY = ("Vary", "Accept")
+JSON = ("Content-Type", "application/json")
+PROBLEM = ("Content-Type", "application/problem+json")
+
+
+def seen(method, path, status, headers=(), body=b"", *, sent=(("Accept", "*/*"),), content=b"", raw=None, problem=""):
+    """Requirements that an observer finds not met in one exchange."""
+    session = Session()
+    session.rest = HttpClient(BASE, session.connection)
+    request = Request(method, BASE + path, (("Host", "robot:7003"), *sent), content, raw)
+    response = None if status is None else Response(status, tuple(headers), body, 1.0)
+    Observer(session)(Exchange(request, response, problem))
+    return set(session.judge.refuted())
+
+
+def test_good_answers_raise_no_alarm():
+    body = json.dumps({**TWIST, "more": 1}).encode()
+    assert seen("GET", "/robot/velocity/", 200, [DATE, VARY, JSON], body) == set()
+    assert seen("HEAD", "/robot/velocity/", 200, [DATE, VARY, JSON]) == set()
+    assert seen("PUT", "/robot/velocity/", 200, [DATE], content=body) == set()
+    assert seen("DELETE", "/robot/navigation/action/goal/", 200, [DATE]) == set()
+    assert seen("OPTIONS", "/robot/velocity/", 204, [DATE]) == set()
+    assert seen("GET", "/robot/velocity", 308, [DATE, ("Location", "/r2/robot/velocity/")]) == set()
+    assert seen("GET", "/robot/velocity/", 401, [DATE]) == set()
+    assert seen("GET", "/robot/velocity/", 431, [DATE], sent=(("X-Long", "a" * 9000),)) == set()
+    assert seen("GET", "/robot/pose/", 503, [PROBLEM, ("Retry-After", "1")], b'{"status": 503, "detail": "x"}') == set()
+    assert seen("FOO", "/robot/pose/", 501) == set()
+    assert seen("GET", "", 400, [("Content-Type", "text/plain")], b"?", raw=b"GARBAGE") == set()
+    assert seen("PUT", "/robot/velocity/", None, problem="connection closed without an answer") == set()
+
+
+def test_what_went_elsewhere_is_nobody_s_affair():
+    session = Session()
+    session.rest = HttpClient(BASE, session.connection)
+    Observer(session)(Exchange(Request("GET", "http://robot:7003/r2d2/x"), Response(500, (), b"", 1.0)))
+    assert not session.judge.refuted()
+
+
+@pytest.mark.parametrize(
+    ("status", "headers", "body", "expected"),
+    [
+        (200, [VARY, JSON], json.dumps(TWIST), {"http/date"}),
+        (200, [DATE, JSON], json.dumps(TWIST), {"rest-formats/vary"}),
+        (200, [DATE, VARY], json.dumps(TWIST), {"http/content-type", "http/declared-body"}),
+        (200, [DATE, VARY, ("Content-Type", "text/html")], "<p>", {"http/declared-body"}),
+        (200, [DATE, VARY, JSON], '{"linear": {}}', {"http/declared-body"}),
+        (200, [DATE, VARY, JSON], "", {"http/declared-body"}),
+        (200, [DATE, VARY, JSON], json.dumps(TWIST).replace("0.0", "NaN"), {"http/json-finite", "http/declared-body"}),
+        (200, [DATE, VARY, JSON], "\ufeff" + json.dumps(TWIST), {"http/json-encoding", "http/declared-body"}),
+        (
+            200,
+            [DATE, VARY, JSON],
+            json.dumps(TWIST)[:-1] + ', "linear": 1}',
+            {"http/json-unique-names", "http/declared-body"},
+        ),
+        (202, [DATE, VARY, JSON], json.dumps(TWIST), {"http/declared-status"}),
+        (404, [DATE, PROBLEM], '{"status": 404, "detail": "x"}', {"http/declared-status"}),
+        (500, [DATE, PROBLEM], '{"status": 500}', {"http/no-server-error"}),
+        (503, [DATE, PROBLEM], '{"status": 503, "detail": "x"}', {"http/no-server-error"}),
+    ],
+)
+def test_bad_answers_to_get(status, headers, body, expected):
+    assert seen("GET", "/robot/velocity/", status, headers, body.encode()) == expected
+
+
+@pytest.mark.parametrize(
+    ("headers", "body", "accept", "expected"),
+    [
+        ([DATE, ("Content-Type", "text/html")], "no", "*/*", {"http/problem-type"}),
+        ([DATE, PROBLEM], '{"detail": "x"}', "*/*", {"http/problem-status"}),
+        ([DATE, PROBLEM], '{"status": 400, "detail": "x"}', "*/*", {"http/problem-status"}),
+        ([DATE, PROBLEM], '{"status": "422", "detail": "x"}', "*/*", {"http/problem-status"}),
+        ([DATE, PROBLEM], '{"status": 422, "detail": "x"}', "application/xml", {"rest-formats/problem-xml"}),
+        (
+            [DATE, PROBLEM],
+            '{"status": 422, "detail": "Traceback (most recent call last): ..."}',
+            "*/*",
+            {"http/no-traceback"},
+        ),
+        (
+            [DATE, ("Content-Type", "application/problem+xml")],
+            "<problem xmlns='urn:ietf:rfc:7807'><status>422</status></problem>",
+            "application/xml",
+            set(),
+        ),
+    ],
+)
+def test_problems(headers, body, accept, expected):
+    path = "/robot/navigation/service/plan?x=abc&y=0"
+    assert seen("GET", path, 422, headers, body.encode(), sent=(("Accept", accept),)) == expected
+
+
+def test_formats_are_read_as_what_they_say_they_are():
+    xml, text = [DATE, VARY, ("Content-Type", "application/xml")], [DATE, VARY, ("Content-Type", "text/plain")]
+    wants_xml, wants_text = (("Accept", "application/xml"),), (("Accept", "text/plain"),)
+    path = "/robot/velocity/linear/"
+    assert seen("GET", path, 200, xml, b"<Vector3><x>1</x><y>2</y></Vector3>", sent=wants_xml) == {"rest-formats/xml"}
+    assert seen("GET", path, 200, text, b"x: 1\ny: fast\nz: 0", sent=wants_text) == {"rest-formats/text"}
+    assert seen("GET", path, 200, text, b"x: 1\ny: 1\nz: 0\n---\n", sent=wants_text) == set()
+    assert seen("GET", path, 200, text, b"x: 1\ny: 1\nz: 0", sent=wants_xml) == {"http/not-acceptable"}
+
+
+def test_garbage_is_bad_framing():
+    found = seen("GET", "/robot/pose/", None, problem="the answer is no HTTP: illegal status line")
+    assert found == {"http/framing"}
+
+
+def test_watching_twice_is_watching_once():
+    session = Session()
+    watch(session)
+    watch(session)
+    assert len(session.connection.listeners) == 1
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    st.sampled_from(["/robot/pose/", "/robot/sensors/", "/robot/navigation/action/goal/", "/no/such"]),
+    st.sampled_from([200, 204, 301, 404, 422, 500, 503, 999]),
+    st.sampled_from(
+        ["application/json", "application/xml", "text/plain", "application/problem+json", "application/problem+xml", ""]
+    ),
+    st.one_of(
+        st.binary(max_size=40),
+        st.sampled_from([b"[" * 5000, b"<a>" * 300, b"- " * 3000, b"&a: [*a]", b"[1, {}]", b"null", b'{"status": []}']),
+        st.recursive(st.none() | st.floats() | st.text(), st.lists, max_leaves=5).map(
+            lambda item: json.dumps(item).encode()
+        ),
+    ),
+    st.text(max_size=5),
+)
+def test_no_answer_breaks_an_observer(path, status, media_type, body, date):
+    seen("GET", path, status, [("Content-Type", media_type), ("Date", date)], body)

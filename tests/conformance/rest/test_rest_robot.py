@@ -1,0 +1,126 @@
+"""What the suite makes of answers of a live service: what is steady, what agrees, what may be sent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from lending_library import CONTRACT, Library, open_library
+
+from conformance.contract.files import Contract
+from conformance.contract.statement import Endpoints, Statement
+from conformance.documents.openapi import operations_of
+from conformance.engine.session import Session
+from conformance.rest.applicable import answered, few, need, readable, reads, sampled
+from conformance.rest.calls import example_call
+from conformance.rest.effects import reader_of, settles_at
+from conformance.rest.formats import disagreements
+from conformance.rest.generated import Made, targets
+from conformance.rest.motion_guard import Harmless
+from conformance.rest.refusals import refuses
+from conformance.rest.snapshot import changed, changes_by_itself, leaves, snapshot, steady
+from conformance.verdict.effort import Effort
+
+
+@pytest.fixture
+def library():
+    return Library()
+
+
+@pytest.fixture
+def session(library):
+    rest, _, close = open_library(library)
+    session = Session(Statement(endpoints=Endpoints(rest=rest)), Contract.load(CONTRACT), ("http",))
+    session.connect()
+    yield session
+    close()
+
+
+def _operation(session, id_):
+    return next(item for item in operations_of(session.contract) if item.id == id_)
+
+
+def test_requests_are_made_from_examples(session):
+    put = example_call(session, _operation(session, "putBook"))
+    assert put.path == "/books/9780141439600"
+    assert put.send(session).response.status == 204
+    assert example_call(session, _operation(session, "listBooks")).path == "/books/?limit=10"
+    assert put.having("isbn", "a/b %").path == "/books/a%2Fb%20%25"
+
+
+def test_reads_and_what_is_answered(session, library):
+    assert [call.operation.id for call in reads(session)] == ["listBooks", "getBook", "getHours"]
+    library.books.clear()
+    assert [call.operation.id for call in answered(session)] == ["listBooks", "getHours"]
+    assert readable(session, _operation(session, "listBooks")).send(session).response.status == 200
+
+
+def test_what_was_put_is_got(session, library):
+    call = example_call(session, _operation(session, "putBook"))
+    assert reader_of(session, call).path == call.path
+    assert settles_at(session, call).startswith("title is 'Emma'")
+    call.send(session)
+    assert settles_at(session, call) == ""
+    library.books.clear()
+    assert settles_at(session, call) is None
+
+
+def test_formats_disagree_only_where_they_do(session, library):
+    call = readable(session, _operation(session, "getBook"))
+    library.books[9780141439600] = {"title": "Emma", "year": 1, "price": 0.1 + 0.2, "shelf": {"room": "A", "row": 3}}
+    assert disagreements(session, call, ["application/xml", "text/plain"])[0] == []
+    library.fault = "xml-rounds"
+    (found,) = disagreements(session, call, ["application/xml", "text/plain"])[0]
+    assert (found.place, found.told) == ("price", "price is 0.0 in application/xml and 0.30000000000000004 in JSON")
+
+
+def test_what_changes_is_told_from_what_is_steady(session, library):
+    call = readable(session, _operation(session, "getBook"))
+    before = snapshot(session, [call])["getBook"][0]
+    assert before["price"] == 7.25
+    library.books[9780141439600] = dict(library.books[9780141439600], price=8.0)
+    assert changed(before, leaves(call.send(session))) == {"price": (7.25, 8.0)}
+    assert not changes_by_itself(session, call, "price", 0.05)
+    assert steady([{"a": 1, "b": 2}, {"a": 1, "b": 3}]) == {"a": 1}
+
+
+def test_a_slow_robot_is_asked_less(session):
+    assert few(session, range(10), 3) == list(range(10))
+    session.effort = Effort("standard", usual_ms=300)
+    assert few(session, range(10), 3) == [0, 3, 6]
+    assert len(sampled(session, range(100), 50, "name")) == 3
+    assert sampled(session, range(100), 50, "name") == sampled(session, range(100), 50, "name")
+
+
+def test_what_moves_needs_permission(session):
+    assert need(session, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "deletes") == []
+    assert "allow-motion" in session.judge.evidence["http/delete-idempotent"].skips[0]
+    assert need(session, ["http/safe"], lambda item: item.method == "PATCH", "patches") == []
+    assert "no operation that patches" in session.judge.evidence["http/safe"].unclaimed
+    wanted = Made("DELETE", "/books/5", "", b"")
+    assert Harmless(session).made(wanted) is None
+    assert Harmless(replace(session, allow_motion=True)).made(wanted) == wanted
+
+
+def test_schemathesis_makes_the_same_requests_again(session):
+    made = [[*target.examples(), *target.coverage()] for target in targets(session.contract)]
+    again = [[*target.examples(), *target.coverage()] for target in targets(session.contract)]
+    assert sum(map(len, made)) > 100
+    assert [item.body for group in made for item in group] == [item.body for group in again for item in group]
+    assert {item.method for group in made for item in group} > {"GET", "PUT", "DELETE"}
+
+
+@pytest.mark.parametrize(("status", "expected"), [(400, True), (422, True), (404, True), (204, False), (500, False)])
+def test_refusals(status, expected):
+    assert refuses(status) is expected
+    assert not refuses(401)
+
+
+def test_what_a_robot_might_take_of_random_requests_is_slow_or_not_sent():
+    harmless = Harmless(Session(allow_motion=True))
+    wild = Made("PUT", "/robot/velocity/", "application/json", b'{"linear": {"x": 900.5, "y": -7, "z": true}}')
+    assert harmless.made(wild).body == b'{"linear": {"x": 0.1, "y": 1, "z": true}}'
+    vector = b"<Vector3><x>0.6</x><y>0</y><z>0</z></Vector3>"
+    assert harmless.made(Made("PUT", "/robot/velocity/linear/", "application/xml", vector)) is None
+    assert harmless.made(Made("PUT", "/robot/velocity/", "text/plain", wild.body)) is None
+    assert harmless.made(Made("GET", "/robot/pose/", "", b"")) is not None

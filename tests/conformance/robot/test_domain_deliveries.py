@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import math
+import re
+import struct
+from collections import deque
+from itertools import count
+
+import pytest
+from hypothesis import given, settings
+
+from conformance.robot.batch import Batch, Order
+from conformance.robot.deliveries_seen import Seen
+from conformance.robot.delivery import Delivery, deliveries, doubles, path_of, written
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.evidence import Judge
+
+# The contract's fine print: [+-]?(digits[.digits]|.digits)[e[+-]digits]
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)(e[+-]\d+)?")
+_IDS = {
+    f"equivalence/{name}"
+    for name in ("delivery-rest", "delivery-soap", "coffee-soap", "delivery-same", "delivery-order")
+}
+
+
+def bits(value: float) -> bytes:
+    return struct.pack(">d", value)
+
+
+@settings(max_examples=300, deadline=None, database=None)
+@given(doubles())
+def test_every_form_of_a_number_is_the_contracts_and_loses_no_bit(value):
+    for form in written(value):
+        assert _NUMBER.fullmatch(form), form
+        assert bits(float(form)) == bits(value), form
+
+
+def test_the_forms_are_not_all_the_same():
+    assert set(written(0.5)) >= {"0.5", ".5"}
+    assert set(written(3.0)) >= {"3", "+3", "003"}
+    assert math.copysign(1, float(written(-0.0)[0])) < 0
+
+
+def test_a_path_has_its_values_in_the_papers_order():
+    path = path_of("4", "68.269", "38.718", "60.633", "37.51", "76.02", "41.35")
+    assert path == (
+        "/robot/app/delivery/4/depot_x/68.269/depot_y/38.718/dest_x/60.633/dest_y/37.51/source_x/76.02/source_y/41.35"
+    )
+    assert Delivery(4, 68.269, 38.718, 60.633, 37.51, 76.02, 41.35).rest_path == path
+
+
+class Robot:
+    """Rest interface, publishers service and observer of a robot that has one fault, or none."""
+
+    exact = True
+
+    def __init__(self, fault):
+        self._fault, self._numbers, self._seen = fault, count(1), deque()
+
+    def send(self, method, path, **_):
+        parts = path.split("/")
+        self._arrive("rest", Delivery(int(parts[4]), *map(float, parts[6::2])))
+        return Exchange(Request(method, "http://robot" + path), Response(204, (), b"", 1.0))
+
+    def post(self, body, **_):
+        values = dict(re.findall(rb"<(\w+)>([^<]+)</\w+>", body))
+        named = {name.decode(): float(value) for name, value in values.items()}
+        named["message_code"] = int(named["message_code"])
+        self._arrive("soap", Delivery(**named))
+        return Exchange(Request("POST", "http://robot/soap", (), body), Response(200, (), b"", 1.0))
+
+    def _arrive(self, interface, delivery):
+        self._seen.extend(self._fault(next(self._numbers), Seen(delivery, interface)))
+
+    def mark(self):
+        self._seen.clear()
+
+    def collect(self, _count):
+        return list(self._seen)
+
+
+def found(fault) -> set[str]:
+    robot, judge = Robot(fault), Judge(_IDS)
+    orders = []
+    for number, how in enumerate(("rest", "soap", "coffee", "same") * 3):
+        delivery = Delivery(3, *(1 / 3 + number + place for place in range(6)))
+        orders.append(Order(how, delivery, ("3", *map(repr, delivery[1:]))))
+    well = Batch(robot, robot, robot, judge).run(orders)
+    assert well is not bool(judge.refuted())
+    return {id_.split("/")[1] for id_ in judge.refuted()}
+
+
+def narrowed(seen: Seen) -> Seen:
+    values = (struct.unpack(">f", struct.pack(">f", value))[0] for value in seen.delivery[1:])
+    return Seen(Delivery(seen.delivery.message_code, *values), seen.interface)
+
+
+@pytest.mark.parametrize(
+    ("fault", "requirements"),
+    [
+        (lambda _, seen: [seen], set()),
+        (lambda _, seen: [Seen(seen.delivery)], set()),
+        (lambda number, seen: [seen, seen] if number == 1 else [seen], {"delivery-rest"}),
+        (lambda number, seen: [] if number == 2 else [seen], {"delivery-soap"}),
+        (lambda number, seen: [narrowed(seen)] if number == 3 else [seen], {"coffee-soap"}),
+        (lambda number, seen: [] if number == 5 else [seen], {"delivery-same"}),
+        (lambda _, seen: [Seen(seen.delivery, "rest")], {"delivery-soap", "coffee-soap", "delivery-same"}),
+        (
+            lambda _, seen: [Seen(seen.delivery._replace(message_code=3), seen.interface)],
+            {"coffee-soap"},
+        ),
+    ],
+)
+def test_what_does_not_arrive_as_it_was_sent_is_found(fault, requirements):
+    assert found(fault) == requirements
+
+
+def test_another_order_is_found():
+    kept: list[Seen] = []
+
+    def overtaken(number, seen):
+        if number == 1:
+            kept.append(seen)
+            return []
+        return [seen, *kept] if number == 6 else [seen]
+
+    assert found(overtaken) == {"delivery-order"}
+
+
+@settings(max_examples=50, deadline=None, database=None)
+@given(deliveries())
+def test_a_delivery_survives_its_path(delivery):
+    parts = delivery.rest_path.split("/")
+    assert Delivery(int(parts[4]), *map(float, parts[6::2])).bits == delivery.bits

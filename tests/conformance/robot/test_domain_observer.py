@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from conformance.contract.statement import Limits, Statement
+from conformance.engine.session import Session
+from conformance.robot.observer import observe
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange, Request, Response
+
+_BASE = "http://robot:7003/r2d2"
+_ZERO = dict.fromkeys("xyz", 0.0)
+
+
+def odometry(second: int = 1, **orientation: float) -> dict:
+    return {
+        "header": {"stamp": {"sec": second, "nanosec": 0}, "frame_id": "odom"},
+        "child_frame_id": "base_link",
+        "pose": {
+            "pose": {"position": _ZERO, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1} | orientation},
+            "covariance": [0] * 36,
+        },
+        "twist": {"twist": {"linear": _ZERO, "angular": _ZERO}, "covariance": [0] * 36},
+    }
+
+
+@pytest.fixture
+def session() -> Session:
+    made = Session(statement=Statement(limits=Limits(linear_m_s=0.5, angular_rad_s=2.0)))
+    made.rest = HttpClient(_BASE + "/", made.connection)
+    observe(made)
+    observe(made)
+    return made
+
+
+def see(session: Session, path: str, value: object, *, status: int = 200, headers=(("Accept", "*/*"),), method="GET"):
+    body = value if isinstance(value, bytes) else json.dumps(value).encode()
+    request = Request(method, _BASE + path, (("Host", "robot:7003"), *headers))
+    exchange = Exchange(request, Response(status, (("Content-Type", "application/json"),), body, 0.0))
+    for listener in session.connection.listeners:
+        listener(exchange)
+
+
+def found(session: Session) -> set[str]:
+    return set(session.judge.refuted())
+
+
+def test_a_run_has_one_observer(session):
+    assert len(session.connection.listeners) == 1
+
+
+def test_good_readings_are_cases(session):
+    for second in (1, 1, 2):
+        see(session, "/robot/pose/", odometry(second))
+    see(session, "/robot/velocity/", {"linear": _ZERO, "angular": _ZERO, "unit": "m/s"})
+    see(session, "/robot/velocity/linear/", _ZERO)
+    assert not found(session)
+    assert session.judge.evidence["rest-resources/pose-type"].cases == 3
+    assert session.judge.evidence["rest-resources/linear-type"].cases == 1
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "requirement"),
+    [
+        ("/robot/pose/", {}, "rest-resources/pose-type"),
+        ("/robot/pose/", b"<Odometry/>", "rest-resources/pose-type"),
+        ("/robot/pose/", odometry(6, w=1.01), "rest-resources/pose-quaternion"),
+        ("/robot/pose/", odometry(6, w=0), "rest-resources/pose-quaternion"),
+        ("/robot/pose/", odometry(0), "rest-resources/pose-stamp"),
+        ("/robot/velocity/", {"linear": _ZERO}, "rest-resources/velocity-type"),
+        ("/robot/velocity/", {"linear": _ZERO | {"x": 0.6}, "angular": _ZERO}, "safety/limits-hold"),
+        ("/robot/velocity/", {"linear": _ZERO, "angular": _ZERO | {"z": -2.2}}, "safety/limits-hold"),
+        ("/robot/velocity/linear/", [0, 0, 0], "rest-resources/linear-type"),
+        ("/robot/velocity/linear/", _ZERO | {"y": 1.0}, "safety/limits-hold"),
+    ],
+)
+def test_one_bad_reading_among_good_ones_is_found(session, path, value, requirement):
+    see(session, "/robot/pose/", odometry(5))
+    see(session, path, value)
+    assert found(session) == {requirement}
+
+
+def test_an_error_is_no_reading(session):
+    see(session, "/robot/velocity/", {}, status=500)
+    assert found(session) == {"rest-resources/velocity-type"}
+
+
+def test_before_the_first_odometry_retry_after_is_asked_for(session):
+    see(session, "/robot/pose/", {}, status=503)
+    assert found(session) == {"rest-resources/pose-unavailable"}
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        {"headers": (("Accept", "application/xml"),)},
+        {"headers": (("X-Odd", "1"),)},
+        {"method": "HEAD"},
+        {"status": 429},
+    ],
+)
+def test_odd_requests_are_left_to_others(session, odd):
+    see(session, "/robot/pose/", b"", **odd)
+    assert not found(session)
+
+
+def test_without_the_token_nothing_is_judged(session):
+    session.connection = replace(session.connection, token="secret")  # noqa: S106 - no secret
+    see(session, "/robot/pose/", b"", status=401)
+    assert not found(session)
+
+
+def test_undeclared_limits_are_not_known():
+    session = Session()
+    session.rest = HttpClient(_BASE, session.connection)
+    observe(session)
+    see(session, "/robot/velocity/", {"linear": _ZERO | {"x": 3.0}, "angular": _ZERO})
+    assert not found(session)

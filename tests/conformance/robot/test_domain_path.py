@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from conformance.robot.geometry import Pose, length_of, quaternion_of, wrapped, yaw_of
+from conformance.robot.path import judge_path
+from conformance.robot.robot import Odometry, Velocity
+from conformance.transport.exchange import Exchange, Request
+from conformance.verdict.evidence import Judge
+
+_IDS = {"rest-resources/pose-motion", "rest-resources/pose-rotation"}
+_START = Pose(1.0, 2.0, 0.3)
+_EVIDENCE = Exchange(Request("GET", "http://robot/robot/pose/"), None, "made up")
+
+
+def drive(v: float, w: float, start: Pose, change=lambda pose: pose, seconds: float = 1.0) -> tuple[list, list]:
+    """The odometry of an arc, read fifty times a second."""
+    trace, velocity, pose = [], Velocity(linear_x=v, angular_z=w), start
+    for step in range(int(seconds * 50)):
+        at = step / 50
+        trace.append(Odometry(at, at + 0.001, 1000.0 + at, change(pose), velocity, _EVIDENCE))
+        heading = pose.yaw + w / 100
+        pose = Pose(
+            pose.x + v / 50 * math.cos(heading), pose.y + v / 50 * math.sin(heading), wrapped(pose.yaw + w / 50)
+        )
+    return trace, [velocity] * len(trace)
+
+
+def refuted(v: float, w: float, change=lambda pose: pose, start: Pose = _START) -> set[str]:
+    judge = Judge(_IDS)
+    judge_path(judge, *drive(v, w, start, change))
+    assert sum(evidence.cases for evidence in judge.evidence.values())
+    return {id_.split("/")[1] for id_ in judge.refuted()}
+
+
+@pytest.mark.parametrize("v", [0.3, -0.3, 0.0])
+@pytest.mark.parametrize("w", [1.0, -2.5, 0.0])
+def test_a_robot_that_does_what_its_velocity_says_is_not_refuted(v, w):
+    if v or w:
+        assert refuted(v, w, start=Pose(-3.0, 5.0, 3.0)) == set()
+
+
+@pytest.mark.parametrize(
+    ("change", "v", "w", "found"),
+    [
+        (lambda pose: pose._replace(x=100 * pose.x, y=100 * pose.y), 0.3, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(x=pose.y, y=pose.x), 0.3, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(x=-pose.x, y=-pose.y), 0.3, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(x=pose.x / 2, y=pose.y / 2), 0.5, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(x=0.0, y=0.0), 0.3, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(yaw=-pose.yaw), 0.0, 1.0, "pose-rotation"),
+        (lambda pose: pose._replace(yaw=0.0), 0.0, 1.0, "pose-rotation"),
+        (lambda pose: pose._replace(yaw=pose.yaw / 2), 0.0, 1.0, "pose-rotation"),
+        (lambda pose: pose._replace(yaw=math.nan), 0.0, 1.0, "pose-rotation"),
+    ],
+)
+def test_a_pose_that_moves_otherwise_is_refuted(change, v, w, found):
+    assert found in refuted(v, w, change)
+
+
+def test_a_robot_that_did_not_move_is_not_judged():
+    judge = Judge(_IDS)
+    judge_path(judge, *drive(0.0, 0.0, Pose(0, 0, 0)))
+    assert not any(evidence.cases for evidence in judge.evidence.values())
+
+
+def test_a_simulation_at_half_speed_goes_by_its_stamps():
+    trace, measured = drive(0.3, 0.0, Pose(0, 0, 0))
+    slow = [Odometry(2 * o.sent, 2 * o.received, o.stamp, o.pose, o.velocity, o.exchange) for o in trace]
+    judge = Judge(_IDS)
+    judge_path(judge, slow, measured)
+    assert not judge.refuted()
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0, -3.0, math.pi / 2])
+@pytest.mark.parametrize("length", [1.0, 2.0, 1e-3])
+def test_a_quaternion_of_any_length_has_its_heading(yaw, length):
+    quaternion = quaternion_of(yaw, length)
+    assert yaw_of(quaternion) == pytest.approx(yaw)
+    assert length_of(quaternion) == pytest.approx(length)
+
+
+def test_a_pose_is_seen_from_a_frame():
+    assert Pose(1.0, 0.0, 0.0).seen_from(Pose(2.0, -1.0, math.pi / 2)) == pytest.approx((2.0, 0.0, math.pi / 2))
+    assert Pose(0, 0, 0).ahead(2.0, math.pi / 2) == pytest.approx((0.0, 2.0, math.pi / 2))

@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import json
+import threading
+import time
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from conformance.engine.session import Session
+from conformance.robot.stopping import bring_to_rest, leave_at_rest
+from conformance.transport.client import Connection, HttpClient
+
+_STILL = {part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")}
+
+
+class Body:
+    """A robot with goals of its own waiting, which stops when it has none left and is told to."""
+
+    def __init__(self, goals: int = 0, speed: float = 0.0, *, obeys: bool = True) -> None:
+        self.goals, self.speed, self.obeys = goals, speed, obeys
+        self.asked: list[str] = []
+
+    def answer(self, method: str, path: str, body: bytes) -> tuple[int, object]:
+        self.asked.append(f"{method} {path}")
+        if path.endswith("/goal/"):
+            if method == "DELETE" and self.goals and self.obeys:
+                self.goals -= 1
+                return 204, None
+            return (200, {"goal": 1}) if self.goals else (404, None)
+        if method == "PUT":
+            if self.goals:
+                return 409, None
+            self.speed = json.loads(body)["linear"]["x"] if self.obeys else self.speed
+            return 204, None
+        return 200, {**_STILL, "linear": {"x": self.speed, "y": 0.0, "z": 0.0}}
+
+
+@contextmanager
+def serving(body: Body):
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+        wbufsize = -1
+
+        def _do(self) -> None:
+            sent = self.rfile.read(int(self.headers.get("Content-Length") or 0))
+            status, value = body.answer(self.command, self.path, sent)
+            content = b"" if value is None else json.dumps(value).encode()
+            self.send_response(status)
+            self.send_header("Content-Type", "application/json")
+            self.send_header("Content-Length", str(len(content)))
+            self.end_headers()
+            self.wfile.write(content)
+
+        do_GET = do_PUT = do_DELETE = _do  # noqa: N815 - http.server's names
+
+        def log_message(self, *_: object) -> None:
+            return
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
+def session(url: str, *, motion: bool = True, timeout_s: float = 10.0) -> Session:
+    made = Session(allow_motion=motion, connection=Connection(timeout_s=timeout_s))
+    made.rest = HttpClient(url, made.connection)
+    return made
+
+
+@pytest.mark.parametrize(("goals", "speed"), [(0, 0.0), (1, 0.3), (5, 0.3)])
+def test_a_robot_is_cancelled_until_it_has_no_goal_and_stands(goals, speed):
+    body = Body(goals, speed)
+    with serving(body) as url:
+        assert bring_to_rest(session(url)) == ""
+    assert (body.goals, body.speed) == (0, 0.0)
+
+
+def test_a_robot_that_does_not_cancel_is_not_at_rest():
+    with serving(Body(1, 0.3, obeys=False)) as url:
+        assert bring_to_rest(session(url)).startswith("its goal is still active")
+
+
+def test_a_robot_that_does_not_stop_is_not_at_rest():
+    with serving(Body(0, 0.3, obeys=False)) as url:
+        made = session(url)
+        assert bring_to_rest(made) == "it still moves with 0.3 m/s or rad/s"
+
+
+def test_a_robot_that_is_not_there_raises_nothing(closed_port):
+    started = time.monotonic()
+    assert "its velocity cannot be read" in bring_to_rest(session(closed_port))
+    leave_at_rest(session(closed_port))
+    assert time.monotonic() - started < 5
+
+
+def test_leaving_a_robot_that_hangs_takes_a_few_seconds(listening):
+    made = session(listening(lambda connection: connection.recv(1) and time.sleep(30)), timeout_s=60)
+    started = time.monotonic()
+    leave_at_rest(made)
+    assert time.monotonic() - started < 10
+
+
+def test_a_robot_that_may_not_be_moved_is_sent_nothing():
+    body = Body(1, 0.3)
+    with serving(body) as url:
+        leave_at_rest(session(url, motion=False))
+    assert body.asked == []
+
+
+def test_leaving_judges_nothing_and_stops_the_robot():
+    body = Body(2, 0.3)
+    with serving(body) as url:
+        made = session(url)
+        heard: list[object] = []
+        made.connection.listeners.append(heard.append)
+        leave_at_rest(made)
+    assert (body.goals, body.speed, heard) == (0, 0.0, [])

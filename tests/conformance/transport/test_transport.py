@@ -1,0 +1,113 @@
+"""Every exchange ends at its deadline, and what came instead of an answer is told."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from conformance.transport.client import Connection, HttpClient, NoAnswerError
+
+_DEADLINE = 0.4
+
+
+def _client(url: str, **options) -> HttpClient:
+    return HttpClient(url, Connection(timeout_s=_DEADLINE, **options))
+
+
+def _head(connection) -> None:
+    data = b""
+    while b"\r\n\r\n" not in data:
+        data += connection.recv(65536)
+
+
+def test_an_answer_that_drips_ends_at_the_deadline(listening):
+    def drip(connection):
+        _head(connection)
+        connection.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: 1000\r\n\r\n")
+        for _ in range(1000):
+            connection.sendall(b"x")
+            time.sleep(0.02)
+
+    client = _client(listening(drip))
+    started = time.monotonic()
+    with pytest.raises(NoAnswerError, match=r"no answer within 0\.4 s") as error:
+        client.send("GET", "/")
+    assert error.value.kind == "timeout"
+    assert time.monotonic() - started < 5 * _DEADLINE
+
+
+def test_a_hanging_endpoint_costs_its_deadline_twice_at_most(listening):
+    client = _client(listening(lambda connection: (_head(connection), time.sleep(5))))
+    for _ in range(2):
+        with pytest.raises(NoAnswerError, match="within"):
+            client.send("GET", "/slow/17")
+    started = time.monotonic()
+    with pytest.raises(NoAnswerError, match="has not answered 2 times") as error:
+        client.send("GET", "/slow/18")
+    assert error.value.kind == "unasked"
+    assert time.monotonic() - started < _DEADLINE
+
+
+@pytest.mark.parametrize(
+    ("answer", "kind", "told"),
+    [
+        (b"", "closed", "closed without an answer"),
+        (b"SSH-2.0-OpenSSH_9.2\r\n\r\n", "garbage", "no HTTP"),
+        (b"HTTP/1.1 200 OK\r\nContent-Length: 10\r\n\r\nabc", "garbage", "no HTTP"),
+        (b"HTTP/1.1 200 OK\r\nContent-Length: ten\r\n\r\n", "garbage", "no HTTP"),
+    ],
+)
+def test_what_is_no_answer_is_told_by_kind(listening, answer, kind, told):
+    def reply(connection):
+        _head(connection)
+        connection.sendall(answer)
+        connection.close()
+
+    with pytest.raises(NoAnswerError, match=told) as error:
+        _client(listening(reply)).send("GET", "/")
+    assert error.value.kind == kind
+
+
+def test_a_closed_port_is_refused(closed_port):
+    with pytest.raises(NoAnswerError, match="no connection") as error:
+        _client(closed_port).send("GET", "/")
+    assert error.value.kind == "refused"
+
+
+def test_the_token_is_sent_and_never_shown(listening):
+    seen = []
+
+    def reply(connection):
+        seen.append(connection.recv(65536))
+        connection.sendall(b"HTTP/1.1 204 No Content\r\n\r\n")
+
+    exchange = _client(listening(reply), token="s3cret").send("GET", "/")  # noqa: S106 - made up
+    assert b"Authorization: Bearer s3cret\r\n" in seen[0]
+    assert "s3cret" not in repr(exchange)
+    assert '-H "Authorization: Bearer $ROAAS_TOKEN"' in exchange.request.curl()
+
+
+def test_a_rate_ceiling_is_kept(listening):
+    def reply(connection):
+        while connection.recv(65536):
+            connection.sendall(b"HTTP/1.1 204 No Content\r\n\r\n")
+
+    client = _client(listening(reply), request_rate=50)
+    started = time.monotonic()
+    for _ in range(11):
+        client.send("GET", "/")
+    assert time.monotonic() - started >= 10 / 50
+
+
+def test_the_base_path_and_an_odd_target_are_sent_as_given(listening):
+    seen = []
+
+    def reply(connection):
+        seen.append(connection.recv(65536))
+        connection.sendall(b"HTTP/1.1 204 No Content\r\n\r\n")
+
+    exchange = _client(listening(reply) + "/r2d2/api/").send("GET", "/a/../%zz?x=+1&y=NaN", headers=[("Accept", "")])
+    assert seen[0].startswith(b"GET /r2d2/api/a/../%zz?x=+1&y=NaN HTTP/1.1\r\n")
+    assert b"accept" not in seen[0].lower()
+    assert exchange.request.url.endswith("/r2d2/api/a/../%zz?x=+1&y=NaN")

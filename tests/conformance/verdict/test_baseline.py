@@ -1,0 +1,58 @@
+"""A baseline accepts known failures for a while, and is itself judged."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+import pytest
+
+from conformance.contract.ledger import Requirement
+from conformance.verdict.baseline import BaselineError, Expectation, apply_baseline, load_baseline
+from conformance.verdict.evidence import Evidence
+from conformance.verdict.verdicts import Verdict
+
+_TODAY = dt.date(2026, 11, 20)
+
+
+def _applied(value, expires):
+    requirement = Requirement("http/date", "http", "MUST", "A text.", "RFC")
+    entry = Expectation("http/date", "ticket 7", dt.date.fromisoformat(expires))
+    return apply_baseline([Verdict(requirement, value, "why", Evidence())], [entry], _TODAY)[0]
+
+
+@pytest.mark.parametrize(
+    ("value", "expires", "expected"),
+    [
+        ("fail", "2026-12-31", "warn"),
+        ("fail", "2026-11-20", "warn"),
+        ("fail", "2026-11-19", "fail"),
+        ("pass", "2026-12-31", "error"),
+        ("pass", "2026-11-19", "error"),
+        ("skip", "2026-12-31", "skip"),
+        ("not-claimed", "2026-12-31", "not-claimed"),
+    ],
+)
+def test_an_entry_changes_the_verdict_it_is_for(value, expires, expected):
+    assert _applied(value, expires).value == expected
+
+
+def test_an_expired_entry_is_named():
+    assert "expired on 2026-11-19" in _applied("fail", "2026-11-19").reason
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("[[expected]]\nrequirement = 'http/dat'\nreason = 'x'\nexpires = 2027-01-01", "'http/dat'"),
+        ("[[expected]]\nrequirement = 'http/date'\nexpires = 2027-01-01", "no reason"),
+        ("[[expected]]\nrequirement = 'http/date'\nreason = 'x'\nexpires = '2027-01-01'", "without quotes"),
+        ("[[expect]]\nrequirement = 'http/date'", "'expect'"),
+        ("[expected]\nrequirement = 'http/date'", "two brackets"),
+    ],
+)
+def test_a_wrong_baseline_is_refused_by_name(tmp_path, text, named):
+    path = tmp_path / "baseline.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(BaselineError) as error:
+        load_baseline(path, {"http/date"})
+    assert named in str(error.value)
