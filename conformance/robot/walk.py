@@ -1,4 +1,4 @@
-"""What the walks of a state machine share: they end together, by a refutation, by an unreachable robot, or by the clock."""
+"""What the walks of a state machine share: they end by a refutation, an unreachable robot, or the clock."""
 
 from __future__ import annotations
 

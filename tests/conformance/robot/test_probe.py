@@ -67,6 +67,7 @@ def test_a_domain_without_a_robot_is_told(domain_id):
 
 
 def test_the_suite_loads_no_ros():
-    program = "import sys, conformance.robot.probe.client, conformance.checks.equivalence.test_ros_graph;print('rclpy' in sys.modules)"
+    modules = "conformance.robot.probe.client, conformance.checks.equivalence.test_ros_graph"
+    program = f"import sys, {modules}; print('rclpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
