@@ -7,11 +7,14 @@ passed by ``jsonschema_rs`` before: a plan of a thousand poses takes it 1 ms, an
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import jsonschema_rs
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
+from jsonschema.validators import extend
+
+from conformance.documents.json_text import shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -109,8 +112,18 @@ def kind_of(schema: Schema) -> str:
     return next((name for name in types_of(schema) if name != "null"), "string")
 
 
+def is_number(value: Any) -> bool:
+    """Whether a JSON value is a number that a double can hold; an integer counts as one."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(as_double(value))
+
+
+_TYPES: Final = Draft202012Validator.TYPE_CHECKER.redefine("number", lambda _, value: is_number(value))
+# jsonschema gives extend() no types.
+_Validator: Final = cast("Any", extend)(Draft202012Validator, type_checker=_TYPES)
+
+
 class Shape:
-    """A schema that values are held against.
+    """A schema that values are held against; its numbers are those that a double can hold.
 
     Args:
         schema: without references.
@@ -118,18 +131,18 @@ class Shape:
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
-        self._validator = Draft202012Validator(schema)
+        self._validator = _Validator(schema)
         self._quick = jsonschema_rs.validator_for(schema)
 
-    def problem(self, value: Any) -> str:
-        """Why ``value`` does not have this shape, with its place; empty where it has."""
+    def problem(self, value: Any, where: str = "") -> str:
+        """Why ``value``, found at ``where``, does not have this shape, with its place; empty where it has."""
         try:
             if self._passes(value):
                 return ""
             error = best_match(self._validator.iter_errors(value))
         except RecursionError:
             return "the value is nested too deeply"
-        return _told(error) if error is not None else ""
+        return _described(error, where) if error is not None else ""
 
     def broken_rule(self, value: Any) -> tuple[str, bool]:
         """The keyword that ``value`` breaks first, and whether it is the value itself that breaks it (or a part)."""
@@ -138,14 +151,26 @@ class Shape:
 
     def _passes(self, value: Any) -> bool:
         try:
-            return bool(self._quick.is_valid(value))
+            return bool(self._quick.is_valid(value)) and all(map(math.isfinite, numbers_in(value)))
         except (ValueError, TypeError, OverflowError):
             return False  # a number that it does not take (an Infinity): the other one judges that
 
 
-def _told(error: ValidationError) -> str:
-    where = ".".join(str(part) for part in error.absolute_path) or "the value"
-    return f"at {where}: {error.message[:300]}"
+def _described(error: ValidationError, where: str) -> str:
+    place = where
+    for part in error.absolute_path:
+        place += f"[{part}]" if isinstance(part, int) else f".{part}" if place else str(part)
+    value: Any = error.instance
+    rule: Any = error.validator_value
+    if error.validator == "required":
+        missing = next(name for name in rule if name not in value)
+        return f"{place}.{missing} is missing" if place else f"{missing} is missing"
+    place = place or "the value"
+    if error.validator == "type":
+        return f"{place} is {shown(value)}, not of type {rule}"
+    if error.validator in {"minItems", "maxItems"}:
+        return f"{place} has {len(value)} items"
+    return f"{place}: {error.message[:300]}"
 
 
 _SHAPES: dict[int, Shape] = {}

@@ -7,8 +7,10 @@ import json
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Final
 
+_SHOWN: Final = 60
+_BYTE_ORDER_MARK: Final = "a byte order mark before the JSON"
 # An integer with more digits is beyond every double; Python refuses to read 5,000 of them.
 _DIGITS_READ = 400
 
@@ -37,6 +39,13 @@ class JsonText:
         if self.non_finite:
             return f"the number {self.non_finite}"
         return self.malformed or self.encoding or (f"the name {self.twice!r} twice" if self.twice else "")
+
+    @property
+    def unreadable(self) -> str:
+        """Why no reader gets the value, or empty: most pass over a byte order mark and a name that stands twice."""
+        if self.non_finite:
+            return f"the number {self.non_finite}"
+        return self.malformed or (self.encoding if self.encoding != _BYTE_ORDER_MARK else "")
 
 
 class _Reader:
@@ -82,7 +91,7 @@ def read_json(body: bytes) -> JsonText:
     """
     encoding = ""
     if body.startswith(codecs.BOM_UTF8):
-        encoding = "a byte order mark before the JSON"
+        encoding = _BYTE_ORDER_MARK
         body = body[3:]
     try:
         text = body.decode("utf-8")
@@ -105,3 +114,12 @@ def read_json(body: bytes) -> JsonText:
     except RecursionError:
         malformed = "JSON that is nested too deeply to be read"
     return JsonText(value, malformed, encoding, reader.non_finite, reader.twice)
+
+
+def shown(value: Any) -> str:
+    """A value as JSON writes it, cut where it is long."""
+    try:
+        text = json.dumps(value)
+    except (ValueError, RecursionError):
+        text = type(value).__name__
+    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."

@@ -6,7 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import Any, Final
 
-from conformance.robot.message_shapes import is_number, shown
+from conformance.documents.json_schema import is_number
+from conformance.documents.json_text import shown
 
 # Two writings of one double.
 _EXACT: Final = 1e-9

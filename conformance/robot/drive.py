@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from conformance.robot.message_shapes import TWIST, VECTOR3, fault_in, read_json
+from conformance.robot.message_shapes import TWIST, VECTOR3, read_as
 from conformance.robot.path import judge_path
 from conformance.robot.robot import STILL, VELOCITY, Velocity
 
@@ -100,8 +100,7 @@ class Drive:
         if answer is None or answer.status not in {200, 204}:
             problem = exchange.came
         elif answer.status == 200:  # noqa: PLR2004 - with content
-            value, problem = read_json(answer)
-            problem = problem or fault_in(value, shape)
+            value, problem = read_as(answer, shape)
             if not problem:
                 given = value if name == "linear-put" else value["linear"] | _prefixed(value["angular"])
                 asked = (

@@ -6,8 +6,9 @@ import math
 import time
 from typing import TYPE_CHECKING, Any, Final
 
+from conformance.documents.json_text import shown
 from conformance.robot.geometry import quaternion_of
-from conformance.robot.message_shapes import STATUS, fault_in, shown
+from conformance.robot.message_shapes import STATUS
 from conformance.robot.robot import GOAL_PATH
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def difference(goal: Any, put: dict[str, Any]) -> str:
 
 def status_fault(goal: Any) -> str:
     """What is wrong with the status of an active goal."""
-    problem = fault_in(goal.get("status"), STATUS, "status")
+    problem = STATUS.problem(goal.get("status"), "status")
     if problem:
         return problem
     code = goal["status"]["code"]

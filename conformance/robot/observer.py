@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from conformance.contract.statement import Limits
 from conformance.robot.geometry import length_of
-from conformance.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, Shape, fault_in, read_json
+from conformance.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
 
 if TYPE_CHECKING:
+    from conformance.documents.json_schema import Shape
     from conformance.engine.session import Session
     from conformance.transport.exchange import Exchange
 
@@ -74,9 +75,7 @@ class Observer:
             )
         if response.status == _UNAVAILABLE:
             return
-        value: Any
-        value, problem = (None, exchange.came) if response.status != 200 else read_json(response)  # noqa: PLR2004 - OK
-        problem = problem or fault_in(value, shape)
+        value, problem = read_as(response, shape)
         if not judge.check(id_, not problem, exchange, expected, found=problem):
             return
         if path == "/robot/pose/":

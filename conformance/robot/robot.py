@@ -7,13 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from conformance.contract.statement import Limits
+from conformance.documents.representation import projected
 from conformance.robot.geometry import Pose, pose_of
-from conformance.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, Shape, body_of, pruned, read_as
+from conformance.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
 from conformance.robot.observer import observe
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from conformance.documents.json_schema import Shape
     from conformance.engine.session import Session
     from conformance.transport.exchange import Exchange
 
@@ -123,7 +125,7 @@ class Robot:
         """GET a message, without what a robot adds to it; None where the answer is something else."""
         exchange = self.get(path)
         value, problem = read_as(exchange.response, shape)
-        return (None if problem else pruned(value, shape)), exchange
+        return (None if problem else projected(value, shape.schema)), exchange
 
     def put(self, path: str, value: Mapping[str, Any]) -> Exchange:
         """PUT as JSON."""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 from xml.sax.saxutils import escape
 
 from conformance.documents.xml_names import local
 from conformance.robot.delivery import COFFEE, Delivery
-from conformance.robot.message_shapes import NUMBER, Items, Leaf, Shape
-from conformance.soap.envelope import Envelope, elements, read_answer, text_of
+from conformance.soap.envelope import Envelope, elements, read_answer
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -61,33 +59,3 @@ def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
     if exchange.response is None or not exchange.response.ok or read is None or read.first is None or read.fault:
         return [], f"no SOAP response: {exchange.came}"
     return [child for child in elements(read.first) if local(str(child.tag)) == "return"], ""
-
-
-def value_of(parent: etree._Element, shape: Shape) -> Any:
-    """An element as the JSON of a shape: fields by their local names; None for what is not there or no number."""
-    if isinstance(shape, Leaf):
-        text = text_of(parent)
-        if shape is NUMBER or shape.expected.startswith("an integer"):
-            return _number(text)
-        return text
-    if isinstance(shape, Items):
-        return [value_of(item, shape.shape) for item in elements(parent)]
-    children: dict[str, list[etree._Element]] = {}
-    for child in elements(parent):
-        children.setdefault(local(str(child.tag)), []).append(child)
-    value: dict[str, Any] = {}
-    for name, part in shape.items():
-        found = children.get(name, [])
-        if isinstance(part, Items):
-            value[name] = [value_of(item, part.shape) for item in found]
-        elif found:
-            value[name] = value_of(found[0], part)
-    return value
-
-
-def _number(text: str) -> float | None:
-    try:
-        value = float(text.strip())
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None

@@ -6,7 +6,8 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from conformance.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as, read_json
+from conformance.documents.json_text import read_json
+from conformance.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
 from conformance.transport.client import HttpClient, NoAnswerError
 
 if TYPE_CHECKING:
@@ -67,8 +68,8 @@ def leave_at_rest(session: Session) -> None:
 
 def _shows(answer: Response) -> bool:
     """Whether an answer shows anything that may be a goal."""
-    value, problem = read_json(answer)
-    return not problem and isinstance(value, dict) and bool(value)
+    text = read_json(answer.body)
+    return not text.unreadable and isinstance(text.value, dict) and bool(text.value)
 
 
 class _Stiller:

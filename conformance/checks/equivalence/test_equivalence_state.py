@@ -7,19 +7,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
+from conformance.documents.representation import from_element, projected
 from conformance.robot.agreement import Slack, disagreement, entries_of, stamp_of
 from conformance.robot.drive import BusyError, Drive
 from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals, make_room
-from conformance.robot.message_shapes import GET_PLAN, GOAL, ODOMETRY, STATUS, TWIST, Items, Shape, fault_in, pruned
+from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY, TWIST
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.robot.plan import plan_of, query, reachable
 from conformance.robot.robot import POSE, SENSORS, SERVICES, STILL, VELOCITY, Robot, Velocity
-from conformance.robot.soap_services import ask, returned, value_of
+from conformance.robot.soap_services import ask, returned
 from conformance.robot.stopping import bring_to_rest
 
 if TYPE_CHECKING:
+    from conformance.documents.json_schema import Shape
     from conformance.engine.session import Session
     from conformance.robot.geometry import Pose
     from conformance.soap.service import SoapService
@@ -32,8 +34,6 @@ _SLACK: Final = Slack()
 _SAME: Final = Slack(0.0, 0.0)
 # More than any tolerance that is asked for here, m.
 _END_OFF: Final = 0.3
-# Beside the goal itself, what it is about to do may change at any time.
-_GOAL_AND_STATUS: Final[Shape] = {**GOAL, "status": STATUS} if isinstance(GOAL, dict) else GOAL
 _STATES: Final[dict[str, tuple[str, str, Shape]]] = {
     "pose": (POSE, "GetPose", ODOMETRY),
     "velocity": (VELOCITY, "GetVelocity", TWIST),
@@ -59,7 +59,7 @@ def _answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
     found, problem = returned(exchange)
     if problem or len(found) != 1:
         return None, problem or f"{len(found)} return elements"
-    return value_of(found[0], shape), ""
+    return from_element(found[0], shape.schema), ""
 
 
 def _compare(robot: Robot, subscribers: SoapService, judge: Judge, name: str) -> None:
@@ -135,15 +135,15 @@ def test_lists(robot: Robot, subscribers: SoapService, judge: Judge, effort: Eff
 def _compare_lists(
     robot: Robot, subscribers: SoapService, judge: Judge, name: str, path: str, operation: str, shape: Shape
 ) -> None:
-    entry: Any = shape.shape if isinstance(shape, Items) else shape
-    names = tuple(entry)
+    entry = shape.schema["items"]
+    names = tuple(entry["properties"])
     before, _ = robot.read(path, shape)
     exchange = ask(subscribers, operation)
     found, problem = returned(exchange)
     after, _ = robot.read(path, shape)
     if before is None or after is None:
         return
-    listed = entries_of([value_of(item, entry) for item in found], names)
+    listed = entries_of([from_element(item, entry) for item in found], names)
     wanted = [entries_of(before, names), entries_of(after, names)]
     if not problem and listed not in wanted:
         odd = sorted(set(listed) ^ set(wanted[0]))
@@ -187,7 +187,7 @@ def _compare_plans(
     after, _ = robot.read(query(**parameters), GET_PLAN)
     if before is None or after is None:
         return
-    problem = problem or fault_in(between, GET_PLAN)
+    problem = problem or GET_PLAN.problem(between)
     if not problem and not disagreement(before, after, before, _SAME):
         problem = disagreement(before, between, after, _SAME)
     elif not problem and plan_of(between).poses[-1].distance(goal) > _END_OFF:
@@ -246,8 +246,8 @@ def _goal_difference(robot: Robot, subscribers: SoapService) -> tuple[str | None
     after, last = robot.goal()
     statuses = {one.response.status for one in (first, last) if one.response}
     if before is not None and after is not None and before["goal_id"]["id"] == after["goal_id"]["id"]:
-        between = value_of(found[0], _GOAL_AND_STATUS) if found else None
-        shown = [pruned(goal, _GOAL_AND_STATUS) for goal in (before, after)]
+        between = from_element(found[0], GOAL_AND_STATUS.schema) if found else None
+        shown = [projected(goal, GOAL_AND_STATUS.schema) for goal in (before, after)]
         problem = problem or ("no goal" if between is None else disagreement(shown[0], between, shown[1], _SLACK))
         return problem, exchange
     if statuses == {404}:

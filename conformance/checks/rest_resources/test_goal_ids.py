@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 import pytest
 from hypothesis import strategies as st
 
+from conformance.documents.json_text import shown
 from conformance.robot.goal import NEW, arrived, await_goal, await_none, difference, goal_body, put_goal
 from conformance.robot.goals import choose_goals
-from conformance.robot.message_shapes import shown
 from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
 

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from conformance.robot.message_shapes import MESSAGE_TYPE, SERVICE_TYPE, Leaf, Shape, read_as
+from conformance.robot.message_shapes import MESSAGE_TYPE, SERVICE_TYPE, read_as
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.robot.robot import SENSORS, SERVICES, Robot
 
 if TYPE_CHECKING:
+    from conformance.documents.json_schema import Shape
     from conformance.engine.session import Session
     from conformance.transport.exchange import Exchange
     from conformance.verdict.effort import Effort
@@ -44,7 +45,7 @@ def test_services(roaas: Session, judge: Judge, effort: Effort) -> None:
     _read_often(Robot(roaas), judge, "services", SERVICES, SERVICES_SHAPE, SERVICE_TYPE, effort.cases(100))
 
 
-def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, full: Leaf, times: int) -> None:
+def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, full: Shape, times: int) -> None:
     fields = "{name, topic, type}" if what == "sensors" else "{name, type}"
     before: list[str] | None = None
     for _ in range(times):
@@ -68,7 +69,7 @@ def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, 
         before = listed
 
 
-def _judge_entries(judge: Judge, what: str, entries: list[Any], exchange: Exchange, full: Leaf) -> list[str]:
+def _judge_entries(judge: Judge, what: str, entries: list[Any], exchange: Exchange, full: Shape) -> list[str]:
     """Judge one list; give its entries in a form that can be compared."""
     names = ("name", "topic", "type") if what == "sensors" else ("name", "type")
     listed = sorted(json.dumps([entry[name] for name in names]) for entry in entries)
@@ -76,12 +77,12 @@ def _judge_entries(judge: Judge, what: str, entries: list[Any], exchange: Exchan
     judge.check(
         f"rest-resources/{what}-unique", not twice, exchange, "no entry twice", found=f"twice {twice}", cause="twice"
     )
-    short = next((entry["type"] for entry in entries if not full.fits(entry["type"])), "")
+    short = next((entry["type"] for entry in entries if full.problem(entry["type"])), "")
     judge.check(
         f"rest-resources/{what}-named-in-full",
         not short,
         exchange,
-        full.expected,
+        f"a type named in full, as {'sensor_msgs/msg/LaserScan' if what == 'sensors' else 'nav_msgs/srv/GetPlan'}",
         found=f"type {short!r}",
         cause="not in full",
     )
