@@ -1,4 +1,4 @@
-"""``roaas selftest``: shows that the suite catches faulty robots and blames no good one."""
+"""``roaas selftest``: shows that the suite catches faulty robots (mutants) and blames no good one."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ import click
 from conformance.contract.exit_codes import EXIT_CODES, INTERRUPTED, UNREACHABLE
 
 if TYPE_CHECKING:
-    from conformance.selftest.comparison import Seen
-    from conformance.selftest.controls import Acquittal, Case
-    from conformance.selftest.mutant_run import Catch
-    from conformance.selftest.mutants.mutant import Fault
+    from conformance.selftest.comparison import SchemathesisResult
+    from conformance.selftest.controls import Case, ControlResult
+    from conformance.selftest.mutant_run import MutantResult
+    from conformance.selftest.mutants.mutant import Mutant
     from conformance.selftest.report import Report
 
 # A dozen and some different ones, for a check in less than a minute; the longest first.
@@ -44,7 +44,7 @@ _SHORT = (
     "--faults", "patterns", multiple=True, metavar="PATTERN", help="Only faults whose names match (repeatable)."
 )
 @click.option("--target", type=click.Choice(["reference", "plain", "baroque"]), default="reference", show_default=True,
-              help="The good robot behind the faults; the strangers need no ROS.")  # fmt: skip
+              help="The good robot behind the faults; independent robots need no ROS.")  # fmt: skip
 @click.option("--seeds", type=click.IntRange(min=0), default=20, show_default=True, help="Seeds for each good robot.")
 @click.option("--short", is_flag=True, help="A dozen faults and one seed, in less than a minute.")
 @click.option("--effort", type=click.Choice(["quick", "standard"]), default="quick", show_default=True,
@@ -68,21 +68,21 @@ def selftest(**options: Any) -> None:
     Each faulty robot is a good one behind a proxy with one named change. Exit code: 0 all caught and nobody blamed;
     1 otherwise; 2 usage; 3 a robot does not start; 130 interrupted.
     """
-    from conformance.selftest.mutants import FAULTS  # noqa: PLC0415 - lxml and the like cost what --help need not pay
+    from conformance.selftest.mutants import MUTANTS  # noqa: PLC0415 - lxml and the like cost what --help need not pay
     from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see above
 
     if options["short"]:
         options.update(seeds=min(options["seeds"], 1), compare=False, variants=False)
     patterns = options["patterns"] or (_SHORT if options["short"] else ("*",))
-    chosen = [fault for fault in FAULTS if any(fnmatch.fnmatch(fault.name, pattern) for pattern in patterns)]
+    chosen = [mutant for mutant in MUTANTS if any(fnmatch.fnmatch(mutant.name, pattern) for pattern in patterns)]
     if options["short"] and not options["patterns"]:
         # The longest first, so that it does not keep the others waiting in the end.
-        chosen.sort(key=lambda fault: _SHORT.index(fault.name))
+        chosen.sort(key=lambda mutant: _SHORT.index(mutant.name))
     if not chosen:
         raise click.UsageError(f"no fault has a name like {', '.join(patterns)}; --list shows them")
     if options["listed"]:
-        for fault in chosen:
-            click.echo(f"{fault.name:34} {fault.says} [{', '.join(fault.catches)}]")
+        for mutant in chosen:
+            click.echo(f"{mutant.name:34} {mutant.says} [{', '.join(mutant.catches)}]")
         return
     try:
         report = _run(chosen, options)
@@ -97,34 +97,36 @@ def selftest(**options: Any) -> None:
     sys.exit(0 if report.holds else EXIT_CODES["not-conformant"])
 
 
-def _run(chosen: list[Fault], options: dict[str, Any]) -> Report:
-    from conformance.selftest.mutant_run import Bench, hunt, without_fault  # noqa: PLC0415 - see selftest()
+def _run(chosen: list[Mutant], options: dict[str, Any]) -> Report:
+    from conformance.selftest.mutant_run import RobotPool, run_mutants, run_unchanged  # noqa: PLC0415 - see selftest()
     from conformance.selftest.report import Report  # noqa: PLC0415 - see selftest()
 
     started = time.monotonic()
     report = Report(options["target"])
-    teller = _Teller(len(chosen))
+    progress = _Progress(len(chosen))
     if chosen:
-        with Bench(options["target"], options["parallel"], options["domain_id"]) as bench:
+        with RobotPool(options["target"], options["parallel"], options["domain_id"]) as pool:
             already: frozenset[str] = frozenset()
             if not options["short"]:
-                already = frozenset(without_fault(bench, options["effort"]).caught())
-            report.catches = hunt(bench, chosen, effort=options["effort"], already=already, tell=teller.catch)
+                already = frozenset(run_unchanged(pool, options["effort"]).caught())
+            report.mutant_results = run_mutants(
+                pool, chosen, effort=options["effort"], already=already, tell=progress.mutant
+            )
             if options["compare"]:
-                _compare(report, bench, chosen, teller)
+                _compare(report, pool, chosen, progress)
     if options["seeds"]:
-        _acquit(report, options, teller)
+        _run_controls(report, options, progress)
     report.seconds = time.monotonic() - started
     return report
 
 
-def _compare(report: Report, bench: Any, chosen: list[Fault], teller: _Teller) -> None:
+def _compare(report: Report, pool: Any, chosen: list[Mutant], progress: _Progress) -> None:
     from conformance.selftest import comparison  # noqa: PLC0415 - see selftest()
 
     if comparison.command() is None:
         report.notes.append("Schemathesis' command line is not installed, so that nothing was compared with it.")
         return
-    good, report.compared = comparison.compare(bench, chosen, tell=teller.seen)
+    good, report.compared = comparison.compare(pool, chosen, tell=progress.compared)
     report.good = tuple(sorted(f"{operation} {code}" for operation, code in good))
     report.notes.append(
         f"Schemathesis ran with --max-examples {comparison.EXAMPLES}, phases examples, coverage, fuzzing, and at most "
@@ -132,12 +134,12 @@ def _compare(report: Report, bench: Any, chosen: list[Fault], teller: _Teller) -
     )
 
 
-def _acquit(report: Report, options: dict[str, Any], teller: _Teller) -> None:
+def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) -> None:
     from conformance.selftest import robots  # noqa: PLC0415 - see selftest()
-    from conformance.selftest.controls import Case, acquit  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.controls import Case, run_controls  # noqa: PLC0415 - see selftest()
     from conformance.selftest.variants import VARIANTS  # noqa: PLC0415 - see selftest()
 
-    kinds = [*robots.STRANGERS, robots.REFERENCE]
+    kinds = [*robots.INDEPENDENT_ROBOTS, robots.REFERENCE]
     try:
         robots.check_available(robots.REFERENCE)
     except robots.RobotError as error:
@@ -148,47 +150,49 @@ def _acquit(report: Report, options: dict[str, Any], teller: _Teller) -> None:
         # The slow one first, so that it does not keep all others waiting in the end.
         cases += [Case(variant.robot, variant, 0) for variant in VARIANTS]
     cases += [Case(kind, None, seed) for seed in range(options["seeds"]) for kind in kinds]
-    teller.total = len(cases)
-    report.acquittals = acquit(
+    progress.total = len(cases)
+    report.control_results = run_controls(
         cases,
         effort=options["effort"],
         parallel=options["parallel"],
         domain_id=options["domain_id"],
-        tell=teller.acquittal,
+        tell=progress.control,
     )
 
 
-class _Teller:
+class _Progress:
     """Tells of progress on stderr."""
 
     def __init__(self, total: int) -> None:
         self.total = total
         self._done = 0
         self._compared = 0
-        self._acquitted = 0
+        self._controls = 0
 
-    def catch(self, catch: Catch) -> None:
-        """A fault has been tried."""
+    def mutant(self, result: MutantResult) -> None:
+        """A mutant has been tried."""
         self._done += 1
-        said = catch.unseen or (f"MISSED by {', '.join(catch.missed)}" if catch.missed else f"caught by {_few(catch)}")
-        click.echo(f"[{self._done}/{self.total}] {catch.fault.name}: {said} ({catch.seconds:.1f} s)", err=True)
-
-    def seen(self, seen: Seen) -> None:
-        """Schemathesis has tried a fault."""
-        self._compared += 1
-        said = f"caught: {seen.findings[0]}" if seen.caught else "not caught"
-        click.echo(f"[{self._compared}] Schemathesis, {seen.fault}: {said}", err=True)
-
-    def acquittal(self, acquittal: Acquittal) -> None:
-        """A good robot has been judged."""
-        self._acquitted += 1
-        name = f"{acquittal.robot} {acquittal.variant}".strip()
-        said = acquittal.unseen or (
-            "conformant" if acquittal.acquitted else f"BLAMED: {acquittal.blamed or acquittal.unjudged or 'given up'}"
+        said = result.not_tried or (
+            f"MISSED by {', '.join(result.missed)}" if result.missed else f"caught by {_few(result)}"
         )
-        click.echo(f"[{self._acquitted}/{self.total}] {name}, seed {acquittal.seed}: {said}"[:400], err=True)
+        click.echo(f"[{self._done}/{self.total}] {result.mutant.name}: {said} ({result.seconds:.1f} s)", err=True)
+
+    def compared(self, result: SchemathesisResult) -> None:
+        """Schemathesis has tried a mutant."""
+        self._compared += 1
+        said = f"caught: {result.findings[0]}" if result.caught else "not caught"
+        click.echo(f"[{self._compared}] Schemathesis, {result.mutant}: {said}", err=True)
+
+    def control(self, result: ControlResult) -> None:
+        """A good robot has been judged."""
+        self._controls += 1
+        name = f"{result.robot} {result.variant}".strip()
+        said = result.not_tried or (
+            "conformant" if result.conformant else f"BLAMED: {result.blamed or result.unjudged or 'given up'}"
+        )
+        click.echo(f"[{self._controls}/{self.total}] {name}, seed {result.seed}: {said}"[:400], err=True)
 
 
-def _few(catch: Catch) -> str:
-    rest = len(catch.caught) - len(catch.fault.catches)
-    return ", ".join(catch.fault.catches) + (f" and {rest} more" if rest > 0 else "")
+def _few(result: MutantResult) -> str:
+    rest = len(result.caught) - len(result.mutant.catches)
+    return ", ".join(result.mutant.catches) + (f" and {rest} more" if rest > 0 else "")

@@ -1,1 +1,1 @@
-"""Proof of the suite's quality: it catches faulty robots and blames no conforming one."""
+"""Proof of the suite's quality: it catches mutants (faulty robots) and blames no conforming one."""

@@ -73,7 +73,7 @@ class Outcome:
         return tuple(id_ for id_, verdict in self.verdicts.items() if verdict in {"fail", "warn"})
 
 
-def judge(job: Job) -> Outcome:
+def run_job(job: Job) -> Outcome:
     """Run a certification and wait for it; a run that takes too long is given up, and has caught nothing."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOADED)
@@ -98,7 +98,7 @@ def judge(job: Job) -> Outcome:
     return Outcome(**found, seconds=time.monotonic() - started)
 
 
-def _run(job: Job, answer: Pipe) -> None:
+def _run(job: Job, pipe: Pipe) -> None:
     """Certify, in the child, and send what came of it."""
     from conformance.engine.certification import certify  # noqa: PLC0415 - in the child, where it is preloaded
 
@@ -108,7 +108,7 @@ def _run(job: Job, answer: Pipe) -> None:
         document = certification.document
         wanted = set(job.requirements)
         items = [item for item in document["requirements"] if not wanted or item["id"] in wanted]
-        answer.send(
+        pipe.send(
             {
                 "exit_code": certification.exit_code,
                 "verdicts": {item["id"]: item["verdict"] for item in items},

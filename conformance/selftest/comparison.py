@@ -1,6 +1,6 @@
-"""What the plain Schemathesis command line catches of the REST faults, with the same OpenAPI file.
+"""What the plain Schemathesis command line catches of the REST mutants, with the same OpenAPI file.
 
-It is bounded in time, as our runs are. A fault counts as caught when Schemathesis reports something that it does not
+It is bounded in time, as our runs are. A mutant counts as caught when Schemathesis reports something that it does not
 report of the good robot behind the same proxy: what it says of a good robot is no catch.
 """
 
@@ -25,8 +25,8 @@ from conformance.selftest.proxy import unchanged
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from conformance.selftest.mutant_run import Bench
-    from conformance.selftest.mutants.mutant import Fault
+    from conformance.selftest.mutant_run import RobotPool
+    from conformance.selftest.mutants.mutant import Mutant
     from conformance.selftest.proxy import Proxy
 
 EXAMPLES, LIMIT_S = 3, 40.0
@@ -36,16 +36,16 @@ Findings = frozenset[tuple[str, str]]
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What Schemathesis says of one faulty robot.
+class SchemathesisResult:
+    """What Schemathesis says of one mutant.
 
     Attributes:
-        fault: its name.
+        mutant: its name.
         caught: whether it reports something beyond what it reports of the good robot.
         findings: what is beyond, as "OPERATION CODE".
     """
 
-    fault: str
+    mutant: str
     caught: bool
     findings: tuple[str, ...]
 
@@ -56,32 +56,36 @@ def command() -> str | None:
     return str(beside) if beside.exists() else shutil.which("st")
 
 
-def compare(bench: Bench, faults: Iterable[Fault], *, tell: Callable[[Seen], None]) -> tuple[Findings, list[Seen]]:
-    """Run Schemathesis against the good robot, and then against every REST fault that no ROS probe is needed for."""
+def compare(
+    pool: RobotPool, mutants: Iterable[Mutant], *, tell: Callable[[SchemathesisResult], None]
+) -> tuple[Findings, list[SchemathesisResult]]:
+    """Run Schemathesis against the good robot, and then against every REST mutant that no ROS probe is needed for."""
     lock = threading.Lock()
-    robot, proxy = bench.take()
+    robot, proxy = pool.take()
     try:
         good = _findings(proxy)
     finally:
-        bench.give(robot, proxy)
+        pool.give(robot, proxy)
 
-    def one(fault: Fault) -> Seen:
-        robot, proxy = bench.take()
+    def one(mutant: Mutant) -> SchemathesisResult:
+        robot, proxy = pool.take()
         try:
-            proxy.change, proxy.serial = fault.make(), fault.serial
-            proxy.torn = fault.torn() if fault.torn else None
-            beyond = _findings(proxy, fault.token) - good
+            proxy.change, proxy.serial = mutant.make(), mutant.serial
+            proxy.incomplete_request = mutant.incomplete_request() if mutant.incomplete_request else None
+            beyond = _findings(proxy, mutant.token) - good
         finally:
             proxy.change = unchanged
-            bench.give(robot, proxy)
-        seen = Seen(fault.name, bool(beyond), tuple(sorted(f"{operation} {code}" for operation, code in beyond)))
+            pool.give(robot, proxy)
+        seen = SchemathesisResult(
+            mutant.name, bool(beyond), tuple(sorted(f"{operation} {code}" for operation, code in beyond))
+        )
         with lock:
             tell(seen)
         return seen
 
-    tried = [fault for fault in faults if fault.interface == "rest" and not fault.probe]
-    with ThreadPoolExecutor(bench.size) as pool:
-        return good, list(pool.map(one, tried))
+    tried = [mutant for mutant in mutants if mutant.interface == "rest" and not mutant.probe]
+    with ThreadPoolExecutor(pool.size) as executor:
+        return good, list(executor.map(one, tried))
 
 
 def _findings(proxy: Proxy, token: str = "") -> Findings:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from conformance.selftest.certifying import Job, Outcome, judge
+from conformance.selftest.certifying import Job, Outcome, run_job
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import Robot, running, statement_of
 from conformance.selftest.variants import CertificateError, Variant, certificate
@@ -22,21 +22,21 @@ _TIMEOUT_S = 900.0
 
 
 @dataclass(frozen=True)
-class Acquittal:
+class ControlResult:
     """What was said of a good robot.
 
     Attributes:
         robot: which; variant: in which circumstances, or empty.
         seed: of the run.
         outcome: what came of it, or None when it was not tried.
-        unseen: why it was not tried, or empty.
+        not_tried: why it was not tried, or empty.
     """
 
     robot: str
     variant: str
     seed: int
     outcome: Outcome | None
-    unseen: str = ""
+    not_tried: str = ""
 
     @property
     def blamed(self) -> dict[str, str]:
@@ -55,7 +55,7 @@ class Acquittal:
         }
 
     @property
-    def acquitted(self) -> bool:
+    def conformant(self) -> bool:
         """Whether the robot was found conformant (or was not tried)."""
         return self.outcome is None or (self.outcome.exit_code == 0 and not self.blamed)
 
@@ -69,14 +69,14 @@ class Case:
     seed: int
 
 
-def acquit(
-    cases: list[Case], *, effort: str, parallel: int, domain_id: int, tell: Callable[[Acquittal], None]
-) -> list[Acquittal]:
+def run_controls(
+    cases: list[Case], *, effort: str, parallel: int, domain_id: int, tell: Callable[[ControlResult], None]
+) -> list[ControlResult]:
     """Judge good robots, each case on a robot of its own; ``tell`` is called as each is done."""
     lock = threading.Lock()
     domains = list(range(domain_id, domain_id + parallel))
 
-    def one(case: Case) -> Acquittal:
+    def one(case: Case) -> ControlResult:
         with lock:
             domain = domains.pop()
         try:
@@ -88,11 +88,11 @@ def acquit(
             tell(found)
         return found
 
-    with ThreadPoolExecutor(parallel) as pool:
-        return list(pool.map(one, cases))
+    with ThreadPoolExecutor(parallel) as executor:
+        return list(executor.map(one, cases))
 
 
-def _try(case: Case, effort: str, domain: int) -> Acquittal:
+def _try(case: Case, effort: str, domain: int) -> ControlResult:
     with running(case.robot, domain) as robot, tempfile.TemporaryDirectory() as folder:
         job = Job(
             statement_of(case.robot),
@@ -105,23 +105,25 @@ def _try(case: Case, effort: str, domain: int) -> Acquittal:
             domain_id=robot.domain_id,
         )
         if case.variant is None:
-            return Acquittal(case.robot, "", case.seed, judge(job))
+            return ControlResult(case.robot, "", case.seed, run_job(job))
         return _vary(case, case.variant, robot, job, Path(folder))
 
 
-def _vary(case: Case, variant: Variant, robot: Robot, job: Job, folder: Path) -> Acquittal:
+def _vary(case: Case, variant: Variant, robot: Robot, job: Job, folder: Path) -> ControlResult:
     endpoints = dict(variant.endpoints)
     tls = None
     if variant.tls:
         try:
             tls, ca_file = certificate(folder)
         except CertificateError as error:
-            return Acquittal(case.robot, variant.name, case.seed, None, str(error))
+            return ControlResult(case.robot, variant.name, case.seed, None, str(error))
         endpoints["ca_file"] = str(ca_file)
     try:
         proxy = Proxy(robot.rest, robot.soap, host=variant.host, tls=tls, prefix=variant.prefix)
     except OSError as error:
-        return Acquittal(case.robot, variant.name, case.seed, None, f"{variant.host} cannot be listened on: {error}")
+        return ControlResult(
+            case.robot, variant.name, case.seed, None, f"{variant.host} cannot be listened on: {error}"
+        )
     try:
         proxy.change = variant.make()
         varied = replace(
@@ -132,6 +134,6 @@ def _vary(case: Case, variant: Variant, robot: Robot, job: Job, folder: Path) ->
             token=variant.token,
             endpoints=endpoints,
         )
-        return Acquittal(case.robot, variant.name, case.seed, judge(varied))
+        return ControlResult(case.robot, variant.name, case.seed, run_job(varied))
     finally:
         proxy.close()

@@ -1,4 +1,4 @@
-"""What binds each requirement: the checks that judge it, and the faulty robots that prove that they do."""
+"""What binds each requirement: the checks that judge it, and the mutants that prove that they do."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import conformance.checks
 from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import CLASSES, Requirement, load_ledger
-from conformance.selftest.mutants import FAULTS
+from conformance.selftest.mutants import MUTANTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,12 +32,12 @@ class Binding:
     Attributes:
         requirement: which.
         checks: names of the checks that judge it, as ``module::function``.
-        faults: names of the faulty robots that it must catch.
+        mutants: names of the mutants that it must catch.
     """
 
     requirement: Requirement
     checks: tuple[str, ...]
-    faults: tuple[str, ...]
+    mutants: tuple[str, ...]
 
 
 def checks_by_requirement() -> dict[str, tuple[str, ...]]:
@@ -83,7 +83,7 @@ def _of_parameters(mark: Any) -> Iterator[str]:
 
 
 def bindings() -> tuple[Binding, ...]:
-    """Every requirement of the ledger with its checks and faults.
+    """Every requirement of the ledger with its checks and mutants.
 
     Raises:
         LedgerError: the ledger cannot be read.
@@ -93,33 +93,33 @@ def bindings() -> tuple[Binding, ...]:
         Binding(
             requirement,
             checks.get(id_, ()),
-            tuple(fault.name for fault in FAULTS if id_ in fault.catches),
+            tuple(mutant.name for mutant in MUTANTS if id_ in mutant.catches),
         )
         for id_, requirement in load_ledger(CONTRACT_DIR / "requirements.toml").items()
     )
 
 
 def disagreements() -> list[str]:
-    """Where ledger, checks and faults do not agree, in words."""
+    """Where ledger, checks and mutants do not agree, in words."""
     known = {binding.requirement.id: binding for binding in bindings()}
     problems = []
     for id_, binding in known.items():
         if not binding.checks and binding.requirement.untestable is None:
             problems.append(f"{id_} has no check")
-        if not binding.faults and binding.requirement.level != "MAY" and binding.requirement.untestable is None:
+        if not binding.mutants and binding.requirement.level != "MAY" and binding.requirement.untestable is None:
             problems.append(f"{id_} is {binding.requirement.level}, and no faulty robot shows that it is judged")
     for id_, checks in checks_by_requirement().items():
         if id_ not in known:
             problems.append(f"{checks[0]} judges {id_!r}, which the ledger does not have")
-    names = [fault.name for fault in FAULTS]
-    for fault in FAULTS:
+    names = [mutant.name for mutant in MUTANTS]
+    for mutant in MUTANTS:
         problems += [
-            f"the faulty robot {fault.name} is to be caught by {id_!r}, which the ledger does not have"
-            for id_ in fault.catches
+            f"the faulty robot {mutant.name} is to be caught by {id_!r}, which the ledger does not have"
+            for id_ in mutant.catches
             if id_ not in known
         ]
-        if names.count(fault.name) > 1:
-            problems.append(f"there are {names.count(fault.name)} faulty robots named {fault.name}")
+        if names.count(mutant.name) > 1:
+            problems.append(f"there are {names.count(mutant.name)} faulty robots named {mutant.name}")
     return list(dict.fromkeys(problems))
 
 
@@ -131,7 +131,7 @@ def page() -> str:
     checks = {check for binding in found for check in binding.checks}
     figures = (
         f"{len(found)} requirements ({musts} MUST, {shoulds} SHOULD, {len(found) - musts - shoulds} MAY), "
-        f"{len(checks)} checks, {len(FAULTS)} faulty robots."
+        f"{len(checks)} checks, {len(MUTANTS)} faulty robots."
     )
     lines = [
         _TITLE,
@@ -155,7 +155,7 @@ def page() -> str:
                     item.text,
                     item.source,
                     _listed(binding.checks) or (f"untestable: {item.untestable}" if item.untestable else ""),
-                    _listed(binding.faults),
+                    _listed(binding.mutants),
                 )
                 lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-"""The hunt: each faulty robot is judged, and each requirement that must catch it has to say so."""
+"""Each mutant is judged, and each requirement that must catch it has to say so."""
 
 from __future__ import annotations
 
@@ -9,44 +9,44 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
-from conformance.selftest.certifying import Job, Outcome, judge
+from conformance.selftest.certifying import Job, Outcome, run_job
 from conformance.selftest.proxy import Proxy, unchanged
 from conformance.selftest.robots import REFERENCE, Robot, running, statement_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from conformance.selftest.mutants.mutant import Fault
+    from conformance.selftest.mutants.mutant import Mutant
 
 # How long one run may take, s, by effort.
 _TIMEOUTS = {"quick": 90.0, "standard": 240.0, "deep": 900.0}
 
 
 @dataclass
-class Catch:
-    """What came of one faulty robot.
+class MutantResult:
+    """What came of one mutant.
 
     Attributes:
-        fault: which.
+        mutant: which.
         caught: requirements that said fail or warn, of those that must and of others.
         missed: requirements that must have, and did not.
         effort: the effort at which all had.
-        unseen: why it was not tried, or empty.
+        not_tried: why it was not tried, or empty.
         seconds: how long it took; runs: how many runs.
         reasons: what was said of the missed ones.
     """
 
-    fault: Fault
+    mutant: Mutant
     caught: tuple[str, ...] = ()
     missed: tuple[str, ...] = ()
     effort: str = ""
-    unseen: str = ""
+    not_tried: str = ""
     seconds: float = 0.0
     runs: int = 0
     reasons: dict[str, str] = field(default_factory=dict)
 
 
-class Bench:
+class RobotPool:
     """Robots with a proxy before each, for as many runs at once.
 
     Args:
@@ -85,7 +85,7 @@ class Bench:
 
     def give(self, robot: Robot, proxy: Proxy) -> None:
         """Give them back, as they were."""
-        proxy.change, proxy.torn, proxy.serial = unchanged, None, False
+        proxy.change, proxy.incomplete_request, proxy.serial = unchanged, None, False
         proxy.broken = []
         self._free.put((robot, proxy))
 
@@ -104,29 +104,29 @@ def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, **more: object) 
     )
 
 
-def without_fault(bench: Bench, effort: str = "quick", seed: int = 0) -> Outcome:
+def run_unchanged(pool: RobotPool, effort: str = "quick", seed: int = 0) -> Outcome:
     """What is said of the good robot behind a proxy that changes nothing."""
-    robot, proxy = bench.take()
+    robot, proxy = pool.take()
     try:
-        return judge(job_for(robot, proxy, effort, seed, domain_id=robot.domain_id))
+        return run_job(job_for(robot, proxy, effort, seed, domain_id=robot.domain_id))
     finally:
-        bench.give(robot, proxy)
+        pool.give(robot, proxy)
 
 
-def hunt(
-    bench: Bench,
-    faults: Iterable[Fault],
+def run_mutants(
+    pool: RobotPool,
+    mutants: Iterable[Mutant],
     *,
     effort: str = "quick",
     seed: int = 0,
     already: frozenset[str] = frozenset(),
-    tell: Callable[[Catch], None],
-) -> list[Catch]:
-    """Try every fault, several at once.
+    tell: Callable[[MutantResult], None],
+) -> list[MutantResult]:
+    """Try every mutant, several at once.
 
     Args:
-        bench: the robots.
-        faults: what to try.
+        pool: the robots.
+        mutants: what to try.
         effort: of the first runs.
         seed: of everything random.
         already: requirements that say fail or warn of the good robot itself: nothing can be shown of them.
@@ -134,40 +134,42 @@ def hunt(
     """
     lock = threading.Lock()
 
-    def one(fault: Fault) -> Catch:
-        robot, proxy = bench.take()
+    def one(mutant: Mutant) -> MutantResult:
+        robot, proxy = pool.take()
         try:
-            catch = _try(fault, robot, proxy, effort, seed, already)
+            result = _try(mutant, robot, proxy, effort, seed, already)
         finally:
-            bench.give(robot, proxy)
+            pool.give(robot, proxy)
         with lock:
-            tell(catch)
-        return catch
+            tell(result)
+        return result
 
-    with ThreadPoolExecutor(bench.size) as pool:
-        return list(pool.map(one, faults))
+    with ThreadPoolExecutor(pool.size) as executor:
+        return list(executor.map(one, mutants))
 
 
-def _try(fault: Fault, robot: Robot, proxy: Proxy, effort: str, seed: int, already: frozenset[str]) -> Catch:
-    catch = Catch(fault)
-    if already.intersection(fault.catches):
-        catch.unseen = f"{robot.kind} itself is blamed for {min(already.intersection(fault.catches))}, as it may be"
-        return catch
-    if robot.kind != REFERENCE and fault.probe:
-        catch.unseen = "only a ROS probe can see it, and there is no ROS"
-        return catch
-    if robot.kind not in {REFERENCE, "baroque"} and fault.observer:
-        catch.unseen = "the robot has no list of deliveries, and there is no ROS"
-        return catch
-    classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in fault.catches))
+def _try(mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, already: frozenset[str]) -> MutantResult:
+    result = MutantResult(mutant)
+    if already.intersection(mutant.catches):
+        result.not_tried = (
+            f"{robot.kind} itself is blamed for {min(already.intersection(mutant.catches))}, as it may be"
+        )
+        return result
+    if robot.kind != REFERENCE and mutant.probe:
+        result.not_tried = "only a ROS probe can see it, and there is no ROS"
+        return result
+    if robot.kind not in {REFERENCE, "baroque"} and mutant.observer:
+        result.not_tried = "the robot has no list of deliveries, and there is no ROS"
+        return result
+    classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in mutant.catches))
     seen: dict[str, None] = {}
     # The checks that judge the requirements alone; then the whole classes; then those with more cases.
-    attempts = [(effort, fault.catches), (effort, ()), ("standard", ())]
+    attempts = [(effort, mutant.catches), (effort, ()), ("standard", ())]
     for chosen, requirements in attempts:
-        proxy.change = fault.make()
-        proxy.torn = fault.torn() if fault.torn else None
-        proxy.serial = fault.serial
-        outcome = judge(
+        proxy.change = mutant.make()
+        proxy.incomplete_request = mutant.incomplete_request() if mutant.incomplete_request else None
+        proxy.serial = mutant.serial
+        outcome = run_job(
             job_for(
                 robot,
                 proxy,
@@ -175,28 +177,28 @@ def _try(fault: Fault, robot: Robot, proxy: Proxy, effort: str, seed: int, alrea
                 seed,
                 classes=classes,
                 requirements=requirements,
-                domain_id=robot.domain_id if fault.probe else None,
-                token=fault.token,
+                domain_id=robot.domain_id if mutant.probe else None,
+                token=mutant.token,
             )
         )
         seen.update(dict.fromkeys(outcome.caught()))
-        _note(catch, outcome, tuple(seen), chosen)
+        _note(result, outcome, tuple(seen), chosen)
         if proxy.broken:
-            # What such a fault does is not what it says: nothing that it shows counts.
-            catch.missed = fault.catches
-            catch.reasons = dict.fromkeys(fault.catches, f"the fault itself is broken: {proxy.broken[0]}")
+            # What such a mutant does is not what it says: nothing that it shows counts.
+            result.missed = mutant.catches
+            result.reasons = dict.fromkeys(mutant.catches, f"the fault itself is broken: {proxy.broken[0]}")
             break
-        if not catch.missed:
+        if not result.missed:
             break
-    return catch
+    return result
 
 
-def _note(catch: Catch, outcome: Outcome, seen: tuple[str, ...], effort: str) -> None:
-    catch.runs += 1
-    catch.seconds += outcome.seconds
-    catch.caught, catch.effort = seen, effort
-    catch.missed = tuple(id_ for id_ in catch.fault.catches if id_ not in seen)
+def _note(result: MutantResult, outcome: Outcome, seen: tuple[str, ...], effort: str) -> None:
+    result.runs += 1
+    result.seconds += outcome.seconds
+    result.caught, result.effort = seen, effort
+    result.missed = tuple(id_ for id_ in result.mutant.catches if id_ not in seen)
     given_up = "the run was given up" if outcome.exit_code < 0 else "pass"
-    catch.reasons = {
-        id_: f"{outcome.verdicts.get(id_, 'not judged')}: {outcome.reasons.get(id_, given_up)}" for id_ in catch.missed
+    result.reasons = {
+        id_: f"{outcome.verdicts.get(id_, 'not judged')}: {outcome.reasons.get(id_, given_up)}" for id_ in result.missed
     }

@@ -10,13 +10,13 @@ import traceback
 from typing import TYPE_CHECKING, Protocol
 from urllib.parse import urlsplit
 
-from conformance.selftest.wire import Answer, Ask, Stream, TornError, Upstream
+from conformance.selftest.wire import IncompleteMessageError, Request, Response, Stream, Upstream
 
 if TYPE_CHECKING:
     import ssl
     from collections.abc import Callable
 
-Forward = "Callable[[Ask], Answer]"
+Forward = "Callable[[Request], Response]"
 
 
 class HangUpError(Exception):
@@ -26,7 +26,7 @@ class HangUpError(Exception):
 class Change(Protocol):
     """What a proxy does to exchanges; one instance for one run, so it may remember."""
 
-    def __call__(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
+    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
         """Answer a request; ``forward`` asks the robot, as often as one likes.
 
         Raises:
@@ -34,16 +34,16 @@ class Change(Protocol):
         """
 
 
-class Torn(Protocol):
-    """What a proxy does with a request that was never completed."""
+class IncompleteRequest(Protocol):
+    """What a mutant does with a request that was never completed."""
 
-    def __call__(self, side: str, got: bytes, forward: Callable[[Ask], Answer]) -> None:
+    def __call__(self, side: str, got: bytes, forward: Callable[[Request], Response]) -> None:
         """Take what had come when the client went away."""
 
 
-def unchanged(ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
+def unchanged(request: Request, forward: Callable[[Request], Response]) -> Response:
     """The change that changes nothing."""
-    return forward(ask)
+    return forward(request)
 
 
 class Proxy:
@@ -58,19 +58,19 @@ class Proxy:
 
     Attributes:
         change: what is done to every exchange; may be exchanged at any time.
-        torn: what is done with requests that are never completed.
+        incomplete_request: what is done with requests that are never completed.
         serial: whether a request is read only when the one before it has come to its end.
-        asked: how many requests have come.
-        broken: what a change raised that it should not have: then the fault is wrong, not the robot.
+        requests: how many requests have come.
+        broken: what a change raised that it should not have: then the mutant is wrong, not the robot.
     """
 
     def __init__(
         self, rest: str, soap: str, *, host: str = "127.0.0.1", tls: ssl.SSLContext | None = None, prefix: str = ""
     ) -> None:
         self.change: Change = unchanged
-        self.torn: Torn | None = None
+        self.incomplete_request: IncompleteRequest | None = None
         self.serial = False
-        self.asked = 0
+        self.requests = 0
         self.broken: list[str] = []
         self._tls, self._prefix = tls, prefix
         self._robot = {side: urlsplit(url) for side, url in (("rest", rest), ("soap", soap))}
@@ -123,7 +123,7 @@ class Proxy:
             stream = Stream(sock)
             while self._one(side, stream, upstream):
                 pass
-        except (OSError, TornError, HangUpError, ValueError):
+        except (OSError, IncompleteMessageError, HangUpError, ValueError):
             # Whoever broke it off, there is nobody left to tell.
             pass
         finally:
@@ -135,69 +135,71 @@ class Proxy:
         """One exchange. Returns whether the connection goes on."""
         owner = threading.get_ident()
 
-        def forward(ask: Ask) -> Answer:
-            if ask.side == side and threading.get_ident() == owner:
-                return self._forward(ask, upstream)
+        def forward(request: Request) -> Response:
+            if request.side == side and threading.get_ident() == owner:
+                return self._forward(request, upstream)
             # The other interface, or a thread of the change's own: neither may come between this connection's octets.
-            robot = self._robot[ask.side]
+            robot = self._robot[request.side]
             another = Upstream(robot.hostname or "127.0.0.1", robot.port or 80)
             try:
-                return self._forward(ask, another)
+                return self._forward(request, another)
             finally:
                 another.close()
 
         try:
-            ask = self._next(side, stream)
-        except TornError as torn:
-            if self.torn is not None:
-                self.torn(side, torn.got, forward)
+            request = self._next(side, stream)
+        except IncompleteMessageError as incomplete:
+            if self.incomplete_request is not None:
+                self.incomplete_request(side, incomplete.got, forward)
             raise
-        if ask is None:
+        if request is None:
             return False
-        self.asked += 1
-        answer = self._changed(ask, forward)
-        stream.sock.sendall(answer.wire())
-        closes = "close" in (answer.field("Connection") or "").lower() or "close" in (ask.field("Connection") or "")
-        if answer.raw is not None or ask.raw is not None or closes or answer.version == "HTTP/1.0":
+        self.requests += 1
+        response = self._changed(request, forward)
+        stream.sock.sendall(response.wire())
+        closes = "close" in (response.field("Connection") or "").lower() or "close" in (
+            request.field("Connection") or ""
+        )
+        if response.raw is not None or request.raw is not None or closes or response.version == "HTTP/1.0":
             _linger(stream.sock)
             return False
-        return ask.version != "HTTP/1.0"
+        return request.version != "HTTP/1.0"
 
-    def _changed(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
+    def _changed(self, request: Request, forward: Callable[[Request], Response]) -> Response:
         try:
-            return self.change(ask, forward)
-        except (OSError, TornError, HangUpError):
+            return self.change(request, forward)
+        except (OSError, IncompleteMessageError, HangUpError):
             raise
         except Exception as error:
             where = traceback.extract_tb(error.__traceback__)[-1]
             self.broken.append(f"{type(error).__name__}: {error} ({where.filename.rsplit('/', 1)[-1]}:{where.lineno})")
             raise HangUpError from error
 
-    def _next(self, side: str, stream: Stream) -> Ask | None:
+    def _next(self, side: str, stream: Stream) -> Request | None:
         if not self.serial or side != "rest":
-            return stream.ask(side)
+            return stream.request(side)
         if not stream.more():
             return None
         with self._reading:
-            return stream.ask(side)
+            return stream.request(side)
 
-    def _forward(self, ask: Ask, upstream: Upstream) -> Answer:
-        robot = self._robot[ask.side]
-        if ask.side == "rest" and self._prefix and ask.raw is None:
-            if not ask.target.startswith(self._prefix):
+    def _forward(self, request: Request, upstream: Upstream) -> Response:
+        robot = self._robot[request.side]
+        if request.side == "rest" and self._prefix and request.raw is None:
+            if not request.target.startswith(self._prefix):
                 text = b'{"status":404,"detail":"nothing is here"}'
-                return Answer(404, [("Content-Type", "application/problem+json")], text, asked=ask.method)
-            ask = ask.copy(target=ask.target.removeprefix(self._prefix) or "/")
-        answer = upstream.exchange(ask)
+                return Response(404, [("Content-Type", "application/problem+json")], text, method=request.method)
+            request = request.copy(target=request.target.removeprefix(self._prefix) or "/")
+        response = upstream.exchange(request)
         for side, url in self._robot.items():
             # Addresses in descriptions and redirects lead to the proxy, never past it.
             here, there = self._origin(side) + (self._prefix if side == "rest" else ""), f"{url.scheme}://{url.netloc}"
-            answer.body = answer.body.replace(there.encode(), here.encode())
-            answer.fields = [(name, value.replace(there, here)) for name, value in answer.fields]
-        location = answer.field("Location")
+            response.body = response.body.replace(there.encode(), here.encode())
+            response.fields = [(name, value.replace(there, here)) for name, value in response.fields]
+        location = response.field("Location")
         if location is not None and location.startswith("/") and robot.scheme and self._prefix:
-            answer.put("Location", self._prefix + location)
-        return answer
+            response.put("Location", self._prefix + location)
+        return response
 
 
 def _listen(host: str) -> socket.socket:

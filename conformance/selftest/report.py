@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conformance.selftest.comparison import Seen
-    from conformance.selftest.controls import Acquittal
-    from conformance.selftest.mutant_run import Catch
+    from conformance.selftest.comparison import SchemathesisResult
+    from conformance.selftest.controls import ControlResult
+    from conformance.selftest.mutant_run import MutantResult
 
 
 @dataclass
@@ -19,40 +19,40 @@ class Report:
     """Everything that a self-test has found.
 
     Attributes:
-        target: the good robot behind the faults.
-        catches: by faulty robot.
-        acquittals: by good robot.
+        target: the good robot behind the mutants.
+        mutant_results: by mutant.
+        control_results: by good robot.
         compared: what Schemathesis caught; good: what it reports of the good robot.
         notes: remarks.
     """
 
     target: str
-    catches: list[Catch] = field(default_factory=list)
-    acquittals: list[Acquittal] = field(default_factory=list)
-    compared: list[Seen] = field(default_factory=list)
+    mutant_results: list[MutantResult] = field(default_factory=list)
+    control_results: list[ControlResult] = field(default_factory=list)
+    compared: list[SchemathesisResult] = field(default_factory=list)
     good: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
     seconds: float = 0.0
 
     @property
-    def tried(self) -> list[Catch]:
+    def tried(self) -> list[MutantResult]:
         """Faults that were tried."""
-        return [catch for catch in self.catches if not catch.unseen]
+        return [result for result in self.mutant_results if not result.not_tried]
 
     @property
-    def missed(self) -> list[Catch]:
+    def missed(self) -> list[MutantResult]:
         """Faults that a requirement missed which has to catch them."""
-        return [catch for catch in self.tried if catch.missed]
+        return [result for result in self.tried if result.missed]
 
     @property
-    def blamed(self) -> list[Acquittal]:
-        """Good robots that were not acquitted."""
-        return [acquittal for acquittal in self.acquittals if not acquittal.acquitted]
+    def blamed(self) -> list[ControlResult]:
+        """Good robots that were not found conformant."""
+        return [result for result in self.control_results if not result.conformant]
 
     @property
     def holds(self) -> bool:
         """Whether all is caught and nobody is blamed, and something was tried."""
-        return bool(self.tried or self.acquittals) and not self.missed and not self.blamed
+        return bool(self.tried or self.control_results) and not self.missed and not self.blamed
 
     def document(self) -> dict[str, Any]:
         """selftest.json."""
@@ -64,39 +64,39 @@ class Report:
             "notes": self.notes,
             "faults": [
                 {
-                    "name": catch.fault.name,
-                    "says": catch.fault.says,
-                    "interface": catch.fault.interface,
-                    "must": list(catch.fault.catches),
-                    "caught": list(catch.caught),
-                    "missed": list(catch.missed),
-                    "reasons": catch.reasons,
-                    "effort": catch.effort,
-                    "not_tried": catch.unseen,
-                    "runs": catch.runs,
-                    "seconds": round(catch.seconds, 2),
+                    "name": result.mutant.name,
+                    "says": result.mutant.says,
+                    "interface": result.mutant.interface,
+                    "must": list(result.mutant.catches),
+                    "caught": list(result.caught),
+                    "missed": list(result.missed),
+                    "reasons": result.reasons,
+                    "effort": result.effort,
+                    "not_tried": result.not_tried,
+                    "runs": result.runs,
+                    "seconds": round(result.seconds, 2),
                 }
-                for catch in self.catches
+                for result in self.mutant_results
             ],
             "good_robots": [
                 {
-                    "robot": acquittal.robot,
-                    "variant": acquittal.variant,
-                    "seed": acquittal.seed,
-                    "acquitted": acquittal.acquitted,
-                    "not_tried": acquittal.unseen,
-                    "exit_code": acquittal.outcome.exit_code if acquittal.outcome else None,
-                    "blamed": acquittal.blamed,
-                    "unjudged": acquittal.unjudged,
-                    "requests": acquittal.outcome.requests if acquittal.outcome else 0,
-                    "seconds": round(acquittal.outcome.seconds, 2) if acquittal.outcome else 0.0,
+                    "robot": result.robot,
+                    "variant": result.variant,
+                    "seed": result.seed,
+                    "acquitted": result.conformant,
+                    "not_tried": result.not_tried,
+                    "exit_code": result.outcome.exit_code if result.outcome else None,
+                    "blamed": result.blamed,
+                    "unjudged": result.unjudged,
+                    "requests": result.outcome.requests if result.outcome else 0,
+                    "seconds": round(result.outcome.seconds, 2) if result.outcome else 0.0,
                 }
-                for acquittal in self.acquittals
+                for result in self.control_results
             ],
             "schemathesis": {
                 "of_the_good_robot": list(self.good),
                 "faults": [
-                    {"name": seen.fault, "caught": seen.caught, "findings": list(seen.findings)}
+                    {"name": seen.mutant, "caught": seen.caught, "findings": list(seen.findings)}
                     for seen in self.compared
                 ],
             },
@@ -115,8 +115,8 @@ class Report:
         return path
 
     def matrix(self) -> str:
-        """The matrix, as a table: each faulty robot, and the requirements that caught it."""
-        compared = {seen.fault: seen.caught for seen in self.compared}
+        """The matrix, as a table: each mutant, and the requirements that caught it."""
+        compared = {seen.mutant: seen.caught for seen in self.compared}
         lines = [
             "# Faulty robots, and what caught them",
             "",
@@ -125,15 +125,14 @@ class Report:
             "| faulty robot | what is wrong with it | caught by | missed by | plain Schemathesis |",
             "|---|---|---|---|---|",
         ]
-        for catch in self.catches:
-            ours = [id_ for id_ in catch.caught if id_ in catch.fault.catches]
-            others = len(catch.caught) - len(ours)
+        for result in self.mutant_results:
+            ours = [id_ for id_ in result.caught if id_ in result.mutant.catches]
+            others = len(result.caught) - len(ours)
             caught = ", ".join(f"`{id_}`" for id_ in ours) + (f" and {others} more" if others else "")
-            known = {True: "caught", False: "not caught"}.get(compared.get(catch.fault.name))  # type: ignore[arg-type] # None is no key
-            missed = ", ".join(f"`{id_}`" for id_ in catch.missed)
-            lines.append(
-                f"| {catch.fault.name} | {catch.fault.says} | {catch.unseen or caught} | {missed} | {known or ''} |"
-            )
+            known = {True: "caught", False: "not caught"}.get(compared.get(result.mutant.name))  # type: ignore[arg-type] # None is no key
+            missed = ", ".join(f"`{id_}`" for id_ in result.missed)
+            cells = (result.mutant.name, result.mutant.says, result.not_tried or caught, missed, known or "")
+            lines.append(f"| {' | '.join(cells)} |")
         return "\n".join(lines) + "\n"
 
     def summary(self) -> str:
@@ -141,19 +140,19 @@ class Report:
         tried, missed = len(self.tried), len(self.missed)
         lines = []
         if tried:
-            requirements = {id_ for catch in self.tried for id_ in catch.fault.catches if id_ not in catch.missed}
+            requirements = {id_ for result in self.tried for id_ in result.mutant.catches if id_ not in result.missed}
             lines.append(
                 f"{tried - missed} of {tried} faulty robots caught ({100 * (tried - missed) / tried:.1f} %), "
                 f"by {len(requirements)} requirements"
             )
-        unseen = [catch for catch in self.catches if catch.unseen]
-        if unseen:
-            lines.append(f"{len(unseen)} not tried, first {unseen[0].fault.name}: {unseen[0].unseen}")
-        for catch in self.missed:
-            said = "; ".join(f"{id_} said {catch.reasons.get(id_, 'nothing')[:200]}" for id_ in catch.missed)
-            lines.append(f"MISSED {catch.fault.name} ({catch.fault.says}) {said}")
-        if self.acquittals:
-            good = [one for one in self.acquittals if one.outcome is not None]
+        not_tried = [result for result in self.mutant_results if result.not_tried]
+        if not_tried:
+            lines.append(f"{len(not_tried)} not tried, first {not_tried[0].mutant.name}: {not_tried[0].not_tried}")
+        for result in self.missed:
+            said = "; ".join(f"{id_} said {result.reasons.get(id_, 'nothing')[:200]}" for id_ in result.missed)
+            lines.append(f"MISSED {result.mutant.name} ({result.mutant.says}) {said}")
+        if self.control_results:
+            good = [one for one in self.control_results if one.outcome is not None]
             lines.append(
                 f"{len(good) - len(self.blamed)} of {len(good)} certifications of good robots found them conformant"
             )
@@ -163,9 +162,9 @@ class Report:
             code = one.outcome.exit_code if one.outcome else "none"
             lines.append(f"BLAMED {one.robot}{where}, seed {one.seed}, exit code {code}: {said}")
         if self.compared:
-            theirs = {seen.fault for seen in self.compared if seen.caught}
-            ours = {catch.fault.name for catch in self.tried if not catch.missed} & {
-                seen.fault for seen in self.compared
+            theirs = {seen.mutant for seen in self.compared if seen.caught}
+            ours = {result.mutant.name for result in self.tried if not result.missed} & {
+                seen.mutant for seen in self.compared
             }
             lines.append(
                 f"Of {len(self.compared)} faults of REST, the plain Schemathesis command line caught {len(theirs)}, "

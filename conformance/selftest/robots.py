@@ -23,7 +23,7 @@ _READY = re.compile(r"ready rest=(\S+) soap=(\S+)")
 _START_S, _STOP_S = 40.0, 10.0
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
 _DOMAINS = 102
-STRANGERS = ("plain", "baroque", "legacy")
+INDEPENDENT_ROBOTS = ("plain", "baroque", "legacy")
 REFERENCE = "reference"
 
 
@@ -36,7 +36,7 @@ class Robot:
     """A robot that runs.
 
     Attributes:
-        kind: "reference" or a stranger's name.
+        kind: "reference" or an independent robot's name.
         rest: REST's base URL.
         soap: the publishers' WSDL.
         domain_id: its ROS domain, or None.
@@ -62,7 +62,7 @@ def check_available(kind: str) -> None:
     if kind == REFERENCE and find_spec("rclpy") is None:
         raise RobotError(
             "the reference robot needs ROS 2 (pip install 'roaas[robot,ros]', or source /opt/ros/jazzy/setup.bash); "
-            "without it, take a stranger in its place: roaas selftest --target baroque"
+            "without it, take an independent robot in its place: roaas selftest --target baroque"
         )
 
 
@@ -71,7 +71,7 @@ def running(kind: str, domain_id: int) -> Iterator[Robot]:
     """Start a robot on free ports, and stop it in the end.
 
     Args:
-        kind: "reference" or a stranger's name.
+        kind: "reference" or an independent robot's name.
         domain_id: first ROS domain to try for the reference robot.
 
     Raises:

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from conformance.selftest.proxy import Change
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _PREFIX = "/r2d2/api"
 _TOKEN = "open-sesame"  # noqa: S105 - of a robot that lives for seconds, on loopback
@@ -78,36 +78,36 @@ def certificate(folder: Path) -> tuple[ssl.SSLContext, Path]:
     return context, cert
 
 
-def _slow(ask: Ask, forward: Forward) -> Answer:
+def _slow(request: Request, forward: Forward) -> Response:
     time.sleep(_DELAY_S)
-    return forward(ask)
+    return forward(request)
 
 
-def _prefixed(ask: Ask, forward: Forward) -> Answer:
+def _prefixed(request: Request, forward: Forward) -> Response:
     """Descriptions say under which path everything is."""
-    answer = forward(ask)
-    if ask.side == "rest" and ask.path.endswith("/openapi.json"):
-        value = parsed(answer.body)
+    response = forward(request)
+    if request.side == "rest" and request.path.endswith("/openapi.json"):
+        value = parsed(response.body)
         if isinstance(value, dict):
-            answer.body = json.dumps({**value, "servers": [{"url": _PREFIX}]}).encode()
-    return answer
+            response.body = json.dumps({**value, "servers": [{"url": _PREFIX}]}).encode()
+    return response
 
 
-def _closing(ask: Ask, forward: Forward) -> Answer:
-    answer = forward(ask)
-    answer.version = "HTTP/1.0"
-    answer.put("Connection", "close")
-    return answer
+def _closing(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    response.version = "HTTP/1.0"
+    response.put("Connection", "close")
+    return response
 
 
-def _guarded(ask: Ask, forward: Forward) -> Answer:
+def _guarded(request: Request, forward: Forward) -> Response:
     """A token is wanted for everything; without it, 401 as RFC 9110 has it."""
-    if ask.raw is None and ask.field("Authorization") != f"Bearer {_TOKEN}":
+    if request.raw is None and request.field("Authorization") != f"Bearer {_TOKEN}":
         # Framing is looked at first, by the robot; a request that is none never comes to the question of the token.
-        if sum(name.lower() == "host" for name, _ in ask.fields) != 1:
-            return forward(ask)
-        return problem(401, "a bearer token is wanted", ("WWW-Authenticate", 'Bearer realm="robot"'))(ask)
-    return forward(ask)
+        if sum(name.lower() == "host" for name, _ in request.fields) != 1:
+            return forward(request)
+        return problem(401, "a bearer token is wanted", ("WWW-Authenticate", 'Bearer realm="robot"'))(request)
+    return forward(request)
 
 
 class _Ceiling:
@@ -117,15 +117,15 @@ class _Ceiling:
         self._times: list[float] = []
         self._lock = threading.Lock()
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         now = time.monotonic()
         with self._lock:
             self._times = [*(one for one in self._times if now - one < 1.0), now]
             # A tenth more than the ceiling: clients' clocks and scheduling are no fault of theirs.
             full = len(self._times) > _CEILING * 1.1
         if full:
-            return problem(429, "too many requests", ("Retry-After", "1"))(ask)
-        return forward(ask)
+            return problem(429, "too many requests", ("Retry-After", "1"))(request)
+        return forward(request)
 
 
 VARIANTS = (

@@ -14,7 +14,7 @@ _NO_BODY = {204, 304}
 _WAIT_S = 30.0
 
 
-class TornError(Exception):
+class IncompleteMessageError(Exception):
     """A connection ended in the middle of a message; ``got`` is what had come."""
 
     def __init__(self, got: bytes) -> None:
@@ -47,7 +47,7 @@ class _Fields:
 
 
 @dataclass
-class Ask(_Fields):
+class Request(_Fields):
     """A request.
 
     Attributes:
@@ -73,7 +73,7 @@ class Ask(_Fields):
         """What follows the question mark."""
         return self.target.partition("?")[2]
 
-    def copy(self, **changes: object) -> Ask:
+    def copy(self, **changes: object) -> Request:
         """A copy with other parts; its fields can be altered without altering ours."""
         return replace(self, **{"fields": list(self.fields), **changes})  # type: ignore[arg-type] # fields by name
 
@@ -93,7 +93,7 @@ class Ask(_Fields):
 
 
 @dataclass
-class Answer(_Fields):
+class Response(_Fields):
     """A response.
 
     Attributes:
@@ -107,9 +107,9 @@ class Answer(_Fields):
     version: str = "HTTP/1.1"
     reason: str = ""
     raw: bytes | None = None
-    asked: str = "GET"
+    method: str = "GET"
 
-    def copy(self) -> Answer:
+    def copy(self) -> Response:
         """A copy whose fields can be altered without altering ours."""
         return replace(self, fields=list(self.fields))
 
@@ -121,11 +121,11 @@ class Answer(_Fields):
         if self.status in _NO_BODY or 100 <= self.status < 200:  # noqa: PLR2004 - informational
             self.drop("Content-Length")
             self.body = b""
-        elif self.asked != "HEAD":
+        elif self.method != "HEAD":
             self.put("Content-Length", str(len(self.body)))
         reason = self.reason or (HTTPStatus(self.status).phrase if self.status in set(HTTPStatus) else "Unknown")
         lines = [f"{self.version} {self.status} {reason}", *(f"{key}: {value}" for key, value in self.fields), "", ""]
-        return "\r\n".join(lines).encode("latin-1", "replace") + (b"" if self.asked == "HEAD" else self.body)
+        return "\r\n".join(lines).encode("latin-1", "replace") + (b"" if self.method == "HEAD" else self.body)
 
 
 class Stream:
@@ -144,7 +144,7 @@ class Stream:
         self._buffer += data
         return bool(data)
 
-    def ask(self, side: str) -> Ask | None:
+    def request(self, side: str) -> Request | None:
         """The next request, or None at the end of the connection.
 
         Raises:
@@ -156,21 +156,21 @@ class Stream:
             return None
         line, *rest = head.split(b"\r\n")
         if not _LINE.fullmatch(line):
-            return Ask(side, raw=head + b"\r\n\r\n" + self._all())
+            return Request(side, raw=head + b"\r\n\r\n" + self._all())
         method, target, version = line.decode("latin-1").split(" ")
-        ask = Ask(side, method, target, version, _fields(rest))
-        lengths = {value for key, value in ask.fields if key.lower() == "content-length"}
+        request = Request(side, method, target, version, _fields(rest))
+        lengths = {value for key, value in request.fields if key.lower() == "content-length"}
         # Where a message ends is not clear: the robot is to say so, and at once.
         unclear = len(lengths) > 1 or not all(length.isdigit() for length in lengths)
-        if len(ask.fields) < len([one for one in rest if one]) or unclear:
-            return Ask(side, raw=head + b"\r\n\r\n" + self._all())
-        if (ask.field("Expect") or "").lower() == "100-continue":
+        if len(request.fields) < len([one for one in rest if one]) or unclear:
+            return Request(side, raw=head + b"\r\n\r\n" + self._all())
+        if (request.field("Expect") or "").lower() == "100-continue":
             self.sock.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
-            ask.drop("Expect")
-        ask.body = self._body(ask, None)
-        return ask
+            request.drop("Expect")
+        request.body = self._body(request, None)
+        return request
 
-    def answer(self, method: str) -> Answer:
+    def response(self, method: str) -> Response:
         """The next answer; informational ones are passed over.
 
         Raises:
@@ -180,15 +180,15 @@ class Stream:
         while True:
             head = self._head(requests=False)
             if head is None:
-                raise TornError(b"")
+                raise IncompleteMessageError(b"")
             line, *rest = head.split(b"\r\n")
             version, status, reason = (*line.decode("latin-1").split(" ", 2), "", "")[:3]
-            answer = Answer(int(status), _fields(rest), b"", version, reason, asked=method)
-            if not 100 <= answer.status < 200:  # noqa: PLR2004 - informational
+            response = Response(int(status), _fields(rest), b"", version, reason, method=method)
+            if not 100 <= response.status < 200:  # noqa: PLR2004 - informational
                 break
-        if method != "HEAD" and answer.status not in _NO_BODY:
-            answer.body = self._body(answer, -1)
-        return answer
+        if method != "HEAD" and response.status not in _NO_BODY:
+            response.body = self._body(response, -1)
+        return response
 
     def _head(self, *, requests: bool) -> bytes | None:
         while b"\r\n\r\n" not in self._buffer:
@@ -200,7 +200,7 @@ class Stream:
             if len(self._buffer) > _MOST_HEAD or not self.more():
                 if not self._buffer:
                     return None
-                raise TornError(self._buffer)
+                raise IncompleteMessageError(self._buffer)
         head, _, self._buffer = self._buffer.partition(b"\r\n\r\n")
         return head
 
@@ -208,7 +208,7 @@ class Stream:
         data, self._buffer = self._buffer, b""
         return data
 
-    def _body(self, message: Ask | Answer, unsaid: int | None) -> bytes:
+    def _body(self, message: Request | Response, unsaid: int | None) -> bytes:
         """A body; where its length is ``unsaid`` there is none (None), or it ends with the connection (-1)."""
         if "chunked" in (message.field("Transfer-Encoding") or "").lower():
             return self._chunks()
@@ -227,7 +227,7 @@ class Stream:
             got = len(parts[0])
             while got < size:
                 if not self.more():
-                    raise TornError(b"".join(parts))
+                    raise IncompleteMessageError(b"".join(parts))
                 parts.append(self._all())
                 got += len(parts[-1])
             self._buffer = b"".join(parts)
@@ -239,7 +239,7 @@ class Stream:
         while True:
             while b"\r\n" not in self._buffer:
                 if not self.more():
-                    raise TornError(b"".join(parts))
+                    raise IncompleteMessageError(b"".join(parts))
             line, _, self._buffer = self._buffer.partition(b"\r\n")
             size = int(line.partition(b";")[0] or b"0", 16)
             chunk = self._take(size + 2)[:size] if size else b""
@@ -265,7 +265,7 @@ class Upstream:
         self._address = (host, port)
         self._stream: Stream | None = None
 
-    def exchange(self, ask: Ask) -> Answer:
+    def exchange(self, request: Request) -> Response:
         """Send a request and wait for its answer.
 
         Raises:
@@ -273,24 +273,26 @@ class Upstream:
         """
         used = self._stream is not None
         try:
-            return self._once(ask)
-        except (TornError, OSError):
+            return self._once(request)
+        except (IncompleteMessageError, OSError):
             self.close()
             if not used:
                 raise
         # The robot closed a connection that was kept: that answered no request.
-        return self._once(ask)
+        return self._once(request)
 
-    def _once(self, ask: Ask) -> Answer:
+    def _once(self, request: Request) -> Response:
         if self._stream is None:
             self._stream = Stream(socket.create_connection(self._address, timeout=_WAIT_S))
             self._stream.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._send(self._stream.sock, ask.wire())
-        answer = self._stream.answer(ask.method)
-        closes = "close" in (answer.field("Connection") or "").lower() or "close" in (ask.field("Connection") or "")
-        if closes or answer.version == "HTTP/1.0" or ask.raw is not None or ask.version == "HTTP/1.0":
+        self._send(self._stream.sock, request.wire())
+        response = self._stream.response(request.method)
+        closes = "close" in (response.field("Connection") or "").lower() or "close" in (
+            request.field("Connection") or ""
+        )
+        if closes or response.version == "HTTP/1.0" or request.raw is not None or request.version == "HTTP/1.0":
             self.close()
-        return answer
+        return response
 
     def _send(self, sock: socket.socket, data: bytes) -> None:
         """Send until all is sent, or the robot answers before that, or it closes."""

@@ -1,4 +1,4 @@
-"""Starts one of the strangers: ``python -m conformance.selftest.independent_robots NAME``."""
+"""Starts one of the independent robots: ``python -m conformance.selftest.independent_robots NAME``."""
 
 from __future__ import annotations
 

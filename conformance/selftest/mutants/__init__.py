@@ -1,4 +1,4 @@
-"""Every faulty robot, by subject."""
+"""Every mutant, by subject."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from conformance.selftest.mutants import (
 )
 
 if TYPE_CHECKING:
-    from conformance.selftest.mutants.mutant import Fault
+    from conformance.selftest.mutants.mutant import Mutant
 
 _SUBJECTS = (
     reach,
@@ -54,4 +54,4 @@ _SUBJECTS = (
     wsdl,
     describe,
 )
-FAULTS: tuple[Fault, ...] = tuple(fault for subject in _SUBJECTS for fault in subject.FAULTS)
+MUTANTS: tuple[Mutant, ...] = tuple(mutant for subject in _SUBJECTS for mutant in subject.MUTANTS)

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 
 from conformance.selftest.mutants.changes import TNS, instead, plain, rewritten
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.mutants.soap_processing import posted
 from conformance.selftest.mutants.soap_services import enveloped, fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _DOCTYPE = re.compile(rb"<!DOCTYPE[^\[>]*(\[.*?\]\s*)?>", re.DOTALL)
 _INTERNAL = re.compile(rb"<!ENTITY\s+([\w.-]+)\s+[\"']([^\"']*)[\"']\s*>")
@@ -33,29 +33,29 @@ _DONE = enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>')
 _LARGE = 10 * 1024 * 1024
 
 
-def _declared(ask: Ask) -> bool:
-    return posted(ask) and b"<!DOCTYPE" in ask.body
+def _declared(request: Request) -> bool:
+    return posted(request) and b"<!DOCTYPE" in request.body
 
 
-def _undeclared(ask: Ask) -> None:
-    ask.body = _REFERENCE.sub(
+def _undeclared(request: Request) -> None:
+    request.body = _REFERENCE.sub(
         lambda found: found[0] if found[1] in {b"lt", b"gt", b"amp", b"quot", b"apos"} else b"1",
-        _DOCTYPE.sub(b"", ask.body),
+        _DOCTYPE.sub(b"", request.body),
     )
 
 
-def _plain_doctype(ask: Ask) -> None:
-    if b"<!ENTITY" not in ask.body:
-        ask.body = _DOCTYPE.sub(b"", ask.body)
+def _plain_doctype(request: Request) -> None:
+    if b"<!ENTITY" not in request.body:
+        request.body = _DOCTYPE.sub(b"", request.body)
 
 
-def _expanded(ask: Ask) -> None:
+def _expanded(request: Request) -> None:
     """Internal entities, a few of them and not nested, are put in their places."""
-    entities = dict(_INTERNAL.findall(ask.body))
-    if not entities or len(ask.body) > 20_000 or any(b"&" in value for value in entities.values()):
+    entities = dict(_INTERNAL.findall(request.body))
+    if not entities or len(request.body) > 20_000 or any(b"&" in value for value in entities.values()):
         return
-    body = _DOCTYPE.sub(b"", ask.body)
-    ask.body = _REFERENCE.sub(lambda found: entities.get(found[1], found[0]), body)
+    body = _DOCTYPE.sub(b"", request.body)
+    request.body = _REFERENCE.sub(lambda found: entities.get(found[1], found[0]), body)
 
 
 def _read(url: str) -> str:
@@ -67,7 +67,7 @@ def _read(url: str) -> str:
         return ""
 
 
-def _leaked(text: str) -> Callable[[Ask], Answer]:
+def _leaked(text: str) -> Callable[[Request], Response]:
     said = (
         "".join(char if char.isprintable() else " " for char in text)
         .replace("&", "+")
@@ -77,23 +77,23 @@ def _leaked(text: str) -> Callable[[Ask], Answer]:
     return fault("Client", f"not a number: {said}")
 
 
-def _external(ask: Ask, forward: Forward) -> Answer:
+def _external(request: Request, forward: Forward) -> Response:
     """An external entity's file is quoted in the fault."""
-    for _, url in _EXTERNAL.findall(ask.body) if posted(ask) else ():
+    for _, url in _EXTERNAL.findall(request.body) if posted(request) else ():
         found = _read(url.decode("utf-8", "replace"))
         if found:
-            return _leaked(found)(ask)
-    return forward(ask)
+            return _leaked(found)(request)
+    return forward(request)
 
 
-def _xinclude(ask: Ask, forward: Forward) -> Answer:
+def _xinclude(request: Request, forward: Forward) -> Response:
     """An xi:include's file is quoted in the fault."""
-    if posted(ask) and b"XInclude" in ask.body:
-        for url in re.findall(rb"href=[\"']([^\"']*)[\"']", ask.body):
+    if posted(request) and b"XInclude" in request.body:
+        for url in re.findall(rb"href=[\"']([^\"']*)[\"']", request.body):
             found = _read(url.decode("utf-8", "replace"))
             if found:
-                return _leaked(found)(ask)
-    return forward(ask)
+                return _leaked(found)(request)
+    return forward(request)
 
 
 def _call(url: bytes) -> None:
@@ -108,11 +108,11 @@ def _call(url: bytes) -> None:
 
 
 def _calling(find: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
-    def change(ask: Ask, forward: Forward) -> Answer:
-        if ask.method in {"POST", "PUT"}:
-            for url in dict.fromkeys(find(ask.body)):
+    def change(request: Request, forward: Forward) -> Response:
+        if request.method in {"POST", "PUT"}:
+            for url in dict.fromkeys(find(request.body)):
                 _call(url)
-        return forward(ask)
+        return forward(request)
 
     return lambda: change
 
@@ -130,42 +130,47 @@ def _addressing_urls(body: bytes) -> list[bytes]:
     return _URL.findall(body) if b"addressing" in body else []
 
 
-def _nested(ask: Ask) -> bool:
-    return posted(ask) and ask.body.count(b"<") > 20_000 and b"<!DOCTYPE" not in ask.body and b"Envelope" in ask.body
+def _nested(request: Request) -> bool:
+    return (
+        posted(request)
+        and request.body.count(b"<") > 20_000
+        and b"<!DOCTYPE" not in request.body
+        and b"Envelope" in request.body
+    )
 
 
-def _many_entities(ask: Ask) -> bool:
-    return posted(ask) and ask.body.count(b"<!ENTITY") > 2
+def _many_entities(request: Request) -> bool:
+    return posted(request) and request.body.count(b"<!ENTITY") > 2
 
 
-def _one_long_entity(ask: Ask) -> bool:
-    return posted(ask) and 0 < ask.body.count(b"<!ENTITY") <= 2 and ask.body.count(b"&") > 50
+def _one_long_entity(request: Request) -> bool:
+    return posted(request) and 0 < request.body.count(b"<!ENTITY") <= 2 and request.body.count(b"&") > 50
 
 
-def _long_name(ask: Ask) -> bool:
-    return posted(ask) and bool(re.search(rb"<[\w:.-]{5000,}", ask.body))
+def _long_name(request: Request) -> bool:
+    return posted(request) and bool(re.search(rb"<[\w:.-]{5000,}", request.body))
 
 
-def _attributed(ask: Ask) -> bool:
-    return posted(ask) and ask.body.count(b'="') > 5000
+def _attributed(request: Request) -> bool:
+    return posted(request) and request.body.count(b'="') > 5000
 
 
-def _bomb(ask: Ask) -> bool:
-    return posted(ask) and bool(ask.field("Content-Encoding"))
+def _bomb(request: Request) -> bool:
+    return posted(request) and bool(request.field("Content-Encoding"))
 
 
-def _spoofed(ask: Ask, forward: Forward) -> Answer:
+def _spoofed(request: Request, forward: Forward) -> Response:
     """SOAPAction chooses what is run, whatever the body says."""
-    action = (ask.field("SOAPAction") or "").strip('"')
+    action = (request.field("SOAPAction") or "").strip('"')
     for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"):
-        if posted(ask) and name in action and name.encode() not in ask.body:
-            body = re.sub(rb"Execute(Coffee|Delivery)Request", name.encode(), ask.body)
-            return forward(ask.copy(body=body))
-    return forward(ask)
+        if posted(request) and name in action and name.encode() not in request.body:
+            body = re.sub(rb"Execute(Coffee|Delivery)Request", name.encode(), request.body)
+            return forward(request.copy(body=body))
+    return forward(request)
 
 
-def _rest_xml(ask: Ask) -> bool:
-    return ask.side == "rest" and ask.method == "PUT" and b"<!DOCTYPE" in ask.body
+def _rest_xml(request: Request) -> bool:
+    return request.side == "rest" and request.method == "PUT" and b"<!DOCTYPE" in request.body
 
 
 class _Exhausted:
@@ -175,95 +180,95 @@ class _Exhausted:
         self._attacks = 6
         self._left = 0
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
         if self._left:
             self._left -= 1
             time.sleep(1.6)
-        if self._attacks and (b"<!DOCTYPE" in ask.body or len(ask.body) > 500_000):
+        if self._attacks and (b"<!DOCTYPE" in request.body or len(request.body) > 500_000):
             self._attacks -= 1
             self._left = 4
-        return forward(ask)
+        return forward(request)
 
 
-def _fault(name: str, says: str, id_: str, make: Any, interface: str = "soap") -> Fault:
-    return Fault(name, says, (f"xml-security/{id_}",), interface, make)
+def _mutant(name: str, says: str, id_: str, make: Any, interface: str = "soap") -> Mutant:
+    return Mutant(name, says, (f"xml-security/{id_}",), interface, make)
 
 
-FAULTS = (
-    _fault(
+MUTANTS = (
+    _mutant(
         "attack-doctype-fine",
         "A Document Type Declaration is passed over.",
         "doctype",
         rewritten(_declared, _plain_doctype),
     ),
-    _fault(
+    _mutant(
         "attack-entity-expanded", "Internal entities are expanded.", "internal-entity", rewritten(_declared, _expanded)
     ),
-    _fault(
+    _mutant(
         "attack-file-leaked", "An external entity's file appears in the fault.", "external-entity", lambda: _external
     ),
-    _fault(
+    _mutant(
         "attack-entity-fetched",
         "An external entity is fetched from the network.",
         "no-callback",
         _calling(_entity_urls),
     ),
-    _fault(
+    _mutant(
         "attack-dtd-fetched",
         "An external DTD or parameter entity is fetched.",
         "parameter-entity",
         _calling(_doctype_urls),
     ),
-    _fault(
+    _mutant(
         "attack-expansion-fine",
         "Entities that expand exponentially are answered like any others.",
         "expansion",
         rewritten(_many_entities, _undeclared),
     ),
-    _fault(
+    _mutant(
         "attack-quadratic-fine",
         "One long entity many times is answered like any other.",
         "quadratic",
         rewritten(_one_long_entity, _undeclared),
     ),
-    _fault("attack-depth-fine", "XML nested without end is answered 200.", "depth", instead(_nested, _DONE)),
-    _fault(
+    _mutant("attack-depth-fine", "XML nested without end is answered 200.", "depth", instead(_nested, _DONE)),
+    _mutant(
         "attack-attributes-fine", "Thousands of attributes are passed over.", "attributes", instead(_attributed, _DONE)
     ),
-    _fault(
+    _mutant(
         "attack-long-name-fine",
         "A name of a million characters is passed over.",
         "long-name",
         instead(_long_name, _DONE),
     ),
-    _fault(
+    _mutant(
         "attack-size-fine",
         "A message over 10 MiB is answered 200.",
         "size",
-        instead(lambda ask: posted(ask) and len(ask.body) > _LARGE, _DONE),
+        instead(lambda request: posted(request) and len(request.body) > _LARGE, _DONE),
     ),
-    _fault(
+    _mutant(
         "attack-bomb-unpacked",
         "A compressed message is unpacked, however large it becomes.",
         "compressed",
         instead(_bomb, _DONE),
     ),
-    _fault(
+    _mutant(
         "attack-instruction-fine",
         "Processing instructions are passed over.",
         "processing-instruction",
-        rewritten(posted, lambda ask: setattr(ask, "body", _INSTRUCTION.sub(b"", ask.body))),
+        rewritten(posted, lambda request: setattr(request, "body", _INSTRUCTION.sub(b"", request.body))),
     ),
-    _fault("attack-included", "XInclude is processed.", "xinclude", lambda: _xinclude),
-    _fault("attack-action-chooses", "SOAPAction chooses what is run.", "soapaction-spoofing", lambda: _spoofed),
-    _fault("attack-reply-elsewhere", "ReplyTo is called.", "addressing-spoofing", _calling(_addressing_urls)),
-    _fault(
+    _mutant("attack-included", "XInclude is processed.", "xinclude", lambda: _xinclude),
+    _mutant("attack-action-chooses", "SOAPAction chooses what is run.", "soapaction-spoofing", lambda: _spoofed),
+    _mutant("attack-reply-elsewhere", "ReplyTo is called.", "addressing-spoofing", _calling(_addressing_urls)),
+    _mutant(
         "attack-rest-fine",
         "A Document Type Declaration in a REST body is passed over.",
         "rest",
         instead(_rest_xml, plain(204)),
         "rest",
     ),
-    _fault("attack-exhausted", "After an attack everything takes 1.6 s.", "responsive", _Exhausted, "both"),
+    _mutant("attack-exhausted", "After an attack everything takes 1.6 s.", "responsive", _Exhausted, "both"),
 )

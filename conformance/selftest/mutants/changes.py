@@ -1,4 +1,4 @@
-"""The parts that faults are made of: which exchanges, and what becomes of them."""
+"""The parts that mutants are made of: which exchanges, and what becomes of them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
-from conformance.selftest.wire import Answer
+from conformance.selftest.wire import Response
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from conformance.selftest.proxy import Change
-    from conformance.selftest.wire import Ask
+    from conformance.selftest.wire import Request
 
-    Where = Callable[[Ask], bool]
-    When = Callable[[Answer], bool]
+    Where = Callable[[Request], bool]
+    When = Callable[[Response], bool]
     Make = Callable[[], Change]
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 POSE, VELOCITY, LINEAR = "/robot/pose/", "/robot/velocity/", "/robot/velocity/linear/"
 SENSORS, SERVICES = "/robot/sensors/", "/robot/navigation/services/"
@@ -35,19 +35,23 @@ def rest(method: str = "", *paths: str) -> Where:
     """REST requests with one of these methods (any, when empty) to one of these paths (likewise)."""
     methods = method.split()
 
-    def where(ask: Ask) -> bool:
-        return ask.side == "rest" and (not methods or ask.method in methods) and (not paths or ask.path in paths)
+    def where(request: Request) -> bool:
+        return (
+            request.side == "rest"
+            and (not methods or request.method in methods)
+            and (not paths or request.path in paths)
+        )
 
     return where
 
 
-def deliveries(ask: Ask) -> bool:
+def deliveries(request: Request) -> bool:
     """Delivery PUTs."""
     return (
-        ask.side == "rest"
-        and ask.method == "PUT"
-        and ask.path.startswith(DELIVERIES)
-        and len(ask.path) > len(DELIVERIES)
+        request.side == "rest"
+        and request.method == "PUT"
+        and request.path.startswith(DELIVERIES)
+        and len(request.path) > len(DELIVERIES)
     )
 
 
@@ -56,96 +60,96 @@ def soap(*operations: str) -> Where:
     names = "|".join(operations) or r"[\w.-]+"
     pattern = re.compile(rb"<(?:[\w.-]+:)?(?:%s)[\s/>]" % names.encode())
 
-    def where(ask: Ask) -> bool:
-        return ask.side == "soap" and ask.method == "POST" and bool(pattern.search(ask.body))
+    def where(request: Request) -> bool:
+        return request.side == "soap" and request.method == "POST" and bool(pattern.search(request.body))
 
     return where
 
 
-def wsdls(ask: Ask) -> bool:
+def wsdls(request: Request) -> bool:
     """Requests for a WSDL, or for a document that it imports."""
-    return ask.side == "soap" and ask.method in {"GET", "HEAD"} and bool(ask.query)
+    return request.side == "soap" and request.method in {"GET", "HEAD"} and bool(request.query)
 
 
-def success(answer: Answer) -> bool:
+def success(response: Response) -> bool:
     """Answers with 2xx."""
-    return answer.status in _SUCCESS
+    return response.status in _SUCCESS
 
 
 def status(*values: int) -> When:
     """Answers with one of these."""
-    return lambda answer: answer.status in values
+    return lambda response: response.status in values
 
 
-def refusal(answer: Answer) -> bool:
+def refusal(response: Response) -> bool:
     """Answers with 4xx."""
-    return 400 <= answer.status < 500
+    return 400 <= response.status < 500
 
 
-def anything(_answer: Answer) -> bool:
+def anything(_answer: Response) -> bool:
     """Every answer."""
     return True
 
 
-def altered(where: Where, edit: Callable[[Answer], object], when: When = success, *, nth: int = 1) -> Make:
+def altered(where: Where, edit: Callable[[Response], object], when: When = success, *, nth: int = 1) -> Make:
     """Alter answers; with ``nth`` only each nth of those that it concerns."""
 
     def make() -> Change:
         seen = 0
 
-        def change(ask: Ask, forward: Forward) -> Answer:
+        def change(request: Request, forward: Forward) -> Response:
             nonlocal seen
-            answer = forward(ask)
-            if where(ask) and when(answer):
+            response = forward(request)
+            if where(request) and when(response):
                 seen += 1
                 if seen % nth == 0:
-                    answer = answer.copy()
-                    edit(answer)
-            return answer
+                    response = response.copy()
+                    edit(response)
+            return response
 
         return change
 
     return make
 
 
-def rewritten(where: Where, edit: Callable[[Ask], object]) -> Make:
+def rewritten(where: Where, edit: Callable[[Request], object]) -> Make:
     """Alter requests on their way to the robot."""
 
     def make() -> Change:
-        def change(ask: Ask, forward: Forward) -> Answer:
-            if where(ask):
-                ask = ask.copy()
-                edit(ask)
-            return forward(ask)
+        def change(request: Request, forward: Forward) -> Response:
+            if where(request):
+                request = request.copy()
+                edit(request)
+            return forward(request)
 
         return change
 
     return make
 
 
-def secretly(where: Where, edit: Callable[[Ask], object]) -> Make:
+def secretly(where: Where, edit: Callable[[Request], object]) -> Make:
     """Alter requests on their way to the robot, and answer 204, so that no answer tells."""
 
     def make() -> Change:
-        def change(ask: Ask, forward: Forward) -> Answer:
-            if not where(ask):
-                return forward(ask)
-            altered_ask = ask.copy()
-            edit(altered_ask)
-            answer = forward(altered_ask)
-            return Answer(204, asked=ask.method) if success(answer) else answer
+        def change(request: Request, forward: Forward) -> Response:
+            if not where(request):
+                return forward(request)
+            altered_request = request.copy()
+            edit(altered_request)
+            response = forward(altered_request)
+            return Response(204, method=request.method) if success(response) else response
 
         return change
 
     return make
 
 
-def instead(where: Where, answer: Callable[[Ask], Answer]) -> Make:
+def instead(where: Where, response: Callable[[Request], Response]) -> Make:
     """Answer requests without asking the robot."""
 
     def make() -> Change:
-        def change(ask: Ask, forward: Forward) -> Answer:
-            return answer(ask) if where(ask) else forward(ask)
+        def change(request: Request, forward: Forward) -> Response:
+            return response(request) if where(request) else forward(request)
 
         return change
 
@@ -157,27 +161,29 @@ def remembering(kind: Callable[[], Change]) -> Make:
     return kind
 
 
-def plain(status_: int, body: bytes = b"", media_type: str = "", *fields: tuple[str, str]) -> Callable[[Ask], Answer]:
+def plain(
+    status_: int, body: bytes = b"", media_type: str = "", *fields: tuple[str, str]
+) -> Callable[[Request], Response]:
     """An answer of one's own."""
     said = [("Content-Type", media_type)] if media_type else []
-    return lambda ask: Answer(status_, [*said, *fields], body, asked=ask.method)
+    return lambda request: Response(status_, [*said, *fields], body, method=request.method)
 
 
-def problem(status_: int, detail: str, *fields: tuple[str, str]) -> Callable[[Ask], Answer]:
+def problem(status_: int, detail: str, *fields: tuple[str, str]) -> Callable[[Request], Response]:
     """A problem as RFC 9457 has it."""
     body = json.dumps({"status": status_, "detail": detail}).encode()
     return plain(status_, body, "application/problem+json", *fields)
 
 
-def becomes(status_: int) -> Callable[[Answer], object]:
+def becomes(status_: int) -> Callable[[Response], object]:
     """Another status, in the problem too."""
 
-    def edit(answer: Answer) -> None:
-        answer.status, answer.reason = status_, ""
-        if answer.media_type.endswith("problem+json"):
-            value = parsed(answer.body)
+    def edit(response: Response) -> None:
+        response.status, response.reason = status_, ""
+        if response.media_type.endswith("problem+json"):
+            value = parsed(response.body)
             if isinstance(value, dict):
-                answer.body = json.dumps({**value, "status": status_}).encode()
+                response.body = json.dumps({**value, "status": status_}).encode()
 
     return edit
 
@@ -190,48 +196,48 @@ def parsed(body: bytes) -> Any:
         return None
 
 
-def values(edit: Callable[[Any], Any]) -> Callable[[Answer], object]:
+def values(edit: Callable[[Any], Any]) -> Callable[[Response], object]:
     """Alter the value of a JSON answer: ``edit`` changes it in place, or returns another one."""
 
-    def apply(answer: Answer) -> None:
-        value = parsed(answer.body)
-        if value is not None and answer.media_type.endswith("json"):
+    def apply(response: Response) -> None:
+        value = parsed(response.body)
+        if value is not None and response.media_type.endswith("json"):
             made = edit(value)
-            answer.body = json.dumps(value if made is None else made).encode()
+            response.body = json.dumps(value if made is None else made).encode()
 
     return apply
 
 
-def inputs(edit: Callable[[Any], Any]) -> Callable[[Ask], object]:
+def inputs(edit: Callable[[Any], Any]) -> Callable[[Request], object]:
     """Alter the value of a JSON request, as values() does."""
 
-    def apply(ask: Ask) -> None:
-        value = parsed(ask.body)
+    def apply(request: Request) -> None:
+        value = parsed(request.body)
         if value is not None:
             made = edit(value)
-            ask.body = json.dumps(value if made is None else made).encode()
+            request.body = json.dumps(value if made is None else made).encode()
 
     return apply
 
 
-def text(pattern: str, by: str, count: int = 0) -> Callable[[Answer], object]:
+def text(pattern: str, by: str, count: int = 0) -> Callable[[Response], object]:
     """Replace a regular expression in an answer's body."""
     compiled = re.compile(pattern.encode(), re.DOTALL)
 
-    def edit(answer: Answer) -> None:
-        answer.body = compiled.sub(by.encode(), answer.body, count=count)
+    def edit(response: Response) -> None:
+        response.body = compiled.sub(by.encode(), response.body, count=count)
 
     return edit
 
 
-def tree(edit: Callable[[Any], object]) -> Callable[[Answer], object]:
+def tree(edit: Callable[[Any], object]) -> Callable[[Response], object]:
     """Alter the XML tree of an answer's body; what is no XML stays as it is."""
 
-    def apply(answer: Answer) -> None:
-        root = xml(answer.body)
+    def apply(response: Response) -> None:
+        root = xml(response.body)
         if root is not None:
             edit(root)
-            answer.body = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+            response.body = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
 
     return apply
 
@@ -250,9 +256,9 @@ def named(root: Any, name: str) -> list[Any]:
     return [node for node in root.iter() if isinstance(node.tag, str) and etree.QName(node).localname == name]
 
 
-def header(name: str, value: str | None) -> Callable[[Answer], object]:
+def header(name: str, value: str | None) -> Callable[[Response], object]:
     """Set a header field, or remove it."""
-    return lambda answer: answer.drop(name) if value is None else answer.put(name, value)
+    return lambda response: response.drop(name) if value is None else response.put(name, value)
 
 
 def set_fields(**fields: object) -> Callable[[Any], None]:

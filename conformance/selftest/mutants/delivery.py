@@ -15,13 +15,13 @@ from conformance.selftest.mutants.changes import (
     remembering,
     rewritten,
 )
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.proxy import HangUpError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NON_FINITE = re.compile(r"[+-]?(nan|inf|infinity|1e400|\d+e\d{3,})", re.IGNORECASE)
@@ -29,15 +29,15 @@ _NON_FINITE = re.compile(r"[+-]?(nan|inf|infinity|1e400|\d+e\d{3,})", re.IGNOREC
 _CODE, _VALUES = 4, range(6, 17, 2)
 
 
-def segments(edit: Callable[[int, str], str]) -> Callable[[Ask], None]:
+def segments(edit: Callable[[int, str], str]) -> Callable[[Request], None]:
     """Alter the values in a delivery's path; ``edit`` gets a value's place and its text."""
 
-    def apply(ask: Ask) -> None:
-        parts = ask.path.split("/")
+    def apply(request: Request) -> None:
+        parts = request.path.split("/")
         for place in (_CODE, *_VALUES):
             if place < len(parts):
                 parts[place] = edit(place, parts[place])
-        ask.target = "/".join(parts)
+        request.target = "/".join(parts)
 
     return apply
 
@@ -61,11 +61,11 @@ def any_code(place: int, text: str) -> str:
     )
 
 
-def _written(pattern: str) -> Callable[[Ask], bool]:
+def _written(pattern: str) -> Callable[[Request], bool]:
     compiled = re.compile(pattern)
 
-    def where(ask: Ask) -> bool:
-        parts = ask.path.split("/") if deliveries(ask) else []
+    def where(request: Request) -> bool:
+        parts = request.path.split("/") if deliveries(request) else []
         return any(compiled.fullmatch(parts[place]) for place in _VALUES if place < len(parts))
 
     return where
@@ -77,87 +77,88 @@ class _OnlyOnce:
     def __init__(self) -> None:
         self._seen: set[str] = set()
 
-    def __call__(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
-        if deliveries(ask):
-            if ask.target in self._seen:
-                return problem(409, "code: this delivery was accepted before")(ask)
-            self._seen.add(ask.target)
-        return forward(ask)
+    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+        if deliveries(request):
+            if request.target in self._seen:
+                return problem(409, "code: this delivery was accepted before")(request)
+            self._seen.add(request.target)
+        return forward(request)
 
 
-def _hung_up(ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
-    if deliveries(ask):
+def _hung_up(request: Request, forward: Callable[[Request], Response]) -> Response:
+    if deliveries(request):
         raise HangUpError
-    return forward(ask)
+    return forward(request)
 
 
-def _fault(name: str, says: str, id_: str, make: Any) -> Fault:
-    return Fault(name, says, (f"rest-delivery/{id_}",), "rest", make)
+def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
+    return Mutant(name, says, (f"rest-delivery/{id_}",), "rest", make)
 
 
-def _page(answer: Answer) -> None:
-    answer.status, answer.reason, answer.body = 200, "", b'{"accepted":true}'
-    answer.put("Content-Type", "application/json")
+def _page(response: Response) -> None:
+    response.status, response.reason, response.body = 200, "", b'{"accepted":true}'
+    response.put("Content-Type", "application/json")
 
 
-FAULTS = (
-    _fault("delivery-crashes", "A delivery is answered 500.", "put", altered(deliveries, becomes(500))),
-    _fault(
+MUTANTS = (
+    _mutant("delivery-crashes", "A delivery is answered 500.", "put", altered(deliveries, becomes(500))),
+    _mutant(
         "delivery-coffee-unknown",
         "There is no coffee: code 4 is 404.",
         "put",
         instead(
-            lambda ask: deliveries(ask) and ask.path.split("/")[_CODE] == "4", problem(404, "code: 4 is not known")
+            lambda request: deliveries(request) and request.path.split("/")[_CODE] == "4",
+            problem(404, "code: 4 is not known"),
         ),
     ),
-    _fault("delivery-silent", "A delivery is accepted by closing the connection.", "put", lambda: _hung_up),
-    _fault(
+    _mutant("delivery-silent", "A delivery is accepted by closing the connection.", "put", lambda: _hung_up),
+    _mutant(
         "delivery-sometimes-lost",
         "One delivery in 50 is answered 500.",
         "put-range",
         altered(deliveries, becomes(500), nth=50),
     ),
-    _fault(
+    _mutant(
         "delivery-talks",
         "A delivery is answered 200 with a page.",
         "put-no-content",
         altered(deliveries, _page),
     ),
-    _fault(
+    _mutant(
         "delivery-positive-only",
         "Negative coordinates are refused.",
         "put-range",
         instead(_written(r"-.*"), problem(422, "depot_x: negative")),
     ),
-    _fault(
+    _mutant(
         "delivery-no-exponents",
         "Numbers with an exponent are refused.",
         "put-range",
         instead(_written(r"[+-]?[\d.]+[eE].*"), problem(422, "depot_x: no number")),
     ),
-    _fault(
+    _mutant(
         "delivery-wants-no-body",
         "A body on the delivery is refused.",
         "put-body",
-        instead(lambda ask: deliveries(ask) and bool(ask.body), problem(415, "a body is not expected")),
+        instead(lambda request: deliveries(request) and bool(request.body), problem(415, "a body is not expected")),
     ),
-    _fault("delivery-only-once", "The same delivery again is 409.", "put-repeated", remembering(_OnlyOnce)),
-    _fault(
+    _mutant("delivery-only-once", "The same delivery again is 409.", "put-repeated", remembering(_OnlyOnce)),
+    _mutant(
         "delivery-text-is-zero",
         "Letters in place of a number count as 0.",
         "refuses-text",
         rewritten(deliveries, segments(lenient)),
     ),
-    _fault(
+    _mutant(
         "delivery-takes-nan",
         "NaN and Infinity are accepted.",
         "refuses-non-finite",
         rewritten(deliveries, segments(finite)),
     ),
-    _fault(
+    _mutant(
         "delivery-takes-any-code", "Any code is accepted.", "refuses-code", rewritten(deliveries, segments(any_code))
     ),
-    _fault(
+    _mutant(
         "delivery-swallows",
         "Whatever stands in a delivery's path is accepted.",
         "refuses-text",

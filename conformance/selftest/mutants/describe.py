@@ -17,12 +17,12 @@ from conformance.selftest.mutants.changes import (
     tree,
     values,
 )
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Ask
+    from conformance.selftest.wire import Request
 
 _OPENAPI, _WADL = rest("GET", "/openapi.json"), rest("GET", "/application.wadl")
 
@@ -49,8 +49,8 @@ def _invalid(description: Any) -> None:
     description["paths"] = [*description["paths"]]
 
 
-def _missing(path: str) -> Callable[[Ask], bool]:
-    return lambda ask: ask.side == "rest" and ask.path == path
+def _missing(path: str) -> Callable[[Request], bool]:
+    return lambda request: request.side == "rest" and request.path == path
 
 
 def _resource_lost(root: Any) -> None:
@@ -71,61 +71,61 @@ def _parameter_lost(root: Any) -> None:
             node.getparent().remove(node)
 
 
-def _fault(name: str, says: str, id_: str, make: Any) -> Fault:
-    return Fault(name, says, (f"describe/{id_}",), "rest", make)
+def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
+    return Mutant(name, says, (f"describe/{id_}",), "rest", make)
 
 
-FAULTS = (
-    _fault("openapi-gone", "There is no /openapi.json.", "openapi", instead(_OPENAPI, problem(404, "no description"))),
-    _fault("openapi-invalid", "/openapi.json is no OpenAPI.", "openapi", altered(_OPENAPI, values(_invalid))),
-    _fault(
+MUTANTS = (
+    _mutant("openapi-gone", "There is no /openapi.json.", "openapi", instead(_OPENAPI, problem(404, "no description"))),
+    _mutant("openapi-invalid", "/openapi.json is no OpenAPI.", "openapi", altered(_OPENAPI, values(_invalid))),
+    _mutant(
         "openapi-yaml",
         "/openapi.json is YAML.",
         "openapi",
         instead(_OPENAPI, plain(200, b"openapi: 3.1.0\npaths: {}\n", "application/yaml")),
     ),
-    _fault(
+    _mutant(
         "openapi-without-path",
         "/openapi.json lacks a path.",
         "openapi-operations",
         altered(_OPENAPI, values(_without_path)),
     ),
-    _fault(
+    _mutant(
         "openapi-without-method",
         "/openapi.json lacks a method.",
         "openapi-operations",
         altered(_OPENAPI, values(_without_method)),
     ),
-    _fault(
+    _mutant(
         "openapi-without-parameter",
         "/openapi.json lacks a parameter.",
         "openapi-operations",
         altered(_OPENAPI, values(_without_parameter)),
     ),
-    _fault(
+    _mutant(
         "openapi-promises",
         "/openapi.json has a path that is not there.",
         "openapi-behaviour",
         altered(_OPENAPI, values(_promised)),
     ),
-    _fault(
+    _mutant(
         "openapi-resource-lost",
         "A resource of the contract is 404.",
         "openapi-behaviour",
         instead(_missing(SENSORS), problem(404, "nothing is here")),
     ),
-    _fault("wadl-gone", "There is no /application.wadl.", "wadl", instead(_WADL, problem(404, "no description"))),
-    _fault("wadl-broken", "/application.wadl is not closed.", "wadl", altered(_WADL, text(r"</[\w:]+>\s*$", ""))),
-    _fault(
+    _mutant("wadl-gone", "There is no /application.wadl.", "wadl", instead(_WADL, problem(404, "no description"))),
+    _mutant("wadl-broken", "/application.wadl is not closed.", "wadl", altered(_WADL, text(r"</[\w:]+>\s*$", ""))),
+    _mutant(
         "wadl-without-resource",
         "/application.wadl lacks a resource.",
         "wadl-resources",
         altered(_WADL, tree(_resource_lost)),
     ),
-    _fault(
+    _mutant(
         "wadl-without-method", "/application.wadl lacks a method.", "wadl-resources", altered(_WADL, tree(_method_lost))
     ),
-    _fault(
+    _mutant(
         "wadl-without-parameter",
         "/application.wadl lacks a parameter.",
         "wadl-resources",

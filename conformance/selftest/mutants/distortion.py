@@ -12,9 +12,9 @@ from conformance.selftest.mutants.changes import deliveries, plain, soap
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _COFFEE = soap("ExecuteCoffeeRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
@@ -22,13 +22,13 @@ _CODE_PLACE = 4
 _DOUBLES = rb"(<(?:\w+:)?(?:depot|destination|source)_[xy][^>]*>\s*)([^<\s]+)(\s*<)"
 
 
-def doubled(where: Callable[[Ask], bool]) -> Callable[[], Any]:
+def doubled(where: Callable[[Request], bool]) -> Callable[[], Any]:
     """Every request is carried out twice, and answered once."""
 
-    def change(ask: Ask, forward: Forward) -> Answer:
-        if where(ask):
-            forward(ask)
-        return forward(ask)
+    def change(request: Request, forward: Forward) -> Response:
+        if where(request):
+            forward(request)
+        return forward(request)
 
     return lambda: change
 
@@ -36,40 +36,40 @@ def doubled(where: Callable[[Ask], bool]) -> Callable[[], Any]:
 class EveryNth:
     """Each nth is answered and forgotten."""
 
-    def __init__(self, where: Callable[[Ask], bool], answer: Callable[[Ask], Answer], nth: int) -> None:
-        self._where, self._answer, self._nth = where, answer, nth
+    def __init__(self, where: Callable[[Request], bool], response: Callable[[Request], Response], nth: int) -> None:
+        self._where, self._answer, self._nth = where, response, nth
         self._seen = 0
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
-        if self._where(ask):
+        if self._where(request):
             self._seen += 1
             if self._seen % self._nth == 0:
-                return self._answer(ask)
-        return forward(ask)
+                return self._answer(request)
+        return forward(request)
 
 
 class OutOfOrder:
     """A REST delivery waits for the next delivery, which overtakes it, or until somebody looks what has arrived."""
 
     def __init__(self) -> None:
-        self._held: tuple[Ask, Forward] | None = None
+        self._held: tuple[Request, Forward] | None = None
         self._lock = threading.Lock()
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
-        overtaking = deliveries(ask) or _BOTH(ask)
+        overtaking = deliveries(request) or _BOTH(request)
         with self._lock:
             held, self._held = self._held, None
-            if held is None and deliveries(ask):
-                self._held = (ask.copy(), forward)
-                return plain(204)(ask)
+            if held is None and deliveries(request):
+                self._held = (request.copy(), forward)
+                return plain(204)(request)
         if held is not None and not overtaking:
             held[1](held[0])
-        answer = forward(ask)
+        response = forward(request)
         if held is not None and overtaking:
             held[1](held[0])
-        return answer
+        return response
 
 
 def float32(text: str) -> str:
@@ -85,14 +85,14 @@ def narrow(place: int, text: str) -> str:
     return text if place == _CODE_PLACE else float32(text)
 
 
-def narrow_soap(ask: Ask) -> None:
+def narrow_soap(request: Request) -> None:
     """The doubles of a SOAP delivery through 32-bit floats."""
-    ask.body = re.sub(
-        _DOUBLES, lambda found: found[1] + float32(found[2].decode("latin-1")).encode() + found[3], ask.body
+    request.body = re.sub(
+        _DOUBLES, lambda found: found[1] + float32(found[2].decode("latin-1")).encode() + found[3], request.body
     )
 
 
-def rounded_soap(ask: Ask) -> None:
+def rounded_soap(request: Request) -> None:
     """The doubles of a SOAP delivery cut after three digits."""
 
     def short(found: re.Match[bytes]) -> bytes:
@@ -100,34 +100,34 @@ def rounded_soap(ask: Ask) -> None:
         digits = re.fullmatch(r"([+-]?\d*\.\d{3})\d+", text)
         return found[1] + (digits[1] if digits else text).encode() + found[3]
 
-    ask.body = re.sub(_DOUBLES, short, ask.body)
+    request.body = re.sub(_DOUBLES, short, request.body)
 
 
-def swapped_soap(ask: Ask) -> None:
+def swapped_soap(request: Request) -> None:
     """Source and destination are exchanged, in their places."""
     found = {
-        name: re.search(rb"<(?:\w+:)?%s[^>]*>([^<]*)<" % name, ask.body) for name in (b"source_x", b"destination_x")
+        name: re.search(rb"<(?:\w+:)?%s[^>]*>([^<]*)<" % name, request.body) for name in (b"source_x", b"destination_x")
     }
     one, other = found[b"source_x"], found[b"destination_x"]
     if one and other:
         first, second = sorted((one, other), key=lambda match: match.start(1))
-        ask.body = (
-            ask.body[: first.start(1)]
+        request.body = (
+            request.body[: first.start(1)]
             + second[1]
-            + ask.body[first.end(1) : second.start(1)]
+            + request.body[first.end(1) : second.start(1)]
             + first[1]
-            + ask.body[second.end(1) :]
+            + request.body[second.end(1) :]
         )
 
 
-def as_delivery(ask: Ask, forward: Forward) -> Answer:
+def as_delivery(request: Request, forward: Forward) -> Response:
     """A coffee is published with the code that it came with, 3 as it happens."""
-    if not _COFFEE(ask):
-        return forward(ask)
-    body = ask.body.replace(b"ExecuteCoffeeRequest", b"ExecuteDeliveryRequest")
-    answer = forward(ask.copy(body=re.sub(rb"(message_code[^>]*>\s*)[+-]?\d+", rb"\g<1>3", body)))
-    answer.body = answer.body.replace(b"ExecuteDeliveryRequest", b"ExecuteCoffeeRequest")
-    return answer
+    if not _COFFEE(request):
+        return forward(request)
+    body = request.body.replace(b"ExecuteCoffeeRequest", b"ExecuteDeliveryRequest")
+    response = forward(request.copy(body=re.sub(rb"(message_code[^>]*>\s*)[+-]?\d+", rb"\g<1>3", body)))
+    response.body = response.body.replace(b"ExecuteDeliveryRequest", b"ExecuteCoffeeRequest")
+    return response
 
 
 def narrow_twist(twist: Any) -> None:

@@ -31,15 +31,15 @@ from conformance.selftest.mutants.distortion import (
     rounded_soap,
     swapped_soap,
 )
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.mutants.soap_services import enveloped
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
@@ -71,7 +71,7 @@ def _one_more(items: Any) -> Any:
     return [*items, {"name": "ghost", "topic": "/ghost", "type": "sensor_msgs/msg/Range"}]
 
 
-def _fault(
+def _mutant(
     name: str,
     says: str,
     ids: tuple[str, ...],
@@ -80,8 +80,8 @@ def _fault(
     *,
     observer: bool = False,
     probe: bool = False,
-) -> Fault:
-    return Fault(
+) -> Mutant:
+    return Mutant(
         name, says, tuple(f"equivalence/{id_}" for id_ in ids), interface, make, observer=observer, probe=probe
     )
 
@@ -89,8 +89,8 @@ def _fault(
 _NO_GOAL = enveloped(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
 
 
-FAULTS = (
-    _fault(
+MUTANTS = (
+    _mutant(
         "same-rest-doubled",
         "A REST delivery is published twice.",
         ("delivery-rest",),
@@ -98,7 +98,7 @@ FAULTS = (
         "rest",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-rest-lost",
         "Each third REST delivery is never published.",
         ("delivery-rest",),
@@ -106,7 +106,7 @@ FAULTS = (
         "rest",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-rest-narrow",
         "REST deliveries go through 32-bit floats.",
         ("delivery-same",),
@@ -114,7 +114,7 @@ FAULTS = (
         "rest",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-soap-doubled",
         "A SOAP delivery is published twice.",
         ("delivery-soap",),
@@ -122,7 +122,7 @@ FAULTS = (
         "soap",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-soap-swapped",
         "Over SOAP, source_x and destination_x are exchanged.",
         ("delivery-soap", "delivery-same"),
@@ -130,7 +130,7 @@ FAULTS = (
         "soap",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-soap-narrow",
         "SOAP deliveries go through 32-bit floats.",
         ("delivery-soap",),
@@ -138,7 +138,7 @@ FAULTS = (
         "soap",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-coffee-code",
         "A coffee is published with code 3.",
         ("coffee-soap",),
@@ -146,7 +146,7 @@ FAULTS = (
         "soap",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-coffee-lost",
         "Each second coffee is never published.",
         ("coffee-soap",),
@@ -154,7 +154,7 @@ FAULTS = (
         "soap",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-soap-rounded",
         "SOAP rounds to three digits, REST does not.",
         ("delivery-same",),
@@ -162,7 +162,7 @@ FAULTS = (
         "soap",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-order",
         "A REST delivery is overtaken by the one after it.",
         ("delivery-order",),
@@ -170,7 +170,7 @@ FAULTS = (
         "rest",
         observer=True,
     ),
-    _fault(
+    _mutant(
         "same-velocity-narrow",
         "Velocities go through 32-bit floats.",
         ("velocity-message",),
@@ -178,7 +178,7 @@ FAULTS = (
         "rest",
         probe=True,
     ),
-    _fault(
+    _mutant(
         "same-sensor-ghost",
         "A sensor is listed that nobody publishes.",
         ("sensors-graph",),
@@ -186,42 +186,42 @@ FAULTS = (
         "rest",
         probe=True,
     ),
-    _fault(
+    _mutant(
         "same-pose",
         "SOAP's pose is 37 cm ahead of REST's.",
         ("pose",),
         altered(soap("GetPose"), tree(_shift("position", 0.37))),
         "soap",
     ),
-    _fault(
+    _mutant(
         "same-velocity",
         "SOAP's velocity is never zero.",
         ("velocity",),
         altered(soap("GetVelocity"), tree(_shift("linear", 0.1))),
         "soap",
     ),
-    _fault(
+    _mutant(
         "same-sensors",
         "SOAP lacks the last sensor.",
         ("sensors",),
         altered(soap("GetSensors"), tree(_without_last)),
         "soap",
     ),
-    _fault(
+    _mutant(
         "same-services",
         "SOAP lacks the last service.",
         ("services",),
         altered(soap("GetNavigationServices"), tree(_without_last)),
         "soap",
     ),
-    _fault(
+    _mutant(
         "same-goal",
         "SOAP never has a goal.",
         ("goal",),
-        lambda: lambda ask, forward: _NO_GOAL(ask) if soap("GetGoal")(ask) else forward(ask),
+        lambda: lambda request, forward: _NO_GOAL(request) if soap("GetGoal")(request) else forward(request),
         "soap",
     ),
-    _fault(
+    _mutant(
         "same-plan",
         "SOAP's plan is another one than REST's.",
         ("plan",),

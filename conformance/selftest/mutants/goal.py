@@ -32,14 +32,14 @@ from conformance.selftest.mutants.goal_memory import (
     pose_of,
     position,
 )
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 
@@ -56,8 +56,8 @@ def _shift(by: float) -> Callable[[Any], None]:
     return edit
 
 
-def _without_id(ask: Ask) -> bool:
-    return _PUT(ask) and "goal" in (parsed(ask.body) or {}) and identity(ask) is None
+def _without_id(request: Request) -> bool:
+    return _PUT(request) and "goal" in (parsed(request.body) or {}) and identity(request) is None
 
 
 def _cut_id(size: int) -> Callable[[Any], None]:
@@ -67,17 +67,19 @@ def _cut_id(size: int) -> Callable[[Any], None]:
     return edit
 
 
-def _when_active(answer_: Callable[[Ask], Answer], *, same: bool, other_pose: bool | None = None) -> Callable[[], Any]:
+def _when_active(
+    answer_: Callable[[Request], Response], *, same: bool, other_pose: bool | None = None
+) -> Callable[[], Any]:
     """PUT during a goal, with the same id or another one, is answered otherwise."""
 
-    def change(ask: Ask, forward: Forward) -> Answer:
-        if _PUT(ask):
-            now, given = active(forward, ask), identity(ask)
+    def change(request: Request, forward: Forward) -> Response:
+        if _PUT(request):
+            now, given = active(forward, request), identity(request)
             if now is not None and (now["goal_id"]["id"] == given) is same:
-                moved = pose_of(now) != pose_of(parsed(ask.body))
+                moved = pose_of(now) != pose_of(parsed(request.body))
                 if other_pose is None or moved is other_pose:
-                    return answer_(ask)
-        return forward(ask)
+                    return answer_(request)
+        return forward(request)
 
     return lambda: change
 
@@ -108,98 +110,98 @@ def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
     return apply
 
 
-def _fault(name: str, says: str, catches: str | tuple[str, ...], make: Any) -> Fault:
+def _mutant(name: str, says: str, catches: str | tuple[str, ...], make: Any) -> Mutant:
     ids = (catches,) if isinstance(catches, str) else catches
-    return Fault(name, says, tuple(f"rest-resources/{id_}" for id_ in ids), "rest", make)
+    return Mutant(name, says, tuple(f"rest-resources/{id_}" for id_ in ids), "rest", make)
 
 
-def _nothing(answer: Answer, status_: int) -> None:
-    answer.status, answer.reason, answer.body = status_, "", b"null"
-    answer.put("Content-Type", "application/json")
+def _nothing(response: Response, status_: int) -> None:
+    response.status, response.reason, response.body = status_, "", b"null"
+    response.put("Content-Type", "application/json")
 
 
-def _delete_conflict(ask: Ask, forward: Forward) -> Answer:
-    if _DELETE(ask) and active(forward, ask) is None:
-        return problem(409, "there is no goal")(ask)
-    return forward(ask)
+def _delete_conflict(request: Request, forward: Forward) -> Response:
+    if _DELETE(request) and active(forward, request) is None:
+        return problem(409, "there is no goal")(request)
+    return forward(request)
 
 
-def _beside(ask: Ask, forward: Forward) -> Answer:
-    if ask.side != "rest" or ask.path != GOAL:
-        return forward(ask)
-    if _PUT(ask):
-        ask = ask.copy()
-        inputs(_guarded(_shift(0.8)))(ask)
-    answer = forward(ask)
-    if success(answer):
-        values(_guarded(_shift(-0.8)))(answer)
-    return answer
+def _beside(request: Request, forward: Forward) -> Response:
+    if request.side != "rest" or request.path != GOAL:
+        return forward(request)
+    if _PUT(request):
+        request = request.copy()
+        inputs(_guarded(_shift(0.8)))(request)
+    response = forward(request)
+    if success(response):
+        values(_guarded(_shift(-0.8)))(response)
+    return response
 
 
-FAULTS = (
-    _fault(
+MUTANTS = (
+    _mutant(
         "goal-none-empty",
         "Without a goal, GET is 200 with null.",
         "goal-none",
-        altered(_GET, lambda answer: _nothing(answer, 200), status(404)),
+        altered(_GET, lambda response: _nothing(response, 200), status(404)),
     ),
-    _fault(
+    _mutant(
         "goal-none-no-content", "Without a goal, GET is 204.", "goal-none", altered(_GET, becomes(204), status(404))
     ),
-    _fault("goal-put-ok", "PUT of a new goal is 200.", "goal-put", altered(_PUT, becomes(200), status(201, 202))),
-    _fault("goal-get-swapped", "GET gives a goal with x and y exchanged.", "goal-get", altered(_GET, values(_swap))),
-    _fault(
+    _mutant("goal-put-ok", "PUT of a new goal is 200.", "goal-put", altered(_PUT, becomes(200), status(201, 202))),
+    _mutant("goal-get-swapped", "GET gives a goal with x and y exchanged.", "goal-get", altered(_GET, values(_swap))),
+    _mutant(
         "goal-get-frame",
         "GET gives a goal in another frame.",
         "goal-get",
         altered(_GET, values(lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2"))),
     ),
-    _fault("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", remembering(Previous)),
-    _fault(
+    _mutant("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", remembering(Previous)),
+    _mutant(
         "goal-get-other-id",
         "GET gives the goal under another id.",
         "goal-get",
         altered(_GET, values(lambda goal: goal["goal_id"].update(id="goal-1"))),
     ),
-    _fault(
+    _mutant(
         "goal-without-status",
         "The active goal has no status.",
         "goal-status",
         altered(_GET, values(lambda goal: goal.pop("status") and None)),
     ),
-    _fault(
+    _mutant(
         "goal-status-succeeded",
         "The active goal has status 4, succeeded.",
         "goal-status",
         altered(_GET, values(lambda goal: goal["status"].update(code=4))),
     ),
-    _fault(
+    _mutant(
         "goal-wants-id",
         "A goal without goal_id is refused.",
         "goal-fills-in",
         instead(_without_id, problem(422, "goal_id: missing")),
     ),
-    _fault(
+    _mutant(
         "goal-empty-id",
         "A goal without goal_id gets an empty one.",
         "goal-fills-in",
         altered(
-            lambda ask: ask.side == "rest" and ask.path == GOAL,
+            lambda request: request.side == "rest" and request.path == GOAL,
             values(lambda goal: goal["goal_id"].update(id="") if len(goal["goal_id"]["id"]) >= 32 else None),
         ),
     ),
-    _fault(
+    _mutant(
         "goal-id-cut",
         "Ids are cut after 32 characters.",
         "goal-id",
-        altered(lambda ask: ask.side == "rest" and ask.path == GOAL, values(_cut_id(32))),
+        altered(lambda request: request.side == "rest" and request.path == GOAL, values(_cut_id(32))),
     ),
-    _fault(
+    _mutant(
         "goal-id-ascii",
         "Ids come back in lower case.",
         "goal-id",
         altered(
-            lambda ask: ask.side == "rest" and ask.path == GOAL,
+            lambda request: request.side == "rest" and request.path == GOAL,
             values(
                 lambda goal: goal["goal_id"].update(
                     id=goal["goal_id"]["id"].lower().encode("ascii", "replace").decode()
@@ -207,71 +209,71 @@ FAULTS = (
             ),
         ),
     ),
-    _fault(
+    _mutant(
         "goal-repeat-refused",
         "The same goal again is refused with 409.",
         "goal-repeat",
         _when_active(problem(409, "goal_id.id: there already"), same=True, other_pose=False),
     ),
-    _fault(
+    _mutant(
         "goal-repeat-created",
         "The same goal again is 201.",
         "goal-repeat",
         _when_active(plain(201), same=True, other_pose=False),
     ),
-    _fault(
+    _mutant(
         "goal-conflict-ignored",
         "The same id with another pose is answered 200.",
         "goal-conflict",
         _when_active(plain(204), same=True, other_pose=True),
     ),
-    _fault(
+    _mutant(
         "goal-first-wins",
         "Another goal is refused with 409 while one is active.",
         "goal-preempt",
         _when_active(problem(409, "a goal is active"), same=False),
     ),
-    _fault("goal-delete-ignored", "DELETE is 204 and cancels nothing.", "goal-delete", instead(_DELETE, plain(204))),
-    _fault(
+    _mutant("goal-delete-ignored", "DELETE is 204 and cancels nothing.", "goal-delete", instead(_DELETE, plain(204))),
+    _mutant(
         "goal-delete-conflict",
         "DELETE of a goal cancels it, and is 409.",
         "goal-delete",
         altered(_DELETE, becomes(409), success),
     ),
-    _fault(
+    _mutant(
         "goal-delete-none-fine",
         "DELETE without a goal is 204.",
         "goal-delete-none",
         altered(_DELETE, becomes(204), status(404)),
     ),
-    _fault(
+    _mutant(
         "goal-delete-none-conflict",
         "DELETE without a goal is 409.",
         "goal-delete-none-success",
         lambda: _delete_conflict,
     ),
-    _fault("goal-lingers", "A goal that has ended is still shown.", "goal-ended", remembering(Lingering)),
-    _fault("goal-id-only-once", "The id of a goal that has ended is refused.", "goal-id-again", remembering(OnlyOnce)),
-    _fault("goal-abandoned", "The robot gives up on its way.", "goal-drives", remembering(Abandoned)),
-    _fault(
+    _mutant("goal-lingers", "A goal that has ended is still shown.", "goal-ended", remembering(Lingering)),
+    _mutant("goal-id-only-once", "The id of a goal that has ended is refused.", "goal-id-again", remembering(OnlyOnce)),
+    _mutant("goal-abandoned", "The robot gives up on its way.", "goal-drives", remembering(Abandoned)),
+    _mutant(
         "goal-beside",
         "The robot stops 80 cm beside the goal, and shows the goal that it was given.",
         "goal-drives",
         lambda: _beside,
     ),
-    _fault(
+    _mutant(
         "goal-unreachable-forever",
         "A goal far outside the map is accepted and stays active.",
         "goal-unreachable",
         remembering(Unreachable),
     ),
-    _fault(
+    _mutant(
         "goal-frame-ignored",
         "A goal's frame is not looked at.",
         "goal-frame",
         rewritten(_PUT, inputs(_guarded(_known_frame))),
     ),
-    _fault(
+    _mutant(
         "goal-quaternion-normalised",
         "A quaternion of another length is made a unit one.",
         "goal-quaternion",

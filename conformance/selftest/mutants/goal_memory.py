@@ -8,14 +8,14 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from conformance.selftest.mutants.changes import GOAL, parsed, plain, problem, rest, success
-from conformance.selftest.wire import Answer
+from conformance.selftest.wire import Response
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Ask
+    from conformance.selftest.wire import Request
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 
@@ -25,21 +25,21 @@ def position(goal: Any) -> Any:
     return goal["goal"]["target_pose"]["pose"]["position"]
 
 
-def identity(ask: Ask) -> str | None:
+def identity(request: Request) -> str | None:
     """The id in a PUT goal."""
-    value = parsed(ask.body)
+    value = parsed(request.body)
     try:
         return str(value["goal_id"]["id"])
     except (TypeError, KeyError):
         return None
 
 
-def active(forward: Forward, ask: Ask) -> Any:
+def active(forward: Forward, request: Request) -> Any:
     """The robot's goal, or None."""
-    answer = forward(
-        ask.copy(method="GET", target=GOAL, body=b"", fields=[("Host", "robot"), ("Accept", "application/json")])
+    response = forward(
+        request.copy(method="GET", target=GOAL, body=b"", fields=[("Host", "robot"), ("Accept", "application/json")])
     )
-    return parsed(answer.body) if answer.status == 200 else None
+    return parsed(response.body) if response.status == 200 else None
 
 
 def pose_of(goal: Any) -> Any:
@@ -55,19 +55,19 @@ class Lingering:
     """GET goes on showing a goal that has ended by itself."""
 
     def __init__(self) -> None:
-        self._last: Answer | None = None
+        self._last: Response | None = None
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
-        answer = forward(ask)
-        if _DELETE(ask):
+        response = forward(request)
+        if _DELETE(request):
             self._last = None
-        if _GET(ask):
-            if answer.status == 200:
-                self._last = answer.copy()
-            elif self._last is not None and answer.status == 404:
+        if _GET(request):
+            if response.status == 200:
+                self._last = response.copy()
+            elif self._last is not None and response.status == 404:
                 return self._last.copy()
-        return answer
+        return response
 
 
 class Previous:
@@ -76,16 +76,16 @@ class Previous:
     def __init__(self) -> None:
         self._seen: list[Any] = []
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
-        answer = forward(ask)
-        value = parsed(answer.body)
-        if _GET(ask) and answer.status == 200 and isinstance(value, dict):
+        response = forward(request)
+        value = parsed(response.body)
+        if _GET(request) and response.status == 200 and isinstance(value, dict):
             if not self._seen or self._seen[-1]["goal_id"] != value["goal_id"]:
                 self._seen.append(value)
             if len(self._seen) > 1:
-                answer.body = json.dumps(self._seen[-2]).encode()
-        return answer
+                response.body = json.dumps(self._seen[-2]).encode()
+        return response
 
 
 class OnlyOnce:
@@ -94,32 +94,32 @@ class OnlyOnce:
     def __init__(self) -> None:
         self._used: set[str] = set()
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
-        id_ = identity(ask) if _PUT(ask) else None
-        if id_ is not None and id_ in self._used and active(forward, ask) is None:
-            return problem(409, f"goal_id.id: {id_!r} was used before")(ask)
-        answer = forward(ask)
-        if id_ is not None and success(answer):
+        id_ = identity(request) if _PUT(request) else None
+        if id_ is not None and id_ in self._used and active(forward, request) is None:
+            return problem(409, f"goal_id.id: {id_!r} was used before")(request)
+        response = forward(request)
+        if id_ is not None and success(response):
             self._used.add(id_)
-        return answer
+        return response
 
 
 class Abandoned:
     """The robot gives a goal up on its way."""
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
-        answer = forward(ask)
-        if _PUT(ask) and answer.status in {201, 202}:
-            later = ask.copy(method="DELETE", body=b"", fields=[("Host", "robot"), ("Connection", "close")])
+        response = forward(request)
+        if _PUT(request) and response.status in {201, 202}:
+            later = request.copy(method="DELETE", body=b"", fields=[("Host", "robot"), ("Connection", "close")])
             threading.Timer(0.4, _quietly, (forward, later)).start()
-        return answer
+        return response
 
 
-def _quietly(forward: Forward, ask: Ask) -> None:
+def _quietly(forward: Forward, request: Request) -> None:
     try:
-        forward(ask)
+        forward(request)
     except Exception:  # noqa: BLE001 - the run may be over
         return
 
@@ -130,12 +130,12 @@ class Unreachable:
     def __init__(self) -> None:
         self._goal: Any = None
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
-        if ask.path != GOAL or ask.side != "rest":
-            return forward(ask)
-        if _PUT(ask):
-            value = parsed(ask.body)
+        if request.path != GOAL or request.side != "rest":
+            return forward(request)
+        if _PUT(request):
+            value = parsed(request.body)
             pose = pose_of(value)
             far = pose is not None and max(abs(pose["position"][axis]) for axis in "xy") > 90
             self._goal = None
@@ -144,24 +144,24 @@ class Unreachable:
                 status_ = {"code": 2, "text": "on my way"}
                 self._goal = {
                     "header": header,
-                    "goal_id": {"stamp": header["stamp"], "id": identity(ask) or "far"},
+                    "goal_id": {"stamp": header["stamp"], "id": identity(request) or "far"},
                     "goal": value["goal"],
                     "status": status_,
                 }
                 value["goal"]["target_pose"]["header"].setdefault("stamp", header["stamp"])
-                return _said(202, self._goal, ask)
-        if _DELETE(ask) and self._goal is not None:
+                return _said(202, self._goal, request)
+        if _DELETE(request) and self._goal is not None:
             self._goal = None
-            return plain(204)(ask)
-        if _GET(ask) and self._goal is not None:
-            return _said(200, self._goal, ask)
-        return forward(ask)
+            return plain(204)(request)
+        if _GET(request) and self._goal is not None:
+            return _said(200, self._goal, request)
+        return forward(request)
 
 
-def _said(status_: int, value: Any, ask: Ask) -> Answer:
-    return Answer(
+def _said(status_: int, value: Any, request: Request) -> Response:
+    return Response(
         status_,
         [("Content-Type", "application/json"), ("Vary", "Accept")],
         json.dumps(value).encode(),
-        asked=ask.method,
+        method=request.method,
     )

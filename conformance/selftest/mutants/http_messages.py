@@ -20,14 +20,14 @@ from conformance.selftest.mutants.changes import (
     text,
     values,
 )
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _ANY, _GET, _POSE = rest(), rest("GET"), rest("GET", POSE)
 _INPUT = rest("PUT", *RESOURCES)
@@ -37,14 +37,14 @@ _TRACE = (
 )
 
 
-def _errors(answer: Answer) -> bool:
-    return answer.status >= 400
+def _errors(response: Response) -> bool:
+    return response.status >= 400
 
 
-def _problems(edit: Callable[[Any], Any]) -> Callable[[Answer], None]:
-    def apply(answer: Answer) -> None:
-        if answer.media_type.endswith("problem+json"):
-            values(edit)(answer)
+def _problems(edit: Callable[[Any], Any]) -> Callable[[Response], None]:
+    def apply(response: Response) -> None:
+        if response.media_type.endswith("problem+json"):
+            values(edit)(response)
 
     return apply
 
@@ -58,213 +58,215 @@ def _valueless(value: Any) -> None:
     value["detail"] = kept
 
 
-def _longer(answer: Answer) -> None:
-    wire = answer.wire()
-    answer.raw = re.sub(rb"(?i)(content-length: )(\d+)", lambda found: found[1] + str(int(found[2]) + 7).encode(), wire)
+def _longer(response: Response) -> None:
+    wire = response.wire()
+    response.raw = re.sub(
+        rb"(?i)(content-length: )(\d+)", lambda found: found[1] + str(int(found[2]) + 7).encode(), wire
+    )
 
 
-def _shorter(answer: Answer) -> None:
-    answer.raw = answer.wire() + b"left over"
+def _shorter(response: Response) -> None:
+    response.raw = response.wire() + b"left over"
 
 
-def _broken_field(answer: Answer) -> None:
-    answer.raw = answer.wire().replace(b"\r\n", b"\r\nThis is no field\r\n", 1)
+def _broken_field(response: Response) -> None:
+    response.raw = response.wire().replace(b"\r\n", b"\r\nThis is no field\r\n", 1)
 
 
-def _two_lengths(answer: Answer) -> None:
-    answer.raw = answer.wire().replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1)
+def _two_lengths(response: Response) -> None:
+    response.raw = response.wire().replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1)
 
 
-def _hosts(count: int) -> Callable[[Ask, Forward], Answer]:
+def _hosts(count: int) -> Callable[[Request, Forward], Response]:
     """Requests with this many Host fields are taken like others."""
 
-    def change(ask: Ask, forward: Forward) -> Answer:
-        if ask.raw is None and sum(name.lower() == "host" for name, _ in ask.fields) == count:
-            ask = ask.copy()
-            ask.put("Host", "robot")
-        return forward(ask)
+    def change(request: Request, forward: Forward) -> Response:
+        if request.raw is None and sum(name.lower() == "host" for name, _ in request.fields) == count:
+            request = request.copy()
+            request.put("Host", "robot")
+        return forward(request)
 
     return change
 
 
-def _first_length(ask: Ask, forward: Forward) -> Answer:
+def _first_length(request: Request, forward: Forward) -> Response:
     """Of several Content-Length fields the first one counts, for what there is."""
-    if ask.side == "rest" and ask.raw is not None and ask.raw.lower().count(b"content-length:") > 1:
-        head, _, body = ask.raw.partition(b"\r\n\r\n")
+    if request.side == "rest" and request.raw is not None and request.raw.lower().count(b"content-length:") > 1:
+        head, _, body = request.raw.partition(b"\r\n\r\n")
         line, *fields = head.split(b"\r\n")
         kept = [field for field in fields if not field.lower().startswith(b"content-length:")]
         kept += [b"Content-Length: %d" % len(body), b"Connection: close"]
-        return forward(ask.copy(raw=b"\r\n".join([line, *kept, b"", b""]) + body))
-    return forward(ask)
+        return forward(request.copy(raw=b"\r\n".join([line, *kept, b"", b""]) + body))
+    return forward(request)
 
 
-def _garbage(ask: Ask, forward: Forward) -> Answer:
+def _garbage(request: Request, forward: Forward) -> Response:
     """What is no HTTP is answered with a page."""
-    if ask.side == "rest" and ask.raw is not None:
-        return plain(200, b"<html>hello</html>", "text/html", ("Date", "Thu, 01 Jan 2026 00:00:00 GMT"))(ask)
-    return forward(ask)
+    if request.side == "rest" and request.raw is not None:
+        return plain(200, b"<html>hello</html>", "text/html", ("Date", "Thu, 01 Jan 2026 00:00:00 GMT"))(request)
+    return forward(request)
 
 
-def _big(size: int, answer: Callable[[Ask], Answer]) -> Callable[[], Any]:
-    return instead(lambda ask: ask.side == "rest" and len(ask.body) > size, answer)
+def _big(size: int, response: Callable[[Request], Response]) -> Callable[[], Any]:
+    return instead(lambda request: request.side == "rest" and len(request.body) > size, response)
 
 
-def _large_field(ask: Ask) -> bool:
-    return ask.side == "rest" and any(len(value) > 60_000 for _, value in ask.fields)
+def _large_field(request: Request) -> bool:
+    return request.side == "rest" and any(len(value) > 60_000 for _, value in request.fields)
 
 
-def _long_target(ask: Ask) -> bool:
-    return ask.side == "rest" and len(ask.target) > 8000
+def _long_target(request: Request) -> bool:
+    return request.side == "rest" and len(request.target) > 8000
 
 
-def _in_latin(answer: Answer) -> None:
-    value = parsed(answer.body)
+def _in_latin(response: Response) -> None:
+    value = parsed(response.body)
     if isinstance(value, dict) and "child_frame_id" in value:
         value["child_frame_id"] = "base_l\u00efnk"
-        answer.body = json.dumps(value, ensure_ascii=False).encode("latin-1")
+        response.body = json.dumps(value, ensure_ascii=False).encode("latin-1")
 
 
-def _token(refused: Callable[[Ask], Answer]) -> Callable[[], Any]:
+def _token(refused: Callable[[Request], Response]) -> Callable[[], Any]:
     """A robot that wants a token, and refuses in its own way where it is missing or wrong."""
 
-    def change(ask: Ask, forward: Forward) -> Answer:
-        if ask.side == "rest" and ask.raw is None and ask.field("Authorization") != "Bearer open-sesame":
-            return refused(ask)
-        return forward(ask)
+    def change(request: Request, forward: Forward) -> Response:
+        if request.side == "rest" and request.raw is None and request.field("Authorization") != "Bearer open-sesame":
+            return refused(request)
+        return forward(request)
 
     return lambda: change
 
 
-def _fault(name: str, says: str, id_: str, make: Any, token: str = "") -> Fault:
-    return Fault(name, says, (f"http/{id_}",), "rest", make, token=token)
+def _mutant(name: str, says: str, id_: str, make: Any, token: str = "") -> Mutant:
+    return Mutant(name, says, (f"http/{id_}",), "rest", make, token=token)
 
 
-def _marked(answer: Answer) -> None:
-    if answer.media_type == JSON:
-        answer.body = b"\xef\xbb\xbf" + answer.body
+def _marked(response: Response) -> None:
+    if response.media_type == JSON:
+        response.body = b"\xef\xbb\xbf" + response.body
 
 
-def _page(answer: Answer) -> None:
-    answer.body = f"<html><body>Error {answer.status}</body></html>".encode()
-    answer.put("Content-Type", "text/html")
+def _page(response: Response) -> None:
+    response.body = f"<html><body>Error {response.status}</body></html>".encode()
+    response.put("Content-Type", "text/html")
 
 
-FAULTS = (
-    _fault(
+MUTANTS = (
+    _mutant(
         "http-large-body-fine",
         "A body of more than 10 MiB is answered as if it were not there.",
         "content-too-large",
         _big(10 * 1024 * 1024, plain(204)),
     ),
-    _fault(
+    _mutant(
         "http-small-limit",
         "Bodies over 20 KiB are refused.",
         "content-too-large",
         _big(20_000, problem(413, "too large")),
     ),
-    _fault(
+    _mutant(
         "http-long-target-crash",
         "A long target is answered 500.",
         "uri-too-long",
         instead(_long_target, problem(500, "oops")),
     ),
-    _fault(
+    _mutant(
         "http-long-target-fine",
         "A long target is cut, and answered 200.",
         "uri-too-long",
         instead(_long_target, plain(200, b"{}", JSON)),
     ),
-    _fault(
+    _mutant(
         "http-large-field-crash",
         "A header field of 128 KiB is answered 500.",
         "header-too-large",
         instead(_large_field, problem(500, "oops")),
     ),
-    _fault(
+    _mutant(
         "http-length-too-long", "Content-Length promises 7 octets more than come.", "framing", altered(_GET, _longer)
     ),
-    _fault(
+    _mutant(
         "http-length-too-short",
         "After an answer come octets that Content-Length does not count.",
         "framing",
         altered(_GET, _shorter),
     ),
-    _fault("http-broken-field", "An answer has a line that is no field.", "framing", altered(_POSE, _broken_field)),
-    _fault(
+    _mutant("http-broken-field", "An answer has a line that is no field.", "framing", altered(_POSE, _broken_field)),
+    _mutant(
         "http-two-lengths",
         "An answer has two different Content-Length fields.",
         "framing",
         altered(_POSE, _two_lengths),
     ),
-    _fault("http-host-optional", "A request without Host is served.", "host-missing", lambda: _hosts(0)),
-    _fault("http-host-twice", "A request with two Host fields is served.", "host-twice", lambda: _hosts(2)),
-    _fault(
+    _mutant("http-host-optional", "A request without Host is served.", "host-missing", lambda: _hosts(0)),
+    _mutant("http-host-twice", "A request with two Host fields is served.", "host-twice", lambda: _hosts(2)),
+    _mutant(
         "http-first-length",
         "Of two Content-Length fields the first one counts.",
         "content-length-conflict",
         lambda: _first_length,
     ),
-    _fault("http-garbage-fine", "What is no HTTP is answered 200.", "malformed-request", lambda: _garbage),
-    _fault(
+    _mutant("http-garbage-fine", "What is no HTTP is answered 200.", "malformed-request", lambda: _garbage),
+    _mutant(
         "http-problem-as-json",
         "Problems come as application/json.",
         "problem-type",
         altered(_ANY, header("Content-Type", JSON), _errors),
     ),
-    _fault("http-problem-as-page", "Errors come as a page.", "problem-type", altered(_ANY, _page, _errors)),
-    _fault(
+    _mutant("http-problem-as-page", "Errors come as a page.", "problem-type", altered(_ANY, _page, _errors)),
+    _mutant(
         "http-problem-other-status",
         "A problem's status is always 400.",
         "problem-status",
         altered(_ANY, _problems(lambda value: value.update(status=400 if value["status"] != 400 else 422)), _errors),
     ),
-    _fault(
+    _mutant(
         "http-problem-vague",
         "A problem's detail is always 'invalid input'.",
         "problem-detail",
         altered(_INPUT, _problems(lambda value: value.update(detail="invalid input")), _errors),
     ),
-    _fault(
+    _mutant(
         "http-problem-mute",
         "Problems have no detail.",
         "problem-detail",
         altered(_ANY, _problems(lambda value: value.pop("detail", None) and None), _errors),
     ),
-    _fault(
+    _mutant(
         "http-problem-valueless",
         "A problem names the field, but never the value.",
         "problem-value",
         altered(_INPUT, _problems(_valueless), _errors),
     ),
-    _fault(
+    _mutant(
         "http-traceback",
         "A problem's detail is a traceback.",
         "no-traceback",
         altered(_INPUT, _problems(lambda value: value.update(detail=value["detail"] + "\n" + _TRACE)), _errors),
     ),
-    _fault("http-nan", "JSON holds NaN.", "json-finite", altered(_POSE, text(r'("y"\s*:\s*)[-+.\deE]+', r"\1NaN", 1))),
-    _fault(
+    _mutant("http-nan", "JSON holds NaN.", "json-finite", altered(_POSE, text(r'("y"\s*:\s*)[-+.\deE]+', r"\1NaN", 1))),
+    _mutant(
         "http-infinity-sometimes",
         "One pose in 50 holds Infinity.",
         "json-finite",
         altered(_POSE, text(r'("z"\s*:\s*)[-+.\deE]+', r"\1-Infinity", 1), nth=50),
     ),
-    _fault("http-byte-order-mark", "JSON begins with a byte order mark.", "json-encoding", altered(_GET, _marked)),
-    _fault("http-latin", "JSON is ISO 8859-1.", "json-encoding", altered(_POSE, _in_latin)),
-    _fault(
+    _mutant("http-byte-order-mark", "JSON begins with a byte order mark.", "json-encoding", altered(_GET, _marked)),
+    _mutant("http-latin", "JSON is ISO 8859-1.", "json-encoding", altered(_POSE, _in_latin)),
+    _mutant(
         "http-name-twice",
         "A name is there twice in one object.",
         "json-unique-names",
         altered(_POSE, text(r'"child_frame_id"', '"child_frame_id": "base", "child_frame_id"', 1)),
     ),
-    _fault(
+    _mutant(
         "http-token-forbidden",
         "Without the token, the answer is 403.",
         "authentication",
         _token(problem(403, "no token")),
         "open-sesame",
     ),
-    _fault(
+    _mutant(
         "http-token-unnamed",
         "Without the token, the answer is 401 without WWW-Authenticate.",
         "authentication",

@@ -25,14 +25,14 @@ from conformance.selftest.mutants.changes import (
     success,
 )
 from conformance.selftest.mutants.delivery import any_code, finite, lenient, segments
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
@@ -43,21 +43,21 @@ _TIME = {"sec": 0, "nanosec": 0}
 _OPTIONAL = {"header": {"stamp": _TIME, "frame_id": ""}, "goal_id": {"stamp": _TIME, "id": "x"}, "stamp": _TIME}
 
 
-def _pattern(ask: Ask) -> Any:
-    return _VECTORS.get(ask.path, _GOAL)
+def _pattern(request: Request) -> Any:
+    return _VECTORS.get(request.path, _GOAL)
 
 
-def _is_json(ask: Ask) -> bool:
-    return _PUT(ask) and ask.media_type == "application/json"
+def _is_json(request: Request) -> bool:
+    return _PUT(request) and request.media_type == "application/json"
 
 
 def _repairing(repair: Callable[[Any, Any], Any]) -> Callable[[], Any]:
     """JSON that is well-formed is made to fit by ``repair(value, pattern)``."""
 
-    def edit(ask: Ask) -> None:
-        value = parsed(ask.body)
+    def edit(request: Request) -> None:
+        value = parsed(request.body)
         if isinstance(value, dict):
-            ask.body = json.dumps(repair(value, _pattern(ask))).encode()
+            request.body = json.dumps(repair(value, _pattern(request))).encode()
 
     return rewritten(_is_json, edit)
 
@@ -114,64 +114,68 @@ def _bounded(value: Any, pattern: Any) -> Any:
     return value
 
 
-def _swallowed(where: Callable[[Ask], bool]) -> Callable[[], Any]:
+def _swallowed(where: Callable[[Request], bool]) -> Callable[[], Any]:
     """What is refused there is answered as if it were fine."""
 
-    def change(ask: Ask, forward: Forward) -> Answer:
-        answer = forward(ask)
-        return plain(204)(ask) if where(ask) and not success(answer) and answer.status != 409 else answer
+    def change(request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        return plain(204)(request) if where(request) and not success(response) and response.status != 409 else response
 
     return lambda: change
 
 
-def _malformed(ask: Ask) -> bool:
+def _malformed(request: Request) -> bool:
     return (
-        _is_json(ask) and bool(ask.body) and parsed(ask.body) is None and ask.body.strip() != b"null" and not _deep(ask)
+        _is_json(request)
+        and bool(request.body)
+        and parsed(request.body) is None
+        and request.body.strip() != b"null"
+        and not _deep(request)
     )
 
 
-def _deep(ask: Ask) -> bool:
-    return _is_json(ask) and (ask.body.count(b"[") > 1000 or ask.body.count(b"{") > 1000)
+def _deep(request: Request) -> bool:
+    return _is_json(request) and (request.body.count(b"[") > 1000 or request.body.count(b"{") > 1000)
 
 
-def _huge(ask: Ask) -> bool:
-    return _is_json(ask) and bool(re.search(rb"\d{1000}", ask.body))
+def _huge(request: Request) -> bool:
+    return _is_json(request) and bool(re.search(rb"\d{1000}", request.body))
 
 
-def _other_encoding(ask: Ask) -> bool:
-    if not _is_json(ask):
+def _other_encoding(request: Request) -> bool:
+    if not _is_json(request):
         return False
     try:
-        ask.body.decode("utf-8")
+        request.body.decode("utf-8")
     except UnicodeDecodeError:
         return True
-    return ask.body.startswith(b"\xef\xbb\xbf") or b"\x00" in ask.body
+    return request.body.startswith(b"\xef\xbb\xbf") or b"\x00" in request.body
 
 
-def _no_object(ask: Ask) -> bool:
+def _no_object(request: Request) -> bool:
     return (
-        _is_json(ask)
-        and not isinstance(parsed(ask.body), dict)
-        and bool(ask.body)
-        and (parsed(ask.body) is not None or ask.body.strip() == b"null")
+        _is_json(request)
+        and not isinstance(parsed(request.body), dict)
+        and bool(request.body)
+        and (parsed(request.body) is not None or request.body.strip() == b"null")
     )
 
 
-def _twice(ask: Ask) -> None:
-    value = parsed(ask.body)
+def _twice(request: Request) -> None:
+    value = parsed(request.body)
     if isinstance(value, dict):
-        ask.body = json.dumps(value).encode()
+        request.body = json.dumps(value).encode()
 
 
-def _xml(ask: Ask) -> bool:
-    return _PUT(ask) and ask.media_type.endswith("xml")
+def _xml(request: Request) -> bool:
+    return _PUT(request) and request.media_type.endswith("xml")
 
 
-def _query(edit: Callable[[dict[str, str]], None]) -> Callable[[Ask], None]:
-    def apply(ask: Ask) -> None:
-        given = dict(parse_qsl(ask.query, keep_blank_values=True))
+def _query(edit: Callable[[dict[str, str]], None]) -> Callable[[Request], None]:
+    def apply(request: Request) -> None:
+        given = dict(parse_qsl(request.query, keep_blank_values=True))
         edit(given)
-        ask.target = f"{ask.path}?{urlencode(given)}"
+        request.target = f"{request.path}?{urlencode(given)}"
 
     return apply
 
@@ -188,88 +192,88 @@ class _Remembered:
     def __init__(self) -> None:
         self._last = {"x": "0", "y": "0"}
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
-        if not rest("GET", PLAN)(ask):
-            return forward(ask)
-        ask = ask.copy()
+        if not rest("GET", PLAN)(request):
+            return forward(request)
+        request = request.copy()
         _query(lambda given: given.update({name: value for name, value in self._last.items() if name not in given}))(
-            ask
+            request
         )
-        answer = forward(ask)
-        if success(answer):
-            self._last = {name: text for name, text in parse_qsl(ask.query) if name in self._last}
-        return answer
+        response = forward(request)
+        if success(response):
+            self._last = {name: text for name, text in parse_qsl(request.query) if name in self._last}
+        return response
 
 
-def _path(ask: Ask) -> None:
+def _path(request: Request) -> None:
     for edit in (lenient, finite, any_code):
-        segments(edit)(ask)
+        segments(edit)(request)
 
 
-def _fault(name: str, says: str, id_: str, make: Any) -> Fault:
-    return Fault(name, says, (f"strict-input/{id_}",), "rest", make)
+def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
+    return Mutant(name, says, (f"strict-input/{id_}",), "rest", make)
 
 
-FAULTS = (
-    _fault("input-malformed-fine", "JSON that is none is answered 204.", "json-malformed", _swallowed(_malformed)),
-    _fault("input-missing-is-zero", "A missing field counts as zero.", "json-missing", _repairing(_filled)),
-    _fault("input-unknown-ignored", "Unknown fields are ignored.", "json-unknown", _repairing(_known)),
-    _fault(
+MUTANTS = (
+    _mutant("input-malformed-fine", "JSON that is none is answered 204.", "json-malformed", _swallowed(_malformed)),
+    _mutant("input-missing-is-zero", "A missing field counts as zero.", "json-missing", _repairing(_filled)),
+    _mutant("input-unknown-ignored", "Unknown fields are ignored.", "json-unknown", _repairing(_known)),
+    _mutant(
         "input-last-wins",
         "Of a name that is there twice, the last one counts.",
         "json-duplicate",
         rewritten(_is_json, _twice),
     ),
-    _fault("input-coerced", "Strings, null and booleans count as numbers.", "json-type", _repairing(_typed)),
-    _fault("input-nan-is-zero", "NaN and what overflows count as zero.", "json-non-finite", _repairing(_finite)),
-    _fault("input-any-root", "A body that is no object is answered 204.", "json-root", _swallowed(_no_object)),
-    _fault("input-deep-fine", "JSON nested deep is answered 204.", "json-depth", _swallowed(_deep)),
-    _fault(
+    _mutant("input-coerced", "Strings, null and booleans count as numbers.", "json-type", _repairing(_typed)),
+    _mutant("input-nan-is-zero", "NaN and what overflows count as zero.", "json-non-finite", _repairing(_finite)),
+    _mutant("input-any-root", "A body that is no object is answered 204.", "json-root", _swallowed(_no_object)),
+    _mutant("input-deep-fine", "JSON nested deep is answered 204.", "json-depth", _swallowed(_deep)),
+    _mutant(
         "input-huge-fine", "An integer of thousands of digits is answered 204.", "json-huge-number", _swallowed(_huge)
     ),
-    _fault(
+    _mutant(
         "input-any-encoding", "A body that is not UTF-8 is answered 204.", "json-encoding", _swallowed(_other_encoding)
     ),
-    _fault(
+    _mutant(
         "input-empty-fine",
         "An empty body is answered 204.",
         "json-empty",
-        _swallowed(lambda ask: _is_json(ask) and not ask.body.strip()),
+        _swallowed(lambda request: _is_json(request) and not request.body.strip()),
     ),
-    _fault("input-bounds-cut", "Values beyond their bounds are cut to them.", "json-bounds", _repairing(_bounded)),
-    _fault(
+    _mutant("input-bounds-cut", "Values beyond their bounds are cut to them.", "json-bounds", _repairing(_bounded)),
+    _mutant(
         "input-path-lenient",
         "Whatever stands in a path counts as a number.",
         "path-parameter",
         rewritten(deliveries, _path),
     ),
-    _fault(
+    _mutant(
         "input-query-lenient",
         "What is no number in a query counts as 0.",
         "query-parameter",
         rewritten(rest("GET", PLAN), _query(_numbers)),
     ),
-    _fault(
+    _mutant(
         "input-query-complete",
         "A missing x or y is the one of the query before.",
         "query-missing",
         _Remembered,
     ),
-    _fault("input-xml-fine", "XML of the wrong shape is answered 204.", "xml-body", _swallowed(_xml)),
-    _fault(
+    _mutant("input-xml-fine", "XML of the wrong shape is answered 204.", "xml-body", _swallowed(_xml)),
+    _mutant(
         "input-malformed-422",
         "JSON that is none is 422.",
         "status-malformed",
         altered(_is_json, becomes(422), status(400)),
     ),
-    _fault(
+    _mutant(
         "input-invalid-400",
         "JSON of the wrong shape is 400.",
         "status-invalid",
         altered(_is_json, becomes(400), status(422)),
     ),
-    _fault(
+    _mutant(
         "input-crash-sometimes",
         "One refused body in 20 is answered 500.",
         "json-type",

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 from lxml import etree
 
 from conformance.selftest.mutants.changes import SOAP, TNS, altered, named, rewritten, soap, xml
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.mutants.soap_profile import is_fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 _ANY = soap()
@@ -24,11 +24,11 @@ _DOUBLE = re.compile(r"\s*([+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?INF|NaN)
 _INT = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
 
 
-def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Ask], None]:
+def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Request], None]:
     """``edit`` gets the Body and the deliveryRequestMessage (or None)."""
 
-    def apply(ask: Ask) -> None:
-        root = xml(ask.body)
+    def apply(request: Request) -> None:
+        root = xml(request.body)
         body = root.find(f"{{{SOAP}}}Body") if root is not None else None
         if body is None:
             return
@@ -36,7 +36,7 @@ def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Ask], None]:
         before = etree.tostring(root)
         edit(body, message)
         if etree.tostring(root) != before:
-            ask.body = etree.tostring(root)
+            request.body = etree.tostring(root)
 
     return apply
 
@@ -144,54 +144,54 @@ def _coded(_body: Any, message: Any) -> None:
             child.text = "3"
 
 
-def _quietly(answer: Answer) -> None:
-    answer.status, answer.reason = 200, ""
+def _quietly(response: Response) -> None:
+    response.status, response.reason = 200, ""
 
 
-def _bare(answer: Answer) -> None:
-    answer.status, answer.reason, answer.body = 500, "", b"refused"
-    answer.put("Content-Type", "text/plain")
+def _bare(response: Response) -> None:
+    response.status, response.reason, response.body = 500, "", b"refused"
+    response.put("Content-Type", "text/plain")
 
 
-def _fault(name: str, says: str, id_: str, edit: Callable[[Any, Any], None]) -> Fault:
+def _mutant(name: str, says: str, id_: str, edit: Callable[[Any, Any], None]) -> Mutant:
     where = soap("Execute[A-Z][A-Za-z]+", "Body")
-    return Fault(name, says, (f"strict-input/{id_}",), "soap", rewritten(where, _repaired(edit)))
+    return Mutant(name, says, (f"strict-input/{id_}",), "soap", rewritten(where, _repaired(edit)))
 
 
-FAULTS = (
-    _fault(
+MUTANTS = (
+    _mutant(
         "input-soap-missing-is-zero", "A missing element counts as zero, as JAX-WS RI has it.", "soap-missing", _filled
     ),
-    _fault("input-soap-unknown-ignored", "Unknown elements are ignored, as JAX-WS RI has it.", "soap-unknown", _known),
-    _fault(
+    _mutant("input-soap-unknown-ignored", "Unknown elements are ignored, as JAX-WS RI has it.", "soap-unknown", _known),
+    _mutant(
         "input-soap-first-wins", "Of an element that is there twice, the first one counts.", "soap-duplicate", _once
     ),
-    _fault("input-soap-any-order", "Elements may come in any order.", "soap-order", _ordered),
-    _fault("input-soap-any-namespace", "Namespaces are not looked at.", "soap-namespace", _renamed),
-    _fault(
+    _mutant("input-soap-any-order", "Elements may come in any order.", "soap-order", _ordered),
+    _mutant("input-soap-any-namespace", "Namespaces are not looked at.", "soap-namespace", _renamed),
+    _mutant(
         "input-soap-text-is-zero",
         "Text in place of a number counts as zero, as JAX-WS RI has it.",
         "soap-lexical",
         _lexical,
     ),
-    _fault("input-soap-overflow", "An integer beyond its type is cut.", "soap-range", _wrapped),
-    _fault("input-soap-inf-is-zero", "INF and NaN count as zero.", "soap-non-finite", _finite),
-    _fault("input-soap-nil-is-zero", "What is nil counts as zero.", "soap-nil", _not_nil),
-    _fault(
+    _mutant("input-soap-overflow", "An integer beyond its type is cut.", "soap-range", _wrapped),
+    _mutant("input-soap-inf-is-zero", "INF and NaN count as zero.", "soap-non-finite", _finite),
+    _mutant("input-soap-nil-is-zero", "What is nil counts as zero.", "soap-nil", _not_nil),
+    _mutant(
         "input-soap-first-child",
         "Of Body's children the first one counts, and an empty Body is a coffee.",
         "soap-body",
         _alone,
     ),
-    _fault("input-soap-any-code", "Every code counts as 3.", "soap-code", _coded),
-    Fault(
+    _mutant("input-soap-any-code", "Every code counts as 3.", "soap-code", _coded),
+    Mutant(
         "input-soap-fault-200",
         "What is refused over SOAP is refused with status 200.",
         ("strict-input/soap-fault",),
         "soap",
         altered(_ANY, _quietly, is_fault),
     ),
-    Fault(
+    Mutant(
         "input-soap-no-fault",
         "What is refused over SOAP is 500 without a fault.",
         ("strict-input/soap-fault",),

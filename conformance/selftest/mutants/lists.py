@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from conformance.selftest.mutants.changes import SENSORS, SERVICES, altered, rest, values
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 
 
 def _first(edit: Any) -> Any:
@@ -16,31 +16,31 @@ def _first(edit: Any) -> Any:
     return values(apply)
 
 
-def _both(name: str, path: str, requirement: str) -> tuple[Fault, ...]:
+def _both(name: str, path: str, requirement: str) -> tuple[Mutant, ...]:
     at = rest("GET", path)
     return (
-        Fault(
+        Mutant(
             f"{name}-without-type",
             f"An entry of the {name} has no type.",
             (f"rest-resources/{requirement}-type",),
             "rest",
             altered(at, _first(lambda item: item.pop("type"))),
         ),
-        Fault(
+        Mutant(
             f"{name}-in-an-object",
             f"The {name} are an object with a list in it.",
             (f"rest-resources/{requirement}-type",),
             "rest",
             altered(at, values(lambda items: {"items": items})),
         ),
-        Fault(
+        Mutant(
             f"{name}-twice",
             f"The first of the {name} is listed twice.",
             (f"rest-resources/{requirement}-unique",),
             "rest",
             altered(at, values(lambda items: [*items, *items[:1]])),
         ),
-        Fault(
+        Mutant(
             f"{name}-short-names",
             f"Types of the {name} are not named in full.",
             (f"rest-resources/{requirement}-named-in-full",),
@@ -54,7 +54,7 @@ def _both(name: str, path: str, requirement: str) -> tuple[Fault, ...]:
                 ),
             ),
         ),
-        Fault(
+        Mutant(
             f"{name}-flicker",
             f"Every other time the last of the {name} is missing.",
             (f"rest-resources/{requirement}-stable",),
@@ -64,4 +64,4 @@ def _both(name: str, path: str, requirement: str) -> tuple[Fault, ...]:
     )
 
 
-FAULTS = (*_both("sensors", SENSORS, "sensors"), *_both("services", SERVICES, "services"))
+MUTANTS = (*_both("sensors", SENSORS, "sensors"), *_both("services", SERVICES, "services"))

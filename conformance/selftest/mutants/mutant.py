@@ -1,4 +1,4 @@
-"""What a faulty robot is: one change between a client and a good robot, and what must notice it."""
+"""What a mutant is: one change between a client and a good robot, and what must notice it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.proxy import Change, Torn
+    from conformance.selftest.proxy import Change, IncompleteRequest
 
 
 @dataclass(frozen=True)
-class Fault:
-    """A faulty robot.
+class Mutant:
+    """A mutant.
 
     Attributes:
         name: its name, unique.
@@ -21,7 +21,7 @@ class Fault:
         catches: ids of the requirements each of which must say fail (MUST) or warn (SHOULD).
         interface: "rest", "soap" or "both".
         make: makes the change for one run.
-        torn: makes what is done with requests that are never completed, or None.
+        incomplete_request: makes what is done with requests that are never completed, or None.
         probe: whether only a ROS probe can see it.
         observer: whether only a ROS probe or the robot's list of deliveries can see it.
         token: bearer token that the robot wants, or empty.
@@ -33,7 +33,7 @@ class Fault:
     catches: tuple[str, ...]
     interface: str
     make: Callable[[], Change]
-    torn: Callable[[], Torn] | None = None
+    incomplete_request: Callable[[], IncompleteRequest] | None = None
     probe: bool = False
     observer: bool = False
     token: str = ""

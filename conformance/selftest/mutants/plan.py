@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlencode
 
 from conformance.selftest.mutants.changes import PLAN, altered, becomes, rest, rewritten, status, values
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
 _GET = rest("GET", PLAN)
 
 
-def _poses(edit: Callable[[list[Any]], list[Any]]) -> Callable[[Answer], object]:
+def _poses(edit: Callable[[list[Any]], list[Any]]) -> Callable[[Response], object]:
     def apply(value: Any) -> None:
         value["plan"]["poses"] = edit(value["plan"]["poses"])
 
@@ -42,11 +42,11 @@ def _turned(poses: list[Any]) -> list[Any]:
     return poses
 
 
-def _ask(edit: Callable[[dict[str, str]], None]) -> Callable[[Ask], None]:
-    def apply(ask: Ask) -> None:
-        given = dict(parse_qsl(ask.query, keep_blank_values=True))
+def _ask(edit: Callable[[dict[str, str]], None]) -> Callable[[Request], None]:
+    def apply(request: Request) -> None:
+        given = dict(parse_qsl(request.query, keep_blank_values=True))
         edit(given)
-        ask.target = f"{ask.path}?{urlencode(given)}"
+        request.target = f"{request.path}?{urlencode(given)}"
 
     return apply
 
@@ -60,10 +60,10 @@ def _quarter(given: dict[str, str]) -> None:
     given.setdefault("yaw", "1.5707963")
 
 
-def _emptied(answer: Answer) -> None:
-    answer.status, answer.reason = 200, ""
-    answer.body = b'{"plan":{"header":{"stamp":{"sec":1,"nanosec":0},"frame_id":"map"},"poses":[]}}'
-    answer.put("Content-Type", "application/json")
+def _emptied(response: Response) -> None:
+    response.status, response.reason = 200, ""
+    response.body = b'{"plan":{"header":{"stamp":{"sec":1,"nanosec":0},"frame_id":"map"},"poses":[]}}'
+    response.put("Content-Type", "application/json")
 
 
 def _frame(value: Any) -> None:
@@ -71,81 +71,81 @@ def _frame(value: Any) -> None:
         pose["header"]["frame_id"] = "base_link"
 
 
-def _fault(name: str, says: str, id_: str, make: Any) -> Fault:
-    return Fault(name, says, (f"rest-resources/{id_}",), "rest", make)
+def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
+    return Mutant(name, says, (f"rest-resources/{id_}",), "rest", make)
 
 
-FAULTS = (
-    _fault(
+MUTANTS = (
+    _mutant(
         "plan-without-stamps",
         "Poses of a plan have no header.",
         "plan-type",
         altered(_GET, _poses(lambda poses: [{"pose": one["pose"]} for one in poses])),
     ),
-    _fault(
+    _mutant(
         "plan-bare",
         "The answer is the path, not a response that holds it.",
         "plan-type",
         altered(_GET, values(lambda value: value["plan"])),
     ),
-    _fault(
+    _mutant(
         "plan-from-elsewhere",
         "A plan begins 60 cm beside the robot.",
         "plan-start",
         altered(_GET, _poses(lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])),
     ),
-    _fault(
+    _mutant(
         "plan-ignores-start", "A given start is not looked at.", "plan-given-start", rewritten(_GET, _ask(_no_start))
     ),
-    _fault(
+    _mutant(
         "plan-falls-short",
         "A plan ends 50 cm before the pose that was asked for.",
         "plan-end",
         altered(_GET, _poses(lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])),
     ),
-    _fault(
+    _mutant(
         "plan-heading-ignored",
         "A plan ends with a heading that is one radian off.",
         "plan-yaw",
         altered(_GET, _poses(_turned)),
     ),
-    _fault(
+    _mutant(
         "plan-jumps",
         "In the middle of a plan there is a leap of 35 m.",
         "plan-continuous",
         altered(_GET, _poses(_detour)),
     ),
-    _fault(
+    _mutant(
         "plan-jumps-sometimes",
         "One plan in 50 has a leap in it.",
         "plan-continuous",
         altered(_GET, _poses(_detour), nth=50),
     ),
-    _fault(
+    _mutant(
         "plan-mixed-frames",
         "Only the first pose is in the frame of the path.",
         "plan-frame",
         altered(_GET, values(_frame)),
     ),
-    _fault(
+    _mutant(
         "plan-frameless",
         "The path's header has no frame.",
         "plan-frame",
         altered(_GET, values(lambda value: value["plan"]["header"].update(frame_id=""))),
     ),
-    _fault(
+    _mutant(
         "plan-other-defaults",
         "A yaw that is left out counts as a quarter turn.",
         "plan-defaults",
         rewritten(_GET, _ask(_quarter)),
     ),
-    _fault(
+    _mutant(
         "plan-none-empty",
         "Where there is no plan, an empty one is sent.",
         "plan-none",
         altered(_GET, _emptied, status(404, 422)),
     ),
-    _fault(
+    _mutant(
         "plan-none-crash",
         "Where there is no plan, the answer is 500.",
         "plan-none",

@@ -17,13 +17,13 @@ from conformance.selftest.mutants.changes import (
     rest,
     values,
 )
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from conformance.selftest.proxy import Change
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
 _AT = rest("GET", POSE)
 
@@ -71,13 +71,13 @@ class _Frozen:
         self._parts = parts
         self._first: Any = None
 
-    def __call__(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
-        answer = forward(ask)
-        value = parsed(answer.body) if _AT(ask) and answer.status == 200 else None
+    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+        response = forward(request)
+        value = parsed(response.body) if _AT(request) and response.status == 200 else None
         if isinstance(value, dict):
             self._first = self._first or copy.deepcopy(value)
-            values(lambda now: now.update({part: self._first[part] for part in self._parts}))(answer)
-        return answer
+            values(lambda now: now.update({part: self._first[part] for part in self._parts}))(response)
+        return response
 
 
 class _Backwards:
@@ -86,13 +86,13 @@ class _Backwards:
     def __init__(self) -> None:
         self._count = 0
 
-    def __call__(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
-        answer = forward(ask)
-        if _AT(ask) and answer.status == 200:
+    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+        response = forward(request)
+        if _AT(request) and response.status == 200:
             self._count += 1
             if self._count % 5 == 0:
-                values(_earlier)(answer)
-        return answer
+                values(_earlier)(response)
+        return response
 
 
 def _earlier(odometry: Any) -> None:
@@ -105,11 +105,11 @@ class _NotYet:
     def __init__(self) -> None:
         self._left = 10
 
-    def __call__(self, ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
-        if _AT(ask) and self._left:
+    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+        if _AT(request) and self._left:
             self._left -= 1
-            return problem(503, "no odometry yet")(ask)
-        return forward(ask)
+            return problem(503, "no odometry yet")(request)
+        return forward(request)
 
 
 def _renewed() -> Change:
@@ -117,113 +117,113 @@ def _renewed() -> Change:
     return _Frozen("pose", "twist")
 
 
-FAULTS = (
-    Fault(
+MUTANTS = (
+    Mutant(
         "pose-short-covariance",
         "The pose's covariance has 35 values.",
         ("rest-resources/pose-type",),
         "rest",
         altered(_AT, values(lambda value: value["pose"].update(covariance=value["pose"]["covariance"][:35]))),
     ),
-    Fault(
+    Mutant(
         "pose-without-child-frame",
         "The pose lacks child_frame_id.",
         ("rest-resources/pose-type",),
         "rest",
         altered(_AT, values(lambda value: value.pop("child_frame_id") and None)),
     ),
-    Fault(
+    Mutant(
         "pose-numbers-as-text",
         "One pose in 50 has its x as a string.",
         ("rest-resources/pose-type",),
         "rest",
         altered(_AT, values(lambda value: _position(value).update(x=str(_position(value)["x"]))), nth=50),
     ),
-    Fault(
+    Mutant(
         "pose-without-retry-after",
         "Before the first odometry, the pose is 503 without Retry-After.",
         ("rest-resources/pose-unavailable",),
         "rest",
         remembering(_NotYet),
     ),
-    Fault(
+    Mutant(
         "pose-quaternion-long",
         "The orientation's quaternion is 1 percent too long.",
         ("rest-resources/pose-quaternion",),
         "rest",
         altered(_AT, values(_lengthened)),
     ),
-    Fault(
+    Mutant(
         "pose-quaternion-zero",
         "The orientation is four zeros.",
         ("rest-resources/pose-quaternion",),
         "rest",
         altered(_AT, values(lambda value: value["pose"]["pose"].update(orientation=dict.fromkeys("xyzw", 0.0)))),
     ),
-    Fault(
+    Mutant(
         "pose-stamp-frozen",
         "The pose's header is for ever the first one's.",
         ("rest-resources/pose-stamp",),
         "rest",
         remembering(lambda: _Frozen("header")),
     ),
-    Fault(
+    Mutant(
         "pose-stamp-backwards",
         "Each fifth pose has a stamp a second back.",
         ("rest-resources/pose-stamp",),
         "rest",
         remembering(_Backwards),
     ),
-    Fault(
+    Mutant(
         "pose-stale",
         "The pose is for ever the first one, with a new stamp.",
         ("rest-resources/pose-motion", "rest-resources/pose-rotation"),
         "rest",
         remembering(_renewed),
     ),
-    Fault(
+    Mutant(
         "pose-in-centimetres",
         "The position is in centimetres.",
         ("rest-resources/pose-motion",),
         "rest",
         altered(_AT, values(_scaled(100))),
     ),
-    Fault(
+    Mutant(
         "pose-mirrored",
         "The position's x and y are swapped.",
         ("rest-resources/pose-motion",),
         "rest",
         altered(_AT, values(_swapped)),
     ),
-    Fault(
+    Mutant(
         "pose-clockwise",
         "The heading counts clockwise.",
         ("rest-resources/pose-rotation",),
         "rest",
         altered(_AT, values(_turned(lambda yaw: -yaw))),
     ),
-    Fault(
+    Mutant(
         "pose-half-turn",
         "The heading turns at half the rate.",
         ("rest-resources/pose-rotation",),
         "rest",
         altered(_AT, values(_turned(lambda yaw: yaw / 2))),
     ),
-    Fault(
+    Mutant(
         "odometry-in-degrees",
         "The odometry's turning rate is in degrees per second.",
         ("rest-resources/velocity-odometry",),
         "rest",
         altered(_AT, values(_in_degrees)),
     ),
-    Fault(
+    Mutant(
         "pose-gone",
         "There is no pose: 404.",
         ("rest-resources/pose-type",),
         "rest",
         instead(_AT, problem(404, "there is no pose")),
     ),
-    Fault(
+    Mutant(
         "pose-no-content",
         "The pose is 204.",
         ("rest-resources/pose-type",),

@@ -5,44 +5,44 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from conformance.selftest.mutants.changes import instead, plain
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.proxy import HangUpError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from conformance.selftest.proxy import Change
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
 _REST_CLASSES = ("rest-resources", "rest-delivery", "http", "safety", "equivalence", "strict-input")
 _LOST = plain(404, b"<html><body>It works!</body></html>", "text/html")
 
 
 def _hung_up() -> Change:
-    def change(ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
-        if ask.side == "rest":
+    def change(request: Request, forward: Callable[[Request], Response]) -> Response:
+        if request.side == "rest":
             raise HangUpError
-        return forward(ask)
+        return forward(request)
 
     return change
 
 
-def _service(name: str) -> Callable[[Ask], bool]:
-    return lambda ask: ask.side == "soap" and name in ask.path
+def _service(name: str) -> Callable[[Request], bool]:
+    return lambda request: request.side == "soap" and name in request.path
 
 
 def _nothing_there() -> Change:
-    def change(ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:  # noqa: ARG001 - a change has a way forward
-        if ask.side == "rest":
+    def change(request: Request, forward: Callable[[Request], Response]) -> Response:  # noqa: ARG001 - a change has a way forward
+        if request.side == "rest":
             raise HangUpError
-        return _LOST(ask)
+        return _LOST(request)
 
     return change
 
 
-FAULTS = (
+MUTANTS = (
     *(
-        Fault(
+        Mutant(
             f"rest-silent-{name}",
             f"REST closes every connection without an answer (seen by class {name}).",
             (f"{name}/reachable",),
@@ -51,28 +51,28 @@ FAULTS = (
         )
         for name in _REST_CLASSES
     ),
-    Fault(
+    Mutant(
         "publishers-elsewhere",
         "Nothing is at the address of the publishers service but somebody else's web server.",
         ("soap-delivery/reachable", "equivalence/reachable"),
         "soap",
         instead(_service("publisher"), _LOST),
     ),
-    Fault(
+    Mutant(
         "subscribers-elsewhere",
         "Nothing is at the address of the subscribers service but somebody else's web server.",
         ("soap-subscribers/reachable", "strict-input/reachable"),
         "soap",
         instead(_service("subscriber"), _LOST),
     ),
-    Fault(
+    Mutant(
         "soap-elsewhere",
         "No SOAP service is where it should be.",
         ("soap-basic-profile/reachable",),
         "soap",
         instead(_service(""), _LOST),
     ),
-    Fault(
+    Mutant(
         "nothing-elsewhere",
         "REST hangs up, and SOAP is somebody else's web server.",
         ("xml-security/reachable",),

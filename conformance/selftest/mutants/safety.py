@@ -21,15 +21,15 @@ from conformance.selftest.mutants.changes import (
 )
 from conformance.selftest.mutants.goal_memory import active
 from conformance.selftest.mutants.input_effects import drive, goal_ahead, sent
-from conformance.selftest.mutants.mutant import Fault
-from conformance.selftest.wire import Ask
+from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.wire import Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer
+    from conformance.selftest.wire import Response
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _PUT = rest("PUT", VELOCITY)
 _PUTS = rest("PUT", VELOCITY, LINEAR)
@@ -38,9 +38,9 @@ _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 _AXES = (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y"))
 
 
-def moving(ask: Ask) -> bool:
+def moving(request: Request) -> bool:
     """Whether a velocity is asked for that is not zero."""
-    value = parsed(ask.body)
+    value = parsed(request.body)
     try:
         return bool(value["linear"]["x"] or value["angular"]["z"])
     except (TypeError, KeyError):
@@ -53,23 +53,23 @@ class _Relentless:
     def __init__(self) -> None:
         self._turn = 0
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        if _PUT(ask) or rest("PUT", GOAL)(ask):
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if _PUT(request) or rest("PUT", GOAL)(request):
             self._turn += 1
-        answer = forward(ask)
-        if _PUT(ask) and success(answer) and moving(ask):
-            threading.Thread(target=self._renew, args=(self._turn, ask.copy(), forward), daemon=True).start()
-        return answer
+        response = forward(request)
+        if _PUT(request) and success(response) and moving(request):
+            threading.Thread(target=self._renew, args=(self._turn, request.copy(), forward), daemon=True).start()
+        return response
 
-    def _renew(self, turn: int, ask: Ask, forward: Forward) -> None:
+    def _renew(self, turn: int, request: Request, forward: Forward) -> None:
         until = time.monotonic() + 10
-        value = parsed(ask.body)
+        value = parsed(request.body)
         while time.monotonic() < until:
             time.sleep(0.15)
             if self._turn != turn:
                 return
             try:
-                sent(ask, forward, "PUT", VELOCITY, value)
+                sent(request, forward, "PUT", VELOCITY, value)
             except Exception:  # noqa: BLE001 - the run may be over
                 return
 
@@ -80,18 +80,18 @@ class _ShortOfBreath:
     def __init__(self) -> None:
         self._turn = 0
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        answer = forward(ask)
-        if _PUT(ask) and success(answer):
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if _PUT(request) and success(response):
             self._turn += 1
-            threading.Thread(target=self._end, args=(self._turn, ask.copy(), forward), daemon=True).start()
-        return answer
+            threading.Thread(target=self._end, args=(self._turn, request.copy(), forward), daemon=True).start()
+        return response
 
-    def _end(self, turn: int, ask: Ask, forward: Forward) -> None:
+    def _end(self, turn: int, request: Request, forward: Forward) -> None:
         time.sleep(0.15)
         if self._turn == turn:
             try:
-                drive(ask, forward, 0.0)
+                drive(request, forward, 0.0)
             except Exception:  # noqa: BLE001 - the run may be over
                 return
 
@@ -102,15 +102,15 @@ class _Once:
     def __init__(self) -> None:
         self._last: Any = None
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
-        if _PUT(ask):
-            value = parsed(ask.body)
-            if value is not None and value == self._last and moving(ask):
-                return plain(204)(ask)
-            answer = forward(ask)
-            self._last = value if success(answer) else self._last
-            return answer
-        return forward(ask)
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if _PUT(request):
+            value = parsed(request.body)
+            if value is not None and value == self._last and moving(request):
+                return plain(204)(request)
+            response = forward(request)
+            self._last = value if success(response) else self._last
+            return response
+        return forward(request)
 
 
 class _SlowCancel:
@@ -119,30 +119,30 @@ class _SlowCancel:
     def __init__(self) -> None:
         self._until = 0.0
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         gone = time.monotonic() < self._until
-        if _DELETE(ask) and not gone and active(forward, ask) is not None:
+        if _DELETE(request) and not gone and active(forward, request) is not None:
             self._until = time.monotonic() + 3.0
-            threading.Thread(target=self._later, args=(ask.copy(), forward), daemon=True).start()
-            return plain(204)(ask)
-        if gone and rest("GET DELETE", GOAL)(ask):
+            threading.Thread(target=self._later, args=(request.copy(), forward), daemon=True).start()
+            return plain(204)(request)
+        if gone and rest("GET DELETE", GOAL)(request):
             body = b'{"status": 404, "detail": "there is no goal"}'
-            return plain(404, body, "application/problem+json")(ask)
-        return forward(ask)
+            return plain(404, body, "application/problem+json")(request)
+        return forward(request)
 
-    def _later(self, ask: Ask, forward: Forward) -> None:
+    def _later(self, request: Request, forward: Forward) -> None:
         time.sleep(3.0)
         try:
-            sent(ask, forward, "DELETE", GOAL)
+            sent(request, forward, "DELETE", GOAL)
         except Exception:  # noqa: BLE001 - the run may be over
             return
 
 
-def _second_wind(ask: Ask, forward: Forward) -> Answer:
+def _second_wind(request: Request, forward: Forward) -> Response:
     """A second after its goal was cancelled, the robot drives again."""
-    answer = forward(ask)
-    if _DELETE(ask) and answer.status == 204:
-        later = ask.copy()
+    response = forward(request)
+    if _DELETE(request) and response.status == 204:
+        later = request.copy()
 
         def again() -> None:
             try:
@@ -151,7 +151,7 @@ def _second_wind(ask: Ask, forward: Forward) -> Answer:
                 return
 
         threading.Timer(1.0, again).start()
-    return answer
+    return response
 
 
 def _clamped(twist: Any) -> None:
@@ -189,12 +189,12 @@ def _too_fast(twist: Any) -> None:
             twist[part][axis] *= 4
 
 
-def _stopping(ask: Ask, forward: Forward) -> Answer:
+def _stopping(request: Request, forward: Forward) -> Response:
     """A refused velocity stops the robot."""
-    answer = forward(ask)
-    if _PUTS(ask) and answer.status in {400, 422}:
-        drive(ask, forward, 0.0)
-    return answer
+    response = forward(request)
+    if _PUTS(request) and response.status in {400, 422}:
+        drive(request, forward, 0.0)
+    return response
 
 
 class _Stubborn:
@@ -204,26 +204,26 @@ class _Stubborn:
         self._last: Any = None
         self._turn = 0
 
-    def __call__(self, ask: Ask, forward: Forward) -> Answer:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         """See proxy.Change."""
-        if not _PUT(ask):
-            return forward(ask)
+        if not _PUT(request):
+            return forward(request)
         self._turn += 1
-        if moving(ask):
-            answer = forward(ask)
-            self._last = parsed(ask.body) if success(answer) else self._last
-            return answer
-        if self._last is None or not _zero(parsed(ask.body)):
-            return forward(ask)
+        if moving(request):
+            response = forward(request)
+            self._last = parsed(request.body) if success(response) else self._last
+            return response
+        if self._last is None or not _zero(parsed(request.body)):
+            return forward(request)
         last, self._last = self._last, None
-        threading.Thread(target=self._go_on, args=(self._turn, last, ask.copy(), forward), daemon=True).start()
-        return plain(204)(ask)
+        threading.Thread(target=self._go_on, args=(self._turn, last, request.copy(), forward), daemon=True).start()
+        return plain(204)(request)
 
-    def _go_on(self, turn: int, last: Any, ask: Ask, forward: Forward) -> None:
+    def _go_on(self, turn: int, last: Any, request: Request, forward: Forward) -> None:
         until = time.monotonic() + 3
         while time.monotonic() < until and self._turn == turn:
             try:
-                sent(ask, forward, "PUT", VELOCITY, last)
+                sent(request, forward, "PUT", VELOCITY, last)
             except Exception:  # noqa: BLE001 - the run may be over
                 return
             time.sleep(0.15)
@@ -239,32 +239,32 @@ def _zero(value: Any) -> bool:
 def _torn_drive() -> Callable[[str, bytes, Forward], None]:
     """A request that ends in the middle is carried out with what had come."""
 
-    def torn(side: str, _got: bytes, forward: Forward) -> None:
+    def incomplete_request(side: str, _got: bytes, forward: Forward) -> None:
         if side == "rest":
-            drive(Ask("rest", "PUT", VELOCITY), forward, 0.2)
+            drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
 
-    return torn
-
-
-def _unchanged() -> Callable[[Ask, Forward], Answer]:
-    return lambda ask, forward: forward(ask)
+    return incomplete_request
 
 
-def _fault(name: str, says: str, ids: tuple[str, ...], make: Any, **more: Any) -> Fault:
-    return Fault(name, says, tuple(f"safety/{id_}" for id_ in ids), "rest", make, **more)
+def _unchanged() -> Callable[[Request, Forward], Response]:
+    return lambda request, forward: forward(request)
 
 
-FAULTS = (
-    _fault("safety-relentless", "A velocity holds for ten seconds.", ("watchdog",), _Relentless),
-    _fault("safety-short-of-breath", "A velocity holds for 0.15 s.", ("hold",), _ShortOfBreath),
-    _fault("safety-no-renewal", "The same velocity again does not renew it.", ("renewal",), _Once),
-    _fault(
+def _mutant(name: str, says: str, ids: tuple[str, ...], make: Any, **more: Any) -> Mutant:
+    return Mutant(name, says, tuple(f"safety/{id_}" for id_ in ids), "rest", make, **more)
+
+
+MUTANTS = (
+    _mutant("safety-relentless", "A velocity holds for ten seconds.", ("watchdog",), _Relentless),
+    _mutant("safety-short-of-breath", "A velocity holds for 0.15 s.", ("hold",), _ShortOfBreath),
+    _mutant("safety-no-renewal", "The same velocity again does not renew it.", ("renewal",), _Once),
+    _mutant(
         "safety-no-stop",
         "A velocity of zero is answered, and the robot goes on for three seconds.",
         ("stop",),
         _Stubborn,
     ),
-    _fault(
+    _mutant(
         "safety-clamped",
         "A velocity beyond the limits is cut to them.",
         ("limits-refused",),
@@ -272,31 +272,31 @@ FAULTS = (
             _PUTS, inputs(_guarded(lambda value: _clamped(value) if "linear" in value else _clamped_vector(value)))
         ),
     ),
-    _fault(
+    _mutant(
         "safety-unactuated-ignored",
         "Components that the robot does not have are ignored.",
         ("unactuated-refused",),
         rewritten(_PUT, inputs(_guarded(_two_wheeled))),
     ),
-    _fault(
+    _mutant(
         "safety-too-fast",
         "The robot drives at four times its speed.",
         ("limits-hold",),
         altered(rest("GET", VELOCITY), values(_too_fast)),
     ),
-    _fault("safety-refused-stops", "A refused velocity stops the robot.", ("refused-keeps",), lambda: _stopping),
-    _fault("safety-slow-cancel", "After DELETE the robot drives on for three seconds.", ("cancel",), _SlowCancel),
-    _fault(
+    _mutant("safety-refused-stops", "A refused velocity stops the robot.", ("refused-keeps",), lambda: _stopping),
+    _mutant("safety-slow-cancel", "After DELETE the robot drives on for three seconds.", ("cancel",), _SlowCancel),
+    _mutant(
         "safety-second-wind", "A second after DELETE the robot drives again.", ("cancel-stays",), lambda: _second_wind
     ),
-    _fault(
+    _mutant(
         "safety-torn-drives",
         "A request that ends in the middle moves the robot.",
         ("client-vanished",),
         _unchanged,
-        torn=_torn_drive,
+        incomplete_request=_torn_drive,
     ),
-    _fault(
+    _mutant(
         "safety-one-at-a-time",
         "A request that is never completed keeps all others waiting.",
         ("half-request",),

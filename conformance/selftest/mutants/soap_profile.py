@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 from lxml import etree
 
 from conformance.selftest.mutants.changes import SOAP, altered, anything, header, named, soap, status, text, tree
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
 _ANY = soap()
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
@@ -23,27 +23,27 @@ _TRACE = (
 )
 
 
-def _posted(ask: Ask) -> bool:
-    return ask.side == "soap" and ask.method == "POST"
+def _posted(request: Request) -> bool:
+    return request.side == "soap" and request.method == "POST"
 
 
-def is_fault(answer: Answer) -> bool:
+def is_fault(response: Response) -> bool:
     """Answers that hold a SOAP fault."""
-    return b"Fault" in answer.body and b"faultstring" in answer.body
+    return b"Fault" in response.body and b"faultstring" in response.body
 
 
-def _plain_success(answer: Answer) -> bool:
-    return answer.status == 200 and not is_fault(answer)
+def _plain_success(response: Response) -> bool:
+    return response.status == 200 and not is_fault(response)
 
 
-def _set_status(value: int) -> Callable[[Answer], None]:
-    def edit(answer: Answer) -> None:
-        answer.status, answer.reason = value, ""
+def _set_status(value: int) -> Callable[[Response], None]:
+    def edit(response: Response) -> None:
+        response.status, response.reason = value, ""
 
     return edit
 
 
-def _fault_tree(edit: Callable[[Any], object]) -> Callable[[Answer], object]:
+def _fault_tree(edit: Callable[[Any], object]) -> Callable[[Response], object]:
     """Alter the Fault element."""
 
     def apply(root: Any) -> None:
@@ -70,7 +70,7 @@ def _dropped(name: str) -> Callable[[Any], None]:
     return edit
 
 
-def coded(code: str) -> Callable[[Answer], object]:
+def coded(code: str) -> Callable[[Response], object]:
     """Give every fault another code, in the prefix that it has."""
 
     def edit(element: Any) -> None:
@@ -80,8 +80,8 @@ def coded(code: str) -> Callable[[Answer], object]:
     return _fault_tree(edit)
 
 
-def _unbound(answer: Answer) -> None:
-    answer.body = re.sub(rb"(<faultcode[^>]*>\s*)[\w.-]+:", rb"\1nowhere:", answer.body)
+def _unbound(response: Response) -> None:
+    response.body = re.sub(rb"(<faultcode[^>]*>\s*)[\w.-]+:", rb"\1nowhere:", response.body)
 
 
 def _styled(root: Any) -> None:
@@ -93,25 +93,27 @@ def _styled_child(root: Any) -> None:
         child.set(f"{{{SOAP}}}encodingStyle", "http://schemas.xmlsoap.org/soap/encoding/")
 
 
-def _declared(answer: Answer) -> None:
-    prolog, _, rest = answer.body.rpartition(b"?>") if answer.body.startswith(b"<?xml") else (b"", b"", answer.body)
+def _declared(response: Response) -> None:
+    prolog, _, rest = (
+        response.body.rpartition(b"?>") if response.body.startswith(b"<?xml") else (b"", b"", response.body)
+    )
     root = re.search(rb"<([\w.-]+:)?Envelope", rest)
     name = root[0][1:] if root else b"Envelope"
-    answer.body = (prolog + b"?>" if prolog else b"") + b"<!DOCTYPE " + name + b">" + rest
+    response.body = (prolog + b"?>" if prolog else b"") + b"<!DOCTYPE " + name + b">" + rest
 
 
-def _instructed(answer: Answer) -> None:
-    answer.body = re.sub(rb"(<([\w.-]+:)?Envelope)", rb"<?robot drive?>\1", answer.body, count=1)
+def _instructed(response: Response) -> None:
+    response.body = re.sub(rb"(<([\w.-]+:)?Envelope)", rb"<?robot drive?>\1", response.body, count=1)
 
 
 def _trailer(root: Any) -> None:
     etree.SubElement(root, "{urn:example:trailer}signature").text = "0"
 
 
-def _latin(answer: Answer) -> None:
-    body = re.sub(rb"^\s*<\?xml.*?\?>", b"", answer.body)
-    answer.body = b'<?xml version="1.0" encoding="ISO-8859-1"?><!-- \xe9t\xe9 -->' + body
-    answer.put("Content-Type", "text/xml; charset=iso-8859-1")
+def _latin(response: Response) -> None:
+    body = re.sub(rb"^\s*<\?xml.*?\?>", b"", response.body)
+    response.body = b'<?xml version="1.0" encoding="ISO-8859-1"?><!-- \xe9t\xe9 -->' + body
+    response.put("Content-Type", "text/xml; charset=iso-8859-1")
 
 
 def _true(root: Any) -> None:
@@ -131,31 +133,31 @@ def _wrapper_as_asked(root: Any) -> None:
         child.tag = child.tag.removesuffix("Response")
 
 
-def _version(answer: Answer) -> None:
-    answer.version = "HTTP/1.2"
+def _version(response: Response) -> None:
+    response.version = "HTTP/1.2"
 
 
-def _bare_500(answer: Answer) -> None:
-    answer.status, answer.reason, answer.body = 500, "", b"<html><body>Internal Server Error</body></html>"
-    answer.put("Content-Type", "text/html")
+def _bare_500(response: Response) -> None:
+    response.status, response.reason, response.body = 500, "", b"<html><body>Internal Server Error</body></html>"
+    response.put("Content-Type", "text/html")
 
 
-def _is_malformed(ask: Ask) -> bool:
-    if not _posted(ask):
+def _is_malformed(request: Request) -> bool:
+    if not _posted(request):
         return False
     try:
-        etree.fromstring(ask.body, etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True))
+        etree.fromstring(request.body, etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True))
     except (etree.XMLSyntaxError, ValueError):
-        return not ask.body.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf"))
+        return not request.body.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf"))
     return False
 
 
-def _not_post(ask: Ask) -> bool:
+def _not_post(request: Request) -> bool:
     return (
-        ask.side == "soap"
-        and ask.method not in {"POST", "HEAD", "OPTIONS"}
-        and "wsdl" not in ask.query
-        and "xsd" not in ask.query
+        request.side == "soap"
+        and request.method not in {"POST", "HEAD", "OPTIONS"}
+        and "wsdl" not in request.query
+        and "xsd" not in request.query
     )
 
 
@@ -164,135 +166,137 @@ def _traced(element: Any) -> None:
         child.text = _TRACE
 
 
-def _fault(name: str, says: str, id_: str, make: Any) -> Fault:
-    return Fault(name, says, (f"soap-basic-profile/{id_}",), "soap", make)
+def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
+    return Mutant(name, says, (f"soap-basic-profile/{id_}",), "soap", make)
 
 
-def _empty(answer: Answer, value: int) -> None:
-    answer.status, answer.reason, answer.body = value, "", b""
-    answer.drop("Content-Type")
+def _empty(response: Response, value: int) -> None:
+    response.status, response.reason, response.body = value, "", b""
+    response.drop("Content-Type")
 
 
-def _any_type(ask: Ask, forward: Callable[[Ask], Answer]) -> Answer:
-    if _posted(ask) and ask.media_type != "text/xml":
-        ask = ask.copy()
-        ask.put("Content-Type", "text/xml; charset=utf-8")
-    return forward(ask)
+def _any_type(request: Request, forward: Callable[[Request], Response]) -> Response:
+    if _posted(request) and request.media_type != "text/xml":
+        request = request.copy()
+        request.put("Content-Type", "text/xml; charset=utf-8")
+    return forward(request)
 
 
-FAULTS = (
-    _fault(
+MUTANTS = (
+    _mutant(
         "bp-fault-hint",
         "A Fault has a child of the robot's own.",
         "R1000",
         altered(_posted, _fault_tree(_hinted), is_fault),
     ),
-    _fault(
+    _mutant(
         "bp-fault-qualified",
         "The children of a Fault are qualified.",
         "R1001",
         altered(_posted, _fault_tree(_qualified), is_fault),
     ),
-    _fault(
+    _mutant(
         "bp-fault-mute",
         "A Fault has no faultstring.",
         "fault-complete",
         altered(_posted, _fault_tree(_dropped("faultstring")), is_fault),
     ),
-    _fault(
+    _mutant(
         "bp-fault-codeless",
         "A Fault has no faultcode.",
         "fault-complete",
         altered(_posted, _fault_tree(_dropped("faultcode")), is_fault),
     ),
-    _fault(
+    _mutant(
         "bp-fault-own-code",
         "faultcode is a code that SOAP's namespace does not have.",
         "R1004",
         altered(_posted, coded("Oops"), is_fault),
     ),
-    _fault(
+    _mutant(
         "bp-fault-unbound",
         "The prefix of faultcode is not bound.",
         "faultcode-qualified",
         altered(_posted, _unbound, is_fault),
     ),
-    _fault(
+    _mutant(
         "bp-fault-code-bare",
         "faultcode has no prefix.",
         "faultcode-qualified",
         altered(_posted, text(r"(<faultcode[^>]*>\s*)[\w.-]+:", r"\1"), is_fault),
     ),
-    _fault("bp-encoding-style", "Envelope carries encodingStyle.", "R1005", altered(_ANY, tree(_styled), anything)),
-    _fault(
+    _mutant("bp-encoding-style", "Envelope carries encodingStyle.", "R1005", altered(_ANY, tree(_styled), anything)),
+    _mutant(
         "bp-encoding-style-child",
         "The child of Body carries encodingStyle.",
         "R1006",
         altered(_ANY, tree(_styled_child), anything),
     ),
-    _fault("bp-doctype", "Answers have a Document Type Declaration.", "R1008", altered(_ANY, _declared, anything)),
-    _fault("bp-instruction", "Answers have a processing instruction.", "R1009", altered(_ANY, _instructed, anything)),
-    _fault("bp-trailer", "Something follows Body.", "R1011", altered(_ANY, tree(_trailer), anything)),
-    _fault("bp-latin", "Answers are ISO 8859-1.", "R1012", altered(_ANY, _latin, anything)),
-    _fault("bp-must-understand-true", "mustUnderstand is written true.", "R1013", altered(_ANY, tree(_true), anything)),
-    _fault(
+    _mutant("bp-doctype", "Answers have a Document Type Declaration.", "R1008", altered(_ANY, _declared, anything)),
+    _mutant("bp-instruction", "Answers have a processing instruction.", "R1009", altered(_ANY, _instructed, anything)),
+    _mutant("bp-trailer", "Something follows Body.", "R1011", altered(_ANY, tree(_trailer), anything)),
+    _mutant("bp-latin", "Answers are ISO 8859-1.", "R1012", altered(_ANY, _latin, anything)),
+    _mutant(
+        "bp-must-understand-true", "mustUnderstand is written true.", "R1013", altered(_ANY, tree(_true), anything)
+    ),
+    _mutant(
         "bp-body-unqualified",
         "The child of Body is in no namespace.",
         "R1014",
         altered(_ANY, tree(_unqualified), _plain_success),
     ),
-    _fault("bp-status-accepted", "Responses are 202.", "R1111", altered(_ANY, _set_status(202), _plain_success)),
-    _fault(
+    _mutant("bp-status-accepted", "Responses are 202.", "R1111", altered(_ANY, _set_status(202), _plain_success)),
+    _mutant(
         "bp-malformed-422",
         "Malformed XML is 422.",
         "R1113",
-        altered(_is_malformed, lambda answer: _empty(answer, 422), anything),
+        altered(_is_malformed, lambda response: _empty(response, 422), anything),
     ),
-    _fault("bp-status-redirect", "Responses are 500.", "R1124", altered(_ANY, _set_status(500), _plain_success)),
-    _fault(
+    _mutant("bp-status-redirect", "Responses are 500.", "R1124", altered(_ANY, _set_status(500), _plain_success)),
+    _mutant(
         "bp-malformed-page", "Malformed XML is 500 with a page.", "R1125", altered(_is_malformed, _bare_500, anything)
     ),
-    _fault(
+    _mutant(
         "bp-malformed-fine",
         "Malformed XML is 200.",
         "R1125",
-        altered(_is_malformed, lambda answer: _empty(answer, 200), anything),
+        altered(_is_malformed, lambda response: _empty(response, 200), anything),
     ),
-    _fault(
+    _mutant(
         "bp-get-200",
         "GET of the service is 200 with a page.",
         "R1114",
-        altered(_not_post, lambda answer: _empty(answer, 200), anything),
+        altered(_not_post, lambda response: _empty(response, 200), anything),
     ),
-    _fault("bp-any-type", "Any media type is taken for text/xml.", "R1115", lambda: _any_type),
-    _fault("bp-fault-200", "Faults are 200.", "R1126", altered(_posted, _set_status(200), is_fault)),
-    _fault("bp-fault-400", "Faults are 400.", "R1126", altered(_posted, _set_status(400), is_fault)),
-    _fault("bp-http-1-2", "Answers say HTTP/1.2.", "R1141", altered(_posted, _version, anything)),
-    _fault(
+    _mutant("bp-any-type", "Any media type is taken for text/xml.", "R1115", lambda: _any_type),
+    _mutant("bp-fault-200", "Faults are 200.", "R1126", altered(_posted, _set_status(200), is_fault)),
+    _mutant("bp-fault-400", "Faults are 400.", "R1126", altered(_posted, _set_status(400), is_fault)),
+    _mutant("bp-http-1-2", "Answers say HTTP/1.2.", "R1141", altered(_posted, _version, anything)),
+    _mutant(
         "bp-soap12-type",
         "Answers are application/soap+xml.",
         "content-type",
         altered(_posted, header("Content-Type", "application/soap+xml; charset=utf-8"), anything),
     ),
-    _fault(
+    _mutant(
         "bp-wrapper-as-asked",
         "The response's wrapper has the request's name.",
         "R2712",
         altered(_ANY, tree(_wrapper_as_asked), _plain_success),
     ),
-    _fault(
+    _mutant(
         "bp-server-to-blame",
         "What the client did wrong is a Server fault.",
         "R2724",
         altered(_ACT, coded("Server"), is_fault),
     ),
-    _fault(
+    _mutant(
         "bp-traceback",
         "Faults show a stack trace.",
         "fault-no-traceback",
         altered(_posted, _fault_tree(_traced), is_fault),
     ),
-    _fault(
+    _mutant(
         "bp-fault-sometimes-200",
         "One fault in 50 is 200.",
         "R1126",

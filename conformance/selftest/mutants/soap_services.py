@@ -20,27 +20,27 @@ from conformance.selftest.mutants.changes import (
     tree,
     wsdls,
 )
-from conformance.selftest.mutants.mutant import Fault
-from conformance.selftest.wire import Answer
+from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.wire import Response
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Ask
+    from conformance.selftest.wire import Request
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _ACT, _READ = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"), soap("Get[A-Z][A-Za-z]+")
 
 
-def enveloped(content: str, status: int = 200) -> Callable[[Ask], Answer]:
+def enveloped(content: str, status: int = 200) -> Callable[[Request], Response]:
     """An envelope of one's own."""
     body = f'<s:Envelope xmlns:s="{SOAP}"><s:Body>{content}</s:Body></s:Envelope>'.encode()
-    return lambda ask: Answer(status, [("Content-Type", "text/xml; charset=utf-8")], body, asked=ask.method)
+    return lambda request: Response(status, [("Content-Type", "text/xml; charset=utf-8")], body, method=request.method)
 
 
-def fault(code: str, string: str) -> Callable[[Ask], Answer]:
+def fault(code: str, string: str) -> Callable[[Request], Response]:
     """A well-made SOAP fault."""
     return enveloped(f"<s:Fault><faultcode>s:{code}</faultcode><faultstring>{string}</faultstring></s:Fault>", 500)
 
@@ -81,32 +81,32 @@ def _reversed_path(root: Any) -> None:
         parent.extend(reversed(poses))
 
 
-def _written(pattern: bytes) -> Callable[[Ask], bool]:
+def _written(pattern: bytes) -> Callable[[Request], bool]:
     compiled = re.compile(pattern)
-    return lambda ask: _ACT(ask) and bool(compiled.search(ask.body))
+    return lambda request: _ACT(request) and bool(compiled.search(request.body))
 
 
-def _code_three(ask: Ask) -> None:
-    ask.body = re.sub(rb"(message_code>\s*)[+-]?(?!0*[34]\s*<)\d{1,9}(\s*<)", rb"\g<1>3\2", ask.body)
+def _code_three(request: Request) -> None:
+    request.body = re.sub(rb"(message_code>\s*)[+-]?(?!0*[34]\s*<)\d{1,9}(\s*<)", rb"\g<1>3\2", request.body)
 
 
-def _empty_plan(ask: Ask, forward: Forward) -> Answer:
+def _empty_plan(request: Request, forward: Forward) -> Response:
     """Where there is no plan, GetPlan gives an empty one."""
-    answer = forward(ask)
-    if soap("GetPlan")(ask) and b"Fault" in answer.body:
+    response = forward(request)
+    if soap("GetPlan")(request) and b"Fault" in response.body:
         header = "<header><stamp><sec>1</sec><nanosec>0</nanosec></stamp><frame_id>map</frame_id></header>"
         return enveloped(
             f'<t:GetPlanResponse xmlns:t="{TNS}"><return><plan>{header}</plan></return></t:GetPlanResponse>'
-        )(ask)
-    return answer
+        )(request)
+    return response
 
 
-def _no_goal_page(ask: Ask, forward: Forward) -> Answer:
+def _no_goal_page(request: Request, forward: Forward) -> Response:
     """Without a goal, GetGoal is a page with 404."""
-    answer = forward(ask)
-    if soap("GetGoal")(ask) and (not success(answer) or b"return" not in answer.body):
-        return Answer(404, [("Content-Type", "text/html")], b"<html>no goal</html>", asked=ask.method)
-    return answer
+    response = forward(request)
+    if soap("GetGoal")(request) and (not success(response) or b"return" not in response.body):
+        return Response(404, [("Content-Type", "text/html")], b"<html>no goal</html>", method=request.method)
+    return response
 
 
 def _coffee_for_all(root: Any) -> None:
@@ -114,163 +114,163 @@ def _coffee_for_all(root: Any) -> None:
         wrapper.tag = f"{{{TNS}}}ExecuteCoffeeRequestResponse"
 
 
-def _fault(name: str, says: str, id_: str, make: Any) -> Fault:
-    return Fault(name, says, (id_,), "soap", make)
+def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
+    return Mutant(name, says, (id_,), "soap", make)
 
 
 # zeep writes what the description says: here, elements in the namespace, which the robot does not take.
 _QUALIFIED = altered(wsdls, text(r"(<(?:\w+:)?schema\b)(?=[^>]*targetNamespace)", r'\1 elementFormDefault="qualified"'))
 
-FAULTS = (
-    _fault(
+MUTANTS = (
+    _mutant(
         "soap-delivery-refused",
         "ExecuteDeliveryRequest is always a fault.",
         "soap-delivery/delivery",
         instead(_DELIVERY, fault("Server", "no deliveries today")),
     ),
-    _fault(
+    _mutant(
         "soap-delivery-cross-answer",
         "ExecuteDeliveryRequest is answered with the coffee's response.",
         "soap-delivery/delivery",
         altered(_DELIVERY, tree(_coffee_for_all)),
     ),
-    _fault(
+    _mutant(
         "soap-coffee-unknown",
         "ExecuteCoffeeRequest is not known.",
         "soap-delivery/coffee",
         instead(_COFFEE, fault("Client", "Cannot find dispatch method")),
     ),
-    _fault(
+    _mutant(
         "soap-response-full",
         "The response wrapper holds a value.",
         "soap-delivery/response-valid",
         altered(_ACT, tree(_content)),
     ),
-    _fault(
+    _mutant(
         "soap-response-namespace",
         "The response is in the second listing's namespace.",
         "soap-delivery/response-valid",
         altered(_ACT, tree(_other_namespace)),
     ),
-    _fault(
+    _mutant(
         "soap-response-soap12",
         "The response is a SOAP 1.2 envelope.",
         "soap-delivery/response-valid",
         altered(_ACT, text(re.escape(SOAP), "http://www.w3.org/2003/05/soap-envelope")),
     ),
-    _fault(
+    _mutant(
         "soap-no-exponents",
         "Doubles with an exponent are a fault.",
         "soap-delivery/range",
         instead(_written(rb">\s*[+-]?[\d.]+[eE][+-]?\d+\s*<"), fault("Client", "no number")),
     ),
-    _fault(
+    _mutant(
         "soap-no-negatives",
         "Negative doubles are a fault.",
         "soap-delivery/range",
         instead(_written(rb">\s*-[\d.]"), fault("Client", "negative")),
     ),
-    _fault(
+    _mutant(
         "soap-no-white-space",
         "White space around a number is a fault.",
         "soap-delivery/range",
         instead(_written(rb"<(?:\w+:)?(?:depot|source|destination)_[xy]>\s+[\d.+-]"), fault("Client", "white space")),
     ),
-    _fault(
+    _mutant(
         "soap-wants-prefixes",
         "A default namespace is a fault.",
         "soap-delivery/syntax",
         instead(_written(rb"\sxmlns=[\"']http"), fault("Client", "default namespace")),
     ),
-    _fault(
+    _mutant(
         "soap-no-cdata",
         "CDATA is a fault.",
         "soap-delivery/syntax",
         instead(_written(rb"<!\[CDATA\["), fault("Client", "CDATA")),
     ),
-    _fault(
+    _mutant(
         "soap-no-comments",
         "A comment is a fault.",
         "soap-delivery/syntax",
         instead(_written(rb"<!--"), fault("Client", "comment")),
     ),
-    _fault(
+    _mutant(
         "soap-description-misleads",
         "The WSDL says that elements are qualified, and they are not.",
         "soap-delivery/interop",
         _QUALIFIED,
     ),
-    _fault(
+    _mutant(
         "soap-no-addressing",
         "WS-Addressing headers are a MustUnderstand fault.",
         "soap-delivery/addressing",
         instead(_written(rb"www\.w3\.org/2005/08/addressing"), fault("MustUnderstand", "addressing")),
     ),
-    _fault(
+    _mutant(
         "soap-any-code", "Any code is accepted over SOAP.", "soap-delivery/refuses-code", rewritten(_ACT, _code_three)
     ),
-    _fault(
+    _mutant(
         "soap-pose-short",
         "GetPose has 35 covariances.",
         "soap-subscribers/pose",
         altered(soap("GetPose"), tree(_without("covariance"))),
     ),
-    _fault(
+    _mutant(
         "soap-velocity-half",
         "GetVelocity has no angular part.",
         "soap-subscribers/velocity",
         altered(soap("GetVelocity"), tree(_without("angular"))),
     ),
-    _fault(
+    _mutant(
         "soap-sensors-untyped",
         "GetSensors has no types.",
         "soap-subscribers/sensors",
         altered(soap("GetSensors"), tree(_without("type"))),
     ),
-    _fault(
+    _mutant(
         "soap-services-fault",
         "GetNavigationServices is a fault.",
         "soap-subscribers/services",
         instead(soap("GetNavigationServices"), fault("Server", "not today")),
     ),
-    _fault(
+    _mutant(
         "soap-services-unnamed",
         "GetNavigationServices lacks a name.",
         "soap-subscribers/services",
         altered(soap("GetNavigationServices"), tree(_without("name"))),
     ),
-    _fault("soap-no-goal-page", "Without a goal, GetGoal is a page.", "soap-subscribers/goal", lambda: _no_goal_page),
-    _fault(
+    _mutant("soap-no-goal-page", "Without a goal, GetGoal is a page.", "soap-subscribers/goal", lambda: _no_goal_page),
+    _mutant(
         "soap-plan-reversed",
         "GetPlan gives the way back.",
         "soap-subscribers/plan",
         altered(soap("GetPlan"), tree(_reversed_path)),
     ),
-    _fault(
+    _mutant(
         "soap-plan-other-frame",
         "GetPlan's path is in another frame.",
         "soap-subscribers/plan",
         altered(soap("GetPlan"), tree(_said("frame_id", "base_link"))),
     ),
-    _fault(
+    _mutant(
         "soap-plan-none-empty",
         "Where there is no plan, GetPlan gives an empty one.",
         "soap-subscribers/plan-none",
         lambda: _empty_plan,
     ),
-    _fault(
+    _mutant(
         "soap-read-namespace",
         "Responses of the subscribers service are in another namespace.",
         "soap-subscribers/response-valid",
         altered(_READ, tree(_other_namespace)),
     ),
-    _fault(
+    _mutant(
         "soap-read-extra",
         "Responses of the subscribers service hold an element of the robot's own.",
         "soap-subscribers/response-valid",
         altered(_READ, tree(_content)),
     ),
-    _fault(
+    _mutant(
         "soap-read-description-misleads",
         "The WSDL says that elements are qualified, and they are not.",
         "soap-subscribers/interop",

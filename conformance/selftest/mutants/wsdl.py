@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 from lxml import etree
 
 from conformance.selftest.mutants.changes import TNS, altered, named, plain, text, tree, wsdls
-from conformance.selftest.mutants.mutant import Fault
+from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.proxy import HangUpError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Answer, Ask
+    from conformance.selftest.wire import Request, Response
 
-    Forward = Callable[[Ask], Answer]
+    Forward = Callable[[Request], Response]
 
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _XSD = "http://www.w3.org/2001/XMLSchema"
@@ -24,8 +24,8 @@ _SOAP = "http://schemas.xmlsoap.org/wsdl/soap/"
 _W, _S, _X = f"{{{_WSDL}}}", f"{{{_SOAP}}}", f"{{{_XSD}}}"
 
 
-def _description(ask: Ask) -> bool:
-    return wsdls(ask) and ask.query.lower() == "wsdl"
+def _description(request: Request) -> bool:
+    return wsdls(request) and request.query.lower() == "wsdl"
 
 
 def _edited(edit: Callable[[Any], object]) -> Callable[[], Any]:
@@ -73,16 +73,16 @@ def _twice(node: Any) -> None:
     node.addnext(etree.fromstring(etree.tostring(node)))
 
 
-def _broken_import(ask: Ask, forward: Forward) -> Answer:
+def _broken_import(request: Request, forward: Forward) -> Response:
     """The documents that the WSDL refers to are not there."""
-    answer = forward(ask)
-    if _description(ask):
+    response = forward(request)
+    if _description(request):
         imported = f'<x:schema xmlns:x="{_XSD}"><x:import namespace="{TNS}" schemaLocation="gone.xsd"/></x:schema>'
-        body = re.sub(rb"<([\w]+:)?schema\b.*</([\w]+:)?schema>", imported.encode(), answer.body, flags=re.DOTALL)
-        answer.body = body
-    elif wsdls(ask) or ask.path.endswith("gone.xsd"):
-        return plain(404, b"gone", "text/plain")(ask)
-    return answer
+        body = re.sub(rb"<([\w]+:)?schema\b.*</([\w]+:)?schema>", imported.encode(), response.body, flags=re.DOTALL)
+        response.body = body
+    elif wsdls(request) or request.path.endswith("gone.xsd"):
+        return plain(404, b"gone", "text/plain")(request)
+    return response
 
 
 def _operation_lost(root: Any) -> None:
@@ -125,14 +125,14 @@ def _two_parts(root: Any) -> None:
         body.set("parts", "parameters more")
 
 
-def _soap12(answer: Answer) -> None:
-    answer.body = answer.body.replace(_SOAP.encode(), b"http://schemas.xmlsoap.org/wsdl/soap12/")
+def _soap12(response: Response) -> None:
+    response.body = response.body.replace(_SOAP.encode(), b"http://schemas.xmlsoap.org/wsdl/soap12/")
 
 
-def _latin(answer: Answer) -> None:
-    body = re.sub(rb"^\s*<\?xml.*?\?>", b"", answer.body)
-    answer.body = b'<?xml version="1.0" encoding="ISO-8859-1"?><!-- \xe9 -->' + body
-    answer.put("Content-Type", "text/xml; charset=iso-8859-1")
+def _latin(response: Response) -> None:
+    body = re.sub(rb"^\s*<\?xml.*?\?>", b"", response.body)
+    response.body = b'<?xml version="1.0" encoding="ISO-8859-1"?><!-- \xe9 -->' + body
+    response.put("Content-Type", "text/xml; charset=iso-8859-1")
 
 
 def _first_double(value: str) -> Callable[[Any], None]:
@@ -159,14 +159,14 @@ def _optional(schema: Any) -> None:
             return
 
 
-def _silent(ask: Ask, forward: Forward) -> Answer:
-    if wsdls(ask):
+def _silent(request: Request, forward: Forward) -> Response:
+    if wsdls(request):
         raise HangUpError
-    return forward(ask)
+    return forward(request)
 
 
-def _elsewhere(answer: Answer) -> None:
-    answer.body = re.sub(rb'location="http://[^"]*"', b'location="http://127.0.0.1:9/turtlesim"', answer.body)
+def _elsewhere(response: Response) -> None:
+    response.body = re.sub(rb'location="http://[^"]*"', b'location="http://127.0.0.1:9/turtlesim"', response.body)
 
 
 def _inline_no_target(root: Any) -> None:
@@ -177,115 +177,119 @@ def _inline_no_target(root: Any) -> None:
         schema.addnext(made)
 
 
-def _fault(name: str, says: str, id_: str, make: Any) -> Fault:
-    return Fault(name, says, (f"describe/{id_}",), "soap", make)
+def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
+    return Mutant(name, says, (f"describe/{id_}",), "soap", make)
 
 
 _OPERATION = f"{_W}portType/{_W}operation"
 _BINDING = f"{_W}binding"
 _TRANSPORT = f"{_BINDING}/{_S}binding"
 
-FAULTS = (
-    _fault(
+MUTANTS = (
+    _mutant(
         "wsdl-gone",
         "There is no WSDL: 404.",
         "wsdl",
-        lambda: lambda ask, forward: plain(404)(ask) if wsdls(ask) else forward(ask),
+        lambda: lambda request, forward: plain(404)(request) if wsdls(request) else forward(request),
     ),
-    _fault("wsdl-silent", "Asked for its WSDL, the robot hangs up.", "wsdl", lambda: _silent),
-    _fault("wsdl-broken", "The WSDL is not closed.", "wsdl", altered(_description, text(r"</[\w:]+>\s*$", ""))),
-    _fault("wsdl-import-gone", "What the WSDL imports is not there.", "wsdl", lambda: _broken_import),
-    _fault(
+    _mutant("wsdl-silent", "Asked for its WSDL, the robot hangs up.", "wsdl", lambda: _silent),
+    _mutant("wsdl-broken", "The WSDL is not closed.", "wsdl", altered(_description, text(r"</[\w:]+>\s*$", ""))),
+    _mutant("wsdl-import-gone", "What the WSDL imports is not there.", "wsdl", lambda: _broken_import),
+    _mutant(
         "wsdl-service-name",
         "The service has another name.",
         "wsdl-names",
         _edited(_all(f"{_W}service", _set("name", "TurtlebotOfficeService"))),
     ),
-    _fault(
+    _mutant(
         "wsdl-port-name",
         "The port has another name.",
         "wsdl-names",
         _edited(_all(f"{_W}service/{_W}port", _set("name", "Port"))),
     ),
-    _fault(
+    _mutant(
         "wsdl-namespace",
         "The target namespace is the second listing's.",
         "wsdl-names",
         _edited(_set("targetNamespace", "http://ros-ws.org")),
     ),
-    _fault(
+    _mutant(
         "wsdl-operation-lost",
         "The WSDL lacks an operation.",
         "wsdl-operations",
         _edited(_operation_lost),
     ),
-    _fault(
+    _mutant(
         "wsdl-part-name",
         "A message's part has another name.",
         "wsdl-operations",
         _edited(_all(f"{_W}message/{_W}part", _set("name", "body"))),
     ),
-    _fault("wsdl-float", "A double is a float in the schema.", "wsdl-types", _typed(_first_double("float"))),
-    _fault("wsdl-order", "The schema has its elements in another order.", "wsdl-types", _typed(_reordered)),
-    _fault("wsdl-optional", "An element is optional in the schema.", "wsdl-types", _typed(_optional)),
-    _fault(
+    _mutant("wsdl-float", "A double is a float in the schema.", "wsdl-types", _typed(_first_double("float"))),
+    _mutant("wsdl-order", "The schema has its elements in another order.", "wsdl-types", _typed(_reordered)),
+    _mutant("wsdl-optional", "An element is optional in the schema.", "wsdl-types", _typed(_optional)),
+    _mutant(
         "wsdl-action",
         "wsam:Action is something else.",
         "wsdl-action",
         altered(_description, text(r'(:Action=["\'])[^"\']*', r"\1urn:drive")),
     ),
-    _fault("wsdl-address", "The address in the WSDL leads nowhere.", "wsdl-address", altered(_description, _elsewhere)),
-    _fault("wsdl-import-in-types", "xsd:import stands in wsdl:types itself.", "wsdl-R2003", _edited(_import_in_types)),
-    _fault("wsdl-strange-element", "The WSDL has an element that WSDL does not know.", "wsdl-R2028", _edited(_strange)),
-    _fault(
+    _mutant(
+        "wsdl-address", "The address in the WSDL leads nowhere.", "wsdl-address", altered(_description, _elsewhere)
+    ),
+    _mutant("wsdl-import-in-types", "xsd:import stands in wsdl:types itself.", "wsdl-R2003", _edited(_import_in_types)),
+    _mutant(
+        "wsdl-strange-element", "The WSDL has an element that WSDL does not know.", "wsdl-R2028", _edited(_strange)
+    ),
+    _mutant(
         "wsdl-no-target",
         "A schema has no targetNamespace.",
         "wsdl-R2105",
         altered(_description, tree(_inline_no_target)),
     ),
-    _fault("wsdl-two-parts", "A body names two parts.", "wsdl-R2201", _edited(_two_parts)),
-    _fault(
+    _mutant("wsdl-two-parts", "A body names two parts.", "wsdl-R2201", _edited(_two_parts)),
+    _mutant(
         "wsdl-type-part",
         "A part has a type in place of an element.",
         "wsdl-R2204",
         _edited(_first(f"{_W}message/{_W}part", _typed_part)),
     ),
-    _fault(
+    _mutant(
         "wsdl-part-of-nothing",
         "A part refers to an element that does not exist.",
         "wsdl-R2206",
         _edited(_first(f"{_W}message/{_W}part", lambda node: node.set("element", f"{_prefix(node)}:NothingAtAll"))),
     ),
-    _fault(
+    _mutant(
         "wsdl-operation-twice", "A port type has an operation twice.", "wsdl-R2304", _edited(_first(_OPERATION, _twice))
     ),
-    _fault("wsdl-soap12", "The binding is one of SOAP 1.2.", "wsdl-R2401", altered(_description, _soap12)),
-    _fault(
+    _mutant("wsdl-soap12", "The binding is one of SOAP 1.2.", "wsdl-R2401", altered(_description, _soap12)),
+    _mutant(
         "wsdl-no-transport",
         "The binding names no transport.",
         "wsdl-R2701",
         _edited(_all(_TRANSPORT, lambda node: node.attrib.pop("transport", None))),
     ),
-    _fault(
+    _mutant(
         "wsdl-smtp",
         "The transport is SMTP.",
         "wsdl-R2702",
         _edited(_all(_TRANSPORT, _set("transport", "http://schemas.xmlsoap.org/soap/smtp"))),
     ),
-    _fault(
+    _mutant(
         "wsdl-mixed-styles",
         "One operation is of style rpc.",
         "wsdl-R2705",
         _edited(_first(f"{_BINDING}/{_W}operation/{_S}operation", _set("style", "rpc"))),
     ),
-    _fault(
+    _mutant(
         "wsdl-encoded",
         "A body is encoded.",
         "wsdl-R2706",
         _edited(_first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("use", "encoded"))),
     ),
-    _fault("wsdl-same-signature", "Two operations have the same element.", "wsdl-R2710", _edited(_same_element)),
-    _fault(
+    _mutant("wsdl-same-signature", "Two operations have the same element.", "wsdl-R2710", _edited(_same_element)),
+    _mutant(
         "wsdl-body-namespace",
         "A body has a namespace attribute.",
         "wsdl-R2716",
@@ -295,17 +299,17 @@ FAULTS = (
             )
         ),
     ),
-    _fault(
+    _mutant(
         "wsdl-binding-short",
         "The binding lacks an operation of its port type.",
         "wsdl-R2718",
         _edited(_first(f"{_BINDING}/{_W}operation", _removed)),
     ),
-    _fault(
+    _mutant(
         "wsdl-old-schema",
         "Types are described in XML Schema of 1999.",
         "wsdl-R2801",
         altered(wsdls, text(re.escape(_XSD), "http://www.w3.org/1999/XMLSchema")),
     ),
-    _fault("wsdl-latin", "The WSDL is ISO 8859-1.", "wsdl-R4003", altered(_description, _latin)),
+    _mutant("wsdl-latin", "The WSDL is ISO 8859-1.", "wsdl-R4003", altered(_description, _latin)),
 )

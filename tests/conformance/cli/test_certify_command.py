@@ -16,7 +16,7 @@ import pytest
 
 from conformance import selftest
 
-_STRANGERS = Path(selftest.__file__).parent / "independent_robots"
+_INDEPENDENT_ROBOTS = Path(selftest.__file__).parent / "independent_robots"
 
 
 def _certify(tmp_path, *arguments):
@@ -93,7 +93,7 @@ def test_a_first_statement_is_written_and_can_be_used(tmp_path, web_server):
 
 
 @contextmanager
-def _stranger(name):
+def _independent_robot(name):
     command = [
         sys.executable,
         "-m",
@@ -111,7 +111,7 @@ def _stranger(name):
             rest, soap = (word.split("=", 1)[1] for word in words[1:3])
             where = ["--rest", rest, "--publishers-wsdl", soap]
             where += ["--subscribers-wsdl", soap.replace("publisher", "subscriber")]
-            yield process, rest, [str(_STRANGERS / name / f"{name}.toml"), *where]
+            yield process, rest, [str(_INDEPENDENT_ROBOTS / name / f"{name}.toml"), *where]
         finally:
             process.kill()
 
@@ -124,7 +124,7 @@ def _until(process, text):
 
 
 def test_a_robot_that_dies_in_mid_run_is_judged_as_far_as_it_came(tmp_path):
-    with _stranger("baroque") as (robot, _, where):
+    with _independent_robot("baroque") as (robot, _, where):
         command = [sys.executable, "-m", "roaas", "certify", *where, "--allow-motion", "--out", str(tmp_path)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
             _until(run, "motion:")
@@ -140,7 +140,7 @@ def test_a_robot_that_dies_in_mid_run_is_judged_as_far_as_it_came(tmp_path):
 
 
 def test_an_interrupted_run_keeps_what_it_has_and_stops_the_robot(tmp_path):
-    with _stranger("baroque") as (_, rest, where):
+    with _independent_robot("baroque") as (_, rest, where):
         command = [sys.executable, "-m", "roaas", "certify", *where, "--allow-motion", "--out", str(tmp_path)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
             _until(run, "motion:")
@@ -162,7 +162,7 @@ def test_an_interrupted_run_keeps_what_it_has_and_stops_the_robot(tmp_path):
 
 def test_the_suite_runs_in_somebody_elses_project(tmp_path):
     (tmp_path / "test_own.py").write_text("def test_own(): pass\n", encoding="utf-8")
-    with _stranger("plain") as (_, rest, _):
+    with _independent_robot("plain") as (_, rest, _):
         command = [sys.executable, "-m", "pytest", "-q", "--pyargs", "conformance", "test_own.py"]
         command += ["--robot-rest", rest, "--robot-class", "rest-formats", "--robot-effort", "quick"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)

@@ -9,9 +9,9 @@ from conformance.cli.contract import contract
 from conformance.cli.selftest import selftest
 from conformance.contract.files import CONTRACT_FILES
 from conformance.selftest.certifying import Outcome
-from conformance.selftest.controls import Acquittal
-from conformance.selftest.mutant_run import Catch
-from conformance.selftest.mutants import FAULTS
+from conformance.selftest.controls import ControlResult
+from conformance.selftest.mutant_run import MutantResult
+from conformance.selftest.mutants import MUTANTS
 from conformance.selftest.report import Report
 
 
@@ -19,7 +19,7 @@ def run(command, *words):
     return CliRunner().invoke(command, list(words))
 
 
-def test_faults_are_listed():
+def test_mutants_are_listed():
     done = run(selftest, "--list", "--faults", "wsdl-*")
     assert done.exit_code == 0
     assert "wsdl-float" in done.output
@@ -39,7 +39,7 @@ def test_without_ros_it_says_what_to_do(monkeypatch):
     assert "--target baroque" in done.output
 
 
-def test_a_faulty_robot_is_caught_and_a_good_one_is_not_blamed(tmp_path):
+def test_a_mutant_is_caught_and_a_good_one_is_not_blamed(tmp_path):
     words = [
         "--target",
         "baroque",
@@ -64,12 +64,14 @@ def outcome(code, **verdicts):
     return Outcome(code, {id_.replace("_", "/", 1): value for id_, value in verdicts.items()}, reasons, 10, 1.0)
 
 
-def test_a_missed_fault_and_a_blamed_robot_are_told(tmp_path):
-    fault = FAULTS[0]
-    report = Report("reference", [Catch(fault, missed=fault.catches, reasons={fault.catches[0]: "pass: pass"})])
-    report.acquittals = [Acquittal("plain", "", 3, outcome(1, http_date="fail"))]
+def test_a_missed_mutant_and_a_blamed_robot_are_told(tmp_path):
+    mutant = MUTANTS[0]
+    report = Report(
+        "reference", [MutantResult(mutant, missed=mutant.catches, reasons={mutant.catches[0]: "pass: pass"})]
+    )
+    report.control_results = [ControlResult("plain", "", 3, outcome(1, http_date="fail"))]
     assert not report.holds
-    assert f"MISSED {fault.name}" in report.summary()
+    assert f"MISSED {mutant.name}" in report.summary()
     assert "BLAMED plain, seed 3, exit code 1: http/date: said" in report.summary()
     report.write(tmp_path)
     assert json.loads((tmp_path / "selftest.json").read_text())["holds"] is False
@@ -77,8 +79,8 @@ def test_a_missed_fault_and_a_blamed_robot_are_told(tmp_path):
 
 def test_nothing_tried_is_no_proof():
     assert not Report("reference").holds
-    assert Report("reference", acquittals=[Acquittal("plain", "", 0, outcome(0, http_date="pass"))]).holds
-    assert not Report("reference", acquittals=[Acquittal("plain", "", 0, outcome(4, http_date="skip"))]).holds
+    assert Report("reference", control_results=[ControlResult("plain", "", 0, outcome(0, http_date="pass"))]).holds
+    assert not Report("reference", control_results=[ControlResult("plain", "", 0, outcome(4, http_date="skip"))]).holds
 
 
 def test_requirements_are_listed():

@@ -60,7 +60,7 @@ REST_OF_THEM = (
 
 
 @pytest.mark.parametrize(("name", "seed"), [("plain", 1), ("baroque", 2)])
-def test_conforming_strangers(connected, run, name, seed):
+def test_conforming_independent_robots(connected, run, name, seed):
     rest, wsdl_url, stop = import_module(f"conformance.selftest.independent_robots.{name}").serve(0, 0)
     try:
         session = connected(rest, wsdl_url.rsplit("/", 1)[0], effort="quick")

@@ -15,7 +15,7 @@ from conformance.selftest.independent_robots.plain import serve as plain_robot
 from conformance.selftest.mutants.changes import altered, becomes, header, instead, plain, rest, rewritten, values
 from conformance.selftest.proxy import HangUpError, Proxy
 from conformance.selftest.variants import VARIANTS, certificate
-from conformance.selftest.wire import Answer, Ask
+from conformance.selftest.wire import Request, Response
 
 
 class Robot(BaseHTTPRequestHandler):
@@ -60,13 +60,13 @@ def proxy(robot):
     proxy.close()
 
 
-def ask(url, method="GET", path="/robot/pose/", body=None, **headers):
+def request(url, method="GET", path="/robot/pose/", body=None, **headers):
     where = urlsplit(url)
     connection = http.client.HTTPConnection(where.hostname, where.port, timeout=10)
     try:
         connection.request(method, where.path + path, body, headers)
-        answer = connection.getresponse()
-        return answer, answer.read()
+        response = connection.getresponse()
+        return response, response.read()
     finally:
         connection.close()
 
@@ -84,11 +84,11 @@ def raw(url, octets):
 
 
 def test_it_hands_on_and_puts_its_own_address_in(proxy, robot):
-    answer, body = ask(proxy.rest)
-    assert answer.status == 200
+    response, body = request(proxy.rest)
+    assert response.status == 200
     assert f"{proxy.rest}/here".encode() in body
     assert robot.seen == [("GET", "/robot/pose/", b"")]
-    assert ask(proxy.rest, "PUT", body=b"abc")[1] == b"abc"
+    assert request(proxy.rest, "PUT", body=b"abc")[1] == b"abc"
 
 
 def test_chunked_requests_are_handed_on(proxy, robot):
@@ -101,22 +101,22 @@ def test_chunked_requests_are_handed_on(proxy, robot):
 
 def test_answers_are_altered_where_they_should_be(proxy):
     proxy.change = altered(rest("GET", "/robot/pose/"), values(lambda value: value.update(x=2)))()
-    assert b'"x": 2' in ask(proxy.rest)[1]
-    assert b'"x": 1' in ask(proxy.rest, path="/robot/other/")[1]
+    assert b'"x": 2' in request(proxy.rest)[1]
+    assert b'"x": 1' in request(proxy.rest, path="/robot/other/")[1]
 
 
 def test_every_nth_is_altered_and_no_other(proxy):
     proxy.change = altered(rest("GET"), becomes(502), nth=3)()
-    assert [ask(proxy.rest)[0].status for _ in range(7)] == [200, 200, 502, 200, 200, 502, 200]
+    assert [request(proxy.rest)[0].status for _ in range(7)] == [200, 200, 502, 200, 200, 502, 200]
 
 
 def test_fields_and_requests_are_altered(proxy, robot):
     proxy.change = altered(rest("GET"), header("Content-Type", None))()
-    assert "Content-Type" not in ask(proxy.rest)[0].headers
+    assert "Content-Type" not in request(proxy.rest)[0].headers
     proxy.change = rewritten(rest("PUT"), lambda one: setattr(one, "body", b"other"))()
-    assert ask(proxy.rest, "PUT", body=b"abc")[1] == b"other"
+    assert request(proxy.rest, "PUT", body=b"abc")[1] == b"other"
     proxy.change = instead(rest("PUT"), plain(418))()
-    assert ask(proxy.rest, "PUT", body=b"abc")[0].status == 418
+    assert request(proxy.rest, "PUT", body=b"abc")[0].status == 418
     assert [method for method, _, _ in robot.seen] == ["GET", "PUT"]
 
 
@@ -126,12 +126,12 @@ def test_hanging_up_answers_nothing(proxy):
 
     proxy.change = change
     with pytest.raises(http.client.RemoteDisconnected):
-        ask(proxy.rest)
+        request(proxy.rest)
 
 
 def test_octets_can_be_sent_as_they_are(proxy):
-    proxy.change = lambda one, _forward: Answer(
-        200, raw=b"HTTP/1.1 200 OK\r\nContent-Length: 9\r\n\r\nshort", asked=one.method
+    proxy.change = lambda one, _forward: Response(
+        200, raw=b"HTTP/1.1 200 OK\r\nContent-Length: 9\r\n\r\nshort", method=one.method
     )
     assert raw(proxy.rest, b"GET / HTTP/1.1\r\nHost: a\r\n\r\n").endswith(b"\r\n\r\nshort")
 
@@ -149,15 +149,15 @@ def test_what_is_no_http_reaches_the_robot():
 def test_a_broken_change_is_told(proxy):
     proxy.change = lambda _ask, _forward: {}["nothing"]
     with pytest.raises(http.client.RemoteDisconnected):
-        ask(proxy.rest)
+        request(proxy.rest)
     assert proxy.broken[0].startswith("KeyError: 'nothing'")
 
 
 def test_a_request_that_ends_in_the_middle_is_torn(proxy, robot):
-    torn = []
-    proxy.torn = lambda side, got, _forward: torn.append((side, got))
+    incomplete_request = []
+    proxy.incomplete_request = lambda side, got, _forward: incomplete_request.append((side, got))
     raw(proxy.rest, b"PUT /p HTTP/1.1\r\nHost: a\r\nContent-Length: 10\r\n\r\nabc")
-    assert torn == [("rest", b"abc")]
+    assert incomplete_request == [("rest", b"abc")]
     assert robot.seen == []
 
 
@@ -177,9 +177,9 @@ def test_a_prefix_is_taken_off(robot):
     proxy = Proxy(robot.url, robot.url, prefix="/r2d2/api")
     try:
         assert proxy.rest.endswith("/r2d2/api")
-        assert ask(proxy.rest)[0].status == 200
+        assert request(proxy.rest)[0].status == 200
         assert robot.seen == [("GET", "/robot/pose/", b"")]
-        assert ask(proxy.rest.removesuffix("/r2d2/api"))[0].status == 404
+        assert request(proxy.rest.removesuffix("/r2d2/api"))[0].status == 404
     finally:
         proxy.close()
 
@@ -201,11 +201,11 @@ def test_it_speaks_tls_with_a_certificate_of_its_own(robot, tmp_path):
 def test_the_token_variant_asks_as_rfc_9110_has_it(proxy):
     variant = next(one for one in VARIANTS if one.name == "token")
     proxy.change = variant.make()
-    answer, _ = ask(proxy.rest)
-    assert (answer.status, "WWW-Authenticate" in answer.headers) == (401, True)
-    assert ask(proxy.rest, Authorization=f"Bearer {variant.token}")[0].status == 200
+    response, _ = request(proxy.rest)
+    assert (response.status, "WWW-Authenticate" in response.headers) == (401, True)
+    assert request(proxy.rest, Authorization=f"Bearer {variant.token}")[0].status == 200
 
 
 def test_a_request_keeps_contradicting_lengths():
-    one = Ask("rest", "PUT", "/", fields=[("Content-Length", "3"), ("Content-Length", "4")], body=b"abc")
+    one = Request("rest", "PUT", "/", fields=[("Content-Length", "3"), ("Content-Length", "4")], body=b"abc")
     assert one.wire().count(b"Content-Length") == 2

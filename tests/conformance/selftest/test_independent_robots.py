@@ -1,4 +1,4 @@
-"""The strangers keep the contract: shown by a few direct assertions, not by the suite that is tested with them."""
+"""The independent robots keep the contract: shown by direct assertions, not by the suite that is tested with them."""
 
 import http.client
 import itertools
@@ -239,7 +239,7 @@ def test_legacy_is_as_lenient_as_java(legacy):
     assert etree.fromstring(legacy.describe("xsd=1")[1]).tag == "{http://www.w3.org/2001/XMLSchema}schema"
 
 
-def test_a_stranger_starts_and_stops_as_a_process():
+def test_an_independent_robot_starts_and_stops_as_a_process():
     command = [sys.executable, "-m", "conformance.selftest.independent_robots", "legacy"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:

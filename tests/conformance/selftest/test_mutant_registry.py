@@ -1,4 +1,4 @@
-"""Ledger, checks, faults and the coverage page agree."""
+"""Ledger, checks, mutants and the coverage page agree."""
 
 from pathlib import Path
 
@@ -7,12 +7,12 @@ import pytest
 from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import load_ledger
 from conformance.selftest import coverage
-from conformance.selftest.mutants import FAULTS
+from conformance.selftest.mutants import MUTANTS
 
 ROOT = Path(coverage.__file__).parents[2]
 
 
-def test_ledger_checks_and_faults_agree():
+def test_ledger_checks_and_mutants_agree():
     assert coverage.disagreements() == []
 
 
@@ -21,28 +21,28 @@ def test_page_is_up_to_date():
     assert there == coverage.page(), "run: roaas contract coverage --out docs/coverage.md"
 
 
-def test_every_must_and_should_has_a_faulty_robot():
-    shown = {id_ for fault in FAULTS for id_ in fault.catches}
+def test_every_must_and_should_has_a_mutant():
+    shown = {id_ for mutant in MUTANTS for id_ in mutant.catches}
     ledger = load_ledger(CONTRACT_DIR / "requirements.toml").values()
     assert [item.id for item in ledger if item.level != "MAY" and not item.untestable and item.id not in shown] == []
 
 
 def test_there_are_many_and_each_has_its_own_name():
-    assert len(FAULTS) >= 80
-    assert len({fault.name for fault in FAULTS}) == len(FAULTS)
+    assert len(MUTANTS) >= 80
+    assert len({mutant.name for mutant in MUTANTS}) == len(MUTANTS)
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
-def test_fault_is_well_made(fault):
-    assert fault.interface in {"rest", "soap", "both"}
-    assert fault.catches
-    assert fault.says.endswith(".")
-    assert callable(fault.make())
-    assert fault.torn is None or callable(fault.torn())
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
+def test_mutant_is_well_made(mutant):
+    assert mutant.interface in {"rest", "soap", "both"}
+    assert mutant.catches
+    assert mutant.says.endswith(".")
+    assert callable(mutant.make())
+    assert mutant.incomplete_request is None or callable(mutant.incomplete_request())
 
 
 def test_each_run_gets_a_change_of_its_own():
-    changes = [fault.make() for fault in FAULTS if fault.name == "pose-stamp-backwards" for _ in range(2)]
+    changes = [mutant.make() for mutant in MUTANTS if mutant.name == "pose-stamp-backwards" for _ in range(2)]
     assert changes[0] is not changes[1]
 
 
