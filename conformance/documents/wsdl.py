@@ -16,7 +16,6 @@ from lxml import etree
 from conformance.documents.wsdl_imports import Collected, Fetch, collect
 from conformance.documents.xml_names import WSAM, WSAW, WSDL, WSDL_SOAP, clark
 from conformance.documents.xsd import SchemaDocument, SchemaError, Types
-from conformance.documents.xsd_shapes import shape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -142,7 +141,7 @@ class Description:
         Raises:
             SchemaError: the schemas do not compile.
         """
-        return shape(self.types, tag)
+        return self.types.shape(tag)
 
     def message(self, reference: str | None) -> etree._Element | None:
         """The wsdl:message that a QName refers to; prefixes are not looked at, names are unique in practice."""

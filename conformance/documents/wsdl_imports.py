@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urljoin
 
+from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xsd import SchemaDocument
-from conformance.soap.envelope import NotXmlError, parse
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -43,9 +43,10 @@ def collect(wsdl: bytes, location: str, fetch: Fetch) -> Collected:
         ValueError: the first one is no WSDL; the message says why.
     """
     try:
-        root = parse(wsdl)
+        # WSDL 1.1 forbids no DOCTYPE: that one is there blames nobody, and nothing of it is read.
+        root = parse(wsdl, doctype=True)
     except NotXmlError as error:
-        raise ValueError(f"no well-formed XML: {error}") from error
+        raise ValueError(str(error)) from error
     if root.tag != clark(WSDL, "definitions"):
         raise ValueError(f"its document element is {root.tag}, not wsdl:definitions")
     found = Collected()
@@ -62,7 +63,7 @@ def collect(wsdl: bytes, location: str, fetch: Fetch) -> Collected:
                 found.missing[target] = f"more than {_MOST} documents"
                 return found
             try:
-                waiting.append((target, parse(fetch(target))))
+                waiting.append((target, parse(fetch(target), doctype=True)))
             except (OSError, ValueError) as error:
                 found.missing[target] = str(error) or type(error).__name__
     return found

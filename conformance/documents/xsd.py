@@ -15,11 +15,10 @@ import xmlschema
 from lxml import etree
 
 from conformance.documents.xml_names import XSD, clark
+from conformance.documents.xsd_shapes import Element, shape
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-
-    from conformance.documents.xsd_shapes import Element
 
 _IMPORT: Final = clark(XSD, "import")
 _INCLUDE: Final = clark(XSD, "include")
@@ -65,12 +64,11 @@ class Types:
         self.libxml: etree.XMLSchema | None = None
         self.python: Any = None
         self.problems: list[str] = []
-        # Of global elements, by tag (see shapes).
-        self.shapes: dict[str, Element | None] = {}
+        self._shapes: dict[str, Element | None] = {}
         with tempfile.TemporaryDirectory(prefix="roaas-xsd-") as folder:
             entry = _assemble(documents, Path(folder))
             try:
-                self.libxml = etree.XMLSchema(etree.parse(entry, etree.XMLParser(no_network=True)))
+                self.libxml = etree.XMLSchema(file=str(entry))
             except etree.LxmlError as error:
                 self.problems.append(f"libxml2: {str(error)[:_SHOWN]}")
             try:
@@ -91,6 +89,13 @@ class Types:
         if key not in _COMPILED:
             _COMPILED[key] = cls(documents)
         return _COMPILED[key]
+
+    def shape(self, tag: str) -> Element | None:
+        """The global element of that name, or None where the schemas have none."""
+        if tag not in self._shapes:
+            declared = self.python.maps.elements.get(tag)
+            self._shapes[tag] = None if declared is None else shape(declared)
+        return self._shapes[tag]
 
     def libxml_problem(self, element: etree._Element) -> str:
         """Why libxml2 finds the element invalid; empty where it finds it valid, or does not know the schema."""
@@ -149,7 +154,7 @@ def _assemble(documents: Sequence[SchemaDocument], folder: Path) -> Path:
 
 def _relocated(schema: etree._Element, collected: dict[str, str]) -> bytes:
     """A document whose imports point at the collected files, and whose includes are left to those."""
-    root = etree.fromstring(etree.tostring(schema))
+    root = copy.deepcopy(schema)
     for reference in [*root.iter(_IMPORT), *root.iter(_INCLUDE)]:
         space = reference.get("namespace") or ""
         if reference.tag == _INCLUDE:
@@ -158,7 +163,7 @@ def _relocated(schema: etree._Element, collected: dict[str, str]) -> bytes:
             reference.set("schemaLocation", collected[space])
         elif "schemaLocation" in reference.attrib:
             del reference.attrib["schemaLocation"]
-    return etree.tostring(root)
+    return etree.tostring(root, with_tail=False)
 
 
 def _schema_of(space: str, *, includes: Sequence[str], imports: Mapping[str, str] | None = None) -> bytes:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from conformance.documents.xml_names import XSD, clark
 
 if TYPE_CHECKING:
-    from conformance.documents.xsd import Types
+    from collections.abc import Iterator
 
 # A type that holds itself is followed this deep.
 _DEEPEST: Final = 12
@@ -51,6 +51,11 @@ class Group:
     minimum: int = 1
     maximum: int | None = 1
 
+    def elements(self) -> Iterator[Element]:
+        """The elements of this group and of those in it."""
+        for item in self.items:
+            yield from (item,) if isinstance(item, Element) else item.elements()
+
 
 @dataclass(frozen=True)
 class Complex:
@@ -91,25 +96,11 @@ class Element:
         """The element particles right inside, groups flattened."""
         if isinstance(self.type, Simple) or self.type.content is None:
             return ()
-        return _flat(self.type.content)
+        return tuple(self.type.content.elements())
 
 
-def _flat(group: Group) -> tuple[Element, ...]:
-    found: list[Element] = []
-    for item in group.items:
-        found += [item] if isinstance(item, Element) else _flat(item)
-    return tuple(found)
-
-
-def shape(types: Types, tag: str) -> Element | None:
-    """The global element of that name, or None where the schema has none."""
-    if tag not in types.shapes:
-        declared = types.python.maps.elements.get(tag)
-        types.shapes[tag] = None if declared is None else _element(declared, 0)
-    return types.shapes[tag]
-
-
-def _element(declared: Any, depth: int) -> Element:
+def shape(declared: Any, depth: int = 0) -> Element:
+    """What an element declaration of xmlschema allows; ``depth`` is how many elements it is in already."""
     space, _, name = str(declared.name).rpartition("}")
     tag = str(declared.name) if space else name
     return Element(
@@ -145,7 +136,7 @@ def _group(declared: Any, depth: int) -> Group:
         if hasattr(item, "model"):
             items.append(_group(item, depth))
         elif type(item).__name__ != "XsdAnyElement":
-            items.append(_element(item, depth + 1))
+            items.append(shape(item, depth + 1))
     return Group(declared.model, tuple(items), declared.min_occurs, declared.max_occurs)
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 from xml.sax.saxutils import escape
 
+from conformance.documents.xml import elements
 from conformance.documents.xml_names import local
 from conformance.robot.delivery import COFFEE, Delivery
-from conformance.soap.envelope import Envelope, elements, read_answer
+from conformance.soap.envelope import Envelope, read_answer
 
 if TYPE_CHECKING:
     from lxml import etree

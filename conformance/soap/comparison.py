@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from conformance.documents.wsdl import DescriptionError, name
 from conformance.documents.xml_names import WSDL, WSDL_SOAP, clark, local
 from conformance.documents.xsd import SchemaError
-from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
+from conformance.documents.xsd_shapes import Complex, Element, Simple
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -124,7 +124,7 @@ def _element(wanted: Element, found: Element, where: str) -> Iterator[str]:
     if isinstance(wanted.type, Simple) or isinstance(found.type, Simple):
         yield from _simple(wanted.type, found.type, where)
         return
-    here, there = _content(wanted.type), _content(found.type)
+    here, there = wanted.children, found.children
     if [child.tag for child in here] != [child.tag for child in there]:
         yield f"{where} holds {_listed(there)}, not {_listed(here)}"
         return
@@ -141,19 +141,6 @@ def _simple(wanted: Simple | Complex, found: Simple | Complex, where: str) -> It
         yield f"{where} is of type {found.builtin}, not {wanted.builtin}"
     elif wanted.enumeration and sorted(wanted.enumeration) != sorted(found.enumeration):
         yield f"{where} takes {', '.join(found.enumeration) or 'anything'}, not {', '.join(wanted.enumeration)}"
-
-
-def _content(kind: Simple | Complex) -> tuple[Element, ...]:
-    if isinstance(kind, Simple) or kind.content is None:
-        return ()
-    return _flat(kind.content)
-
-
-def _flat(group: Group) -> tuple[Element, ...]:
-    found: list[Element] = []
-    for item in group.items:
-        found += [item] if isinstance(item, Element) else _flat(item)
-    return tuple(found)
 
 
 def _model(kind: Complex | Simple) -> str:

@@ -9,10 +9,10 @@ import math
 import re
 from typing import TYPE_CHECKING, Final
 
+from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import local
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS
 from conformance.documents.xsd_shapes import Element, Simple
-from conformance.soap.envelope import elements, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 from conformance.documents import xsd_lexical as lexical
+from conformance.documents.xml import parse
 from conformance.documents.xml_names import XSI, clark, local, namespace
 from conformance.documents.xml_node import Node
-from conformance.soap.envelope import parse
 from conformance.soap.messages import declarations, sequences, simple_leaves, with_text
 
 if TYPE_CHECKING:

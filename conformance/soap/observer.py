@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 from lxml import etree
 
+from conformance.documents.xml import NotXmlError, elements, has_doctype, parse
 from conformance.documents.xml_names import ENVELOPE, clark, local, namespace
-from conformance.soap.envelope import Envelope, Fault, NotSoapError, NotXmlError, elements, parse, read_root
+from conformance.soap.envelope import Envelope, Fault, NotSoapError, read_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from conformance.transport.exchange import Exchange, Response
     from conformance.verdict.evidence import Judge
 
-# BP 1.1 4.1.? R1012; ASCII is a part of UTF-8.
+# BP 1.1 R1012; ASCII is a part of UTF-8.
 _ENCODINGS: Final = frozenset({"", "utf-8", "utf8", "utf-16", "utf-16le", "utf-16be", "us-ascii", "ascii"})
 _ENCODING_STYLE: Final = clark(ENVELOPE, "encodingStyle")
 _MUST_UNDERSTAND: Final = clark(ENVELOPE, "mustUnderstand")
@@ -88,7 +89,7 @@ class SoapObserver:
         claims_xml = response.media_type == "text/xml"
         encoding = _encoding(response)
         try:
-            root = parse(response.body)
+            root = parse(response.body, doctype=True)
         except NotXmlError as error:
             problem = str(error)
             if claims_xml:
@@ -100,7 +101,7 @@ class SoapObserver:
                 not (response.ok or claims_xml),
                 exchange,
                 "a SOAP message as text/xml",
-                lambda: f"{exchange.came}, and the body is no XML ({problem})",
+                lambda: f"{exchange.came}, and the body is {problem}",
             )
             return
         if local(str(root.tag)) != "Envelope":
@@ -121,7 +122,7 @@ class SoapObserver:
         that = self._that
         that("content-type", response.media_type == "text/xml", exchange, "text/xml", lambda: _type(response))
         that("R1012", encoding in _ENCODINGS, exchange, "UTF-8 or UTF-16", lambda: f"the encoding {encoding!r}")
-        that("R1008", root.getroottree().docinfo.internalDTD is None, exchange, "no DOCTYPE", lambda: "a DOCTYPE")
+        that("R1008", not has_doctype(root), exchange, "no DOCTYPE", lambda: "a DOCTYPE")
         that("R1009", not _has_instruction(root), exchange, "no processing instruction", lambda: "one")
         try:
             message = read_root(root)

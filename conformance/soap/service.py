@@ -13,8 +13,8 @@ from urllib.parse import urlsplit
 
 from conformance.contract.statement import StatementError
 from conformance.documents.wsdl import Description, DescriptionError, describe, faults, read_file
+from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL_SOAP, clark
-from conformance.soap.envelope import NotXmlError, parse
 from conformance.transport.client import Connection, HttpClient, NoAnswerError
 
 if TYPE_CHECKING:
@@ -225,7 +225,7 @@ def _obtain(name: str, wsdl: str, connection: Connection) -> tuple[bytes | None,
 def _address(document: bytes) -> str | None:
     """The first soap:address in a WSDL, however broken the WSDL is otherwise."""
     try:
-        root = parse(document)
+        root = parse(document, doctype=True)
     except NotXmlError:
         return None
     for element in root.iter(clark(WSDL_SOAP, "address")):

@@ -6,6 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, Final
 
 from conformance.documents.wsdl import name, qname
+from conformance.documents.xml import elements
 from conformance.documents.xml_names import WSDL, WSDL_SOAP, XSD, clark, local, namespace
 from conformance.documents.xsd import SchemaError
 
@@ -48,10 +49,6 @@ _ATTRIBUTES: Final[dict[str, tuple[str, ...]]] = {
 _ORDER: Final = {"import": 0, "types": 1}
 
 
-def _inside(element: etree._Element) -> list[etree._Element]:
-    return [child for child in element if isinstance(child.tag, str)]
-
-
 def r2003(description: Description) -> Iterator[str]:
     """Types with XML Schema, and xsd:import only inside xsd:schema."""
     if not description.schemas:
@@ -65,7 +62,7 @@ def r2003(description: Description) -> Iterator[str]:
 def r2028(description: Description) -> Iterator[str]:
     """The structure that the schema of WSDL 1.1 and R2022, R2023 allow."""
     for root in description.definitions:
-        ranks = [_ORDER.get(local(str(child.tag)), 2) for child in _inside(root) if _is_part(child)]
+        ranks = [_ORDER.get(local(str(child.tag)), 2) for child in elements(root) if _is_part(child)]
         if ranks != sorted(ranks):
             yield "wsdl:import comes first, then wsdl:types, then the rest"
         for element in root.iter():
@@ -87,7 +84,7 @@ def _structure(element: etree._Element) -> Iterator[str]:
     for attribute in _ATTRIBUTES.get(kind, ()):
         if not element.get(attribute):
             yield f"wsdl:{kind} without {attribute}"
-    for child in _inside(element):
+    for child in elements(element):
         if namespace(str(child.tag)) == WSDL and local(str(child.tag)) not in _CHILDREN[kind]:
             yield f"wsdl:{local(str(child.tag))} in wsdl:{kind}"
 
@@ -98,7 +95,7 @@ def r2105(description: Description) -> Iterator[str]:
         if document.inline and not document.namespace:
             declared = [
                 str(child.tag)
-                for child in _inside(document.root)
+                for child in elements(document.root)
                 if child.tag not in {clark(XSD, "import"), clark(XSD, "annotation")}
             ]
             if declared:
@@ -232,7 +229,7 @@ def r2718(description: Description) -> Iterator[str]:
 def r2801(description: Description) -> Iterator[str]:
     """XML Schema 1.0."""
     for types in description.all("w:types"):
-        for child in _inside(types):
+        for child in elements(types):
             if child.tag not in {clark(XSD, "schema"), clark(WSDL, "documentation")}:
                 yield f"{child.tag} in wsdl:types"
     try:

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xml_node import Node
 from conformance.soap.callable_services import askable, rounds
 from conformance.soap.calls import Answer, ask, call, read_exchange
-from conformance.soap.envelope import NotXmlError, envelope, parse
+from conformance.soap.envelope import envelope
 from conformance.soap.valid_messages import quiet_example
 from conformance.transport.client import NoAnswerError
 
@@ -151,7 +152,7 @@ def test_methods(roaas: Session, judge: Judge, effort: Effort) -> None:
 def _is_description(exchange: Exchange) -> bool:
     """Whether an answer is a WSDL or a schema."""
     try:
-        root = parse(exchange.response.body if exchange.response is not None else b"")
+        root = parse(exchange.response.body if exchange.response is not None else b"", doctype=True)
     except NotXmlError:
         return False
     return root.tag in {clark(WSDL, "definitions"), clark(XSD, "schema")}

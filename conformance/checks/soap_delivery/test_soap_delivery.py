@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import strategies as st
 
+from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import ADDRESSING, clark, local
 from conformance.documents.xml_node import Node
 from conformance.soap import delivery_messages as paper
 from conformance.soap.callable_services import rounds
 from conformance.soap.calls import Answer, ask, call
-from conformance.soap.envelope import elements, envelope, text_of
+from conformance.soap.envelope import envelope
 from conformance.soap.forms import written_integer
 from conformance.soap.messages import variants, with_text
 from conformance.soap.xml_style import single_changes, spell, syntaxes

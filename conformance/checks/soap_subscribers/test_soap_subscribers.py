@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.documents.xml import text_of
 from conformance.documents.xml_names import clark, local
 from conformance.documents.xml_node import Node
 from conformance.soap import content
 from conformance.soap import delivery_messages as paper
 from conformance.soap.calls import Answer, call
-from conformance.soap.envelope import text_of
 
 if TYPE_CHECKING:
     from lxml import etree

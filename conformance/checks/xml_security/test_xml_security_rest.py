@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.documents.xml import NotXmlError, elements, parse, text_of
 from conformance.documents.xml_node import Node
 from conformance.soap.attack_runner import Siege, judge_calls, outcome
 from conformance.soap.attacks import VALUE, Attack, Carrier, attacks
 from conformance.soap.callback_server import Trap
-from conformance.soap.envelope import NotXmlError, elements, parse, text_of
 from conformance.transport.client import HttpClient
 
 if TYPE_CHECKING:

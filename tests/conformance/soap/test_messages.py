@@ -11,11 +11,11 @@ from lxml import etree
 
 from conformance.contract.files import CONTRACT_DIR
 from conformance.documents.wsdl import read_file
+from conformance.documents.xml import parse
 from conformance.documents.xml_names import clark
 from conformance.documents.xsd import SchemaDocument, Types
 from conformance.documents.xsd_lexical import plain, unreadable
-from conformance.documents.xsd_shapes import shape
-from conformance.soap.envelope import envelope, parse, read
+from conformance.soap.envelope import envelope, read
 from conformance.soap.forms import written_float, written_integer
 from conformance.soap.messages import ordinary, simple_leaves, variants, with_text
 from conformance.soap.mutations import invalid_ones, mutants
@@ -39,7 +39,7 @@ XSD = b"""<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:t="urn:t"
   <xs:complexType name="Milk"><xs:simpleContent><xs:extension base="xs:double"/></xs:simpleContent></xs:complexType>
 </xs:schema>"""
 TYPES = Types([SchemaDocument("order.xsd", etree.fromstring(XSD))])
-ORDER = shape(TYPES, clark("urn:t", "Order"))
+ORDER = TYPES.shape(clark("urn:t", "Order"))
 DELIVERY = read_file(CONTRACT_DIR / "publishers.wsdl")
 REQUEST = DELIVERY.shape(clark("http://soap.turtlebot.mybot.org/", "ExecuteDeliveryRequest"))
 
