@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from reference_robot.webservices.deliveries import Deliveries
-from reference_robot.webservices.goals import Goals
 from reference_robot.webservices.http.address import Address, url_of
-from reference_robot.webservices.plans import Planner
 from reference_robot.webservices.resources.delivery import Delivery, DeliveryList
 from reference_robot.webservices.resources.description import OpenApi, Wadl
 from reference_robot.webservices.resources.goal import Goal
@@ -18,10 +15,13 @@ from reference_robot.webservices.resources.pose import Pose
 from reference_robot.webservices.resources.velocity import LinearVelocity
 from reference_robot.webservices.resources.velocity import Velocity as VelocityResource
 from reference_robot.webservices.rest import RestInterface
+from reference_robot.webservices.robot.deliveries import Deliveries
+from reference_robot.webservices.robot.goals import Goals
+from reference_robot.webservices.robot.plans import Planner
+from reference_robot.webservices.robot.velocity import Velocity
 from reference_robot.webservices.soap.interface import SoapInterface
 from reference_robot.webservices.soap.publishers import PublishersWebService
 from reference_robot.webservices.soap.subscribers import SubscribersWebService
-from reference_robot.webservices.velocity import Velocity
 
 if TYPE_CHECKING:
     from reference_robot.webservices.configuration import Configuration

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.messages import Message, Request, Response
-from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.problems import Problem
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable

@@ -1,1 +1,1 @@
-"""What both interfaces share of HTTP: requests and answers, bearer tokens, and the connection's own limits."""
+"""What both interfaces share of HTTP: requests and answers, negotiation, tokens, and the connection's own limits."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hmac
 from typing import TYPE_CHECKING, Final
 
-from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.problems import Problem
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,8 +16,8 @@ from reference_robot.webservices.http.messages import (
     Send,
     content,
 )
-from reference_robot.webservices.negotiation import problem_format
-from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.http.negotiation import problem_format
+from reference_robot.webservices.representation.problems import Problem
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable

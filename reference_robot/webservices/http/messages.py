@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any, Final
 
-from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.problems import Problem
 
 BODY_LIMIT: Final = 1024 * 1024  # octets; the contract allows 64 KiB to 10 MiB
 

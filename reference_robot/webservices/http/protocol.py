@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol, RequestResponseCycle
 
 from reference_robot.webservices.http.messages import BODY_LIMIT
-from reference_robot.webservices.problems import PROBLEM_JSON, Problem
+from reference_robot.webservices.representation.problems import PROBLEM_JSON, Problem
 
 if TYPE_CHECKING:
     from asyncio import Transport

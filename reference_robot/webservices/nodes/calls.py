@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING, Any
 
-from reference_robot.webservices.problems import not_yet
+from reference_robot.webservices.representation.problems import not_yet
 
 if TYPE_CHECKING:
     from collections.abc import Callable

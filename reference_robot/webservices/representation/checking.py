@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.shapes import Real, Record, Series, Text, Truth, Whole
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import math
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from reference_robot.webservices.problems import not_yet
+from reference_robot.webservices.representation.problems import not_yet
 from reference_robot.webservices.representation.shapes import Record, Series, shape_of
 
 if TYPE_CHECKING:

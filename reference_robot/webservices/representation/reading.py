@@ -10,8 +10,8 @@ from collections import Counter
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
-from reference_robot.webservices.problems import Problem
 from reference_robot.webservices.representation.checking import checked, shown
+from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.shapes import Real, Record, Series, Text, Truth, Whole
 from reference_robot.webservices.representation.writing import JSON, XML
 from reference_robot.webservices.representation.xml_input import parsed

@@ -17,7 +17,7 @@ from typing import Final
 
 from lxml import etree
 
-from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.problems import Problem
 
 # The XML declaration; and a DOCTYPE that nothing but white space, comments and instructions precedes. Both match
 # possessively, so that no document makes them backtrack.

@@ -7,13 +7,12 @@ import re
 from typing import TYPE_CHECKING, ClassVar, Final
 from urllib.parse import unquote_to_bytes
 
-from reference_robot.webservices.deliveries import Deliveries, DeliveryRequest
 from reference_robot.webservices.nodes.publishers import (
     COFFEE_DELIVERY_MESSAGE_CODE,
     COURIER_DELIVERY_MESSAGE_CODE,
 )
-from reference_robot.webservices.problems import Problem
 from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.resources.resource import (
     NO_CONTENT,
@@ -21,6 +20,7 @@ from reference_robot.webservices.resources.resource import (
     represented,
     wanted_format,
 )
+from reference_robot.webservices.robot.deliveries import Deliveries, DeliveryRequest
 
 if TYPE_CHECKING:
     from reference_robot.webservices.http.messages import Request, Response

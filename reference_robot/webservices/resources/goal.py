@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from reference_robot.webservices.goals import GOAL, Goals
-from reference_robot.webservices.problems import Problem
+from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.resources.resource import (
     NO_CONTENT,
     Resource,
@@ -13,6 +12,7 @@ from reference_robot.webservices.resources.resource import (
     sent,
     wanted_format,
 )
+from reference_robot.webservices.robot.goals import GOAL, Goals
 
 if TYPE_CHECKING:
     from reference_robot.webservices.http.messages import Request, Response

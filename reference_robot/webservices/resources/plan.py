@@ -7,11 +7,11 @@ import re
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 from urllib.parse import unquote_to_bytes
 
-from reference_robot.webservices.plans import Planner, PlanQuery
-from reference_robot.webservices.problems import Problem
 from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
+from reference_robot.webservices.robot.plans import Planner, PlanQuery
 
 if TYPE_CHECKING:
     from reference_robot.webservices.http.messages import Request, Response

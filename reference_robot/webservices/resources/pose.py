@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from nav_msgs.msg import Odometry
 
-from reference_robot.webservices.problems import not_yet
 from reference_robot.webservices.representation.messages import reader_of
+from reference_robot.webservices.representation.problems import not_yet
 from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
 
 if TYPE_CHECKING:

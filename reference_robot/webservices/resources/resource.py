@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from reference_robot.webservices.http.messages import Request, Response, content
-from reference_robot.webservices.negotiation import chosen
+from reference_robot.webservices.http.negotiation import chosen
 from reference_robot.webservices.representation.reading import read
 from reference_robot.webservices.representation.writing import (
     JSON,

@@ -11,7 +11,7 @@ from reference_robot.webservices.resources.resource import Resource, represented
 
 if TYPE_CHECKING:
     from reference_robot.webservices.http.messages import Request, Response
-    from reference_robot.webservices.velocity import Velocity as RobotVelocity
+    from reference_robot.webservices.robot.velocity import Velocity as RobotVelocity
 
 
 class Velocity(Resource):

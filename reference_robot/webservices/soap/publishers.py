@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from reference_robot.webservices.deliveries import Deliveries, DeliveryRequest
 from reference_robot.webservices.nodes.publishers import COFFEE_DELIVERY_MESSAGE_CODE
 from reference_robot.webservices.resources.delivery import check
+from reference_robot.webservices.robot.deliveries import Deliveries, DeliveryRequest
 from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.faults import SOAP, client_fault
 from reference_robot.webservices.soap.service import SoapService

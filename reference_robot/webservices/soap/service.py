@@ -7,8 +7,8 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Final
 
 from reference_robot.webservices.http.messages import Request, Response, content
-from reference_robot.webservices.problems import Problem
 from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import parsed_content_type
 from reference_robot.webservices.representation.xml_input import parsed
 from reference_robot.webservices.soap.envelope import operation_element

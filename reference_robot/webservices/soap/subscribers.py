@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 from lxml import etree
 
-from reference_robot.webservices.plans import Planner, PlanQuery
 from reference_robot.webservices.representation.writing import element_of
+from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.faults import SOAP, client_fault
 from reference_robot.webservices.soap.service import SoapService
 
 if TYPE_CHECKING:
-    from reference_robot.webservices.goals import Goals
     from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
     from reference_robot.webservices.resources.pose import Pose
+    from reference_robot.webservices.robot.goals import Goals
+    from reference_robot.webservices.robot.velocity import Velocity
     from reference_robot.webservices.soap.service import Operation
-    from reference_robot.webservices.velocity import Velocity
 
 PATH: Final = "/turtlesim_subscriber_ws"
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import BatteryState, LaserScan
 
-from reference_robot.webservices.problems import Problem
 from reference_robot.webservices.representation.messages import message_from, reader_of
+from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import read
 from reference_robot.webservices.representation.shapes import Record, Series, shape_of
 from reference_robot.webservices.representation.writing import write_json, write_text, write_xml

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from geometry_msgs.msg import Twist
 
-from reference_robot.webservices.problems import Problem, not_yet
 from reference_robot.webservices.representation.messages import message_from, reader_of
+from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import shape_of
 
 if TYPE_CHECKING:

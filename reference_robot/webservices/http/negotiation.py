@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from reference_robot.webservices.problems import PROBLEM_JSON, PROBLEM_XML, Problem
+from reference_robot.webservices.representation.problems import PROBLEM_JSON, PROBLEM_XML, Problem
 from reference_robot.webservices.representation.writing import JSON, XML
 
 if TYPE_CHECKING:

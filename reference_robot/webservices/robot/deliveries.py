@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from mybot_delivery_app.msg import DeliveryRequestMsg
 
-from reference_robot.webservices.problems import not_yet
+from reference_robot.webservices.representation.problems import not_yet
 
 if TYPE_CHECKING:
     from reference_robot.webservices.nodes.publishers import RobotPublishersNode

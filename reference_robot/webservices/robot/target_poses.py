@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from geometry_msgs.msg import Pose
 
-from reference_robot.webservices.problems import Problem
 from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.representation.problems import Problem
 
 if TYPE_CHECKING:
     from reference_robot.names import Frames

@@ -15,10 +15,10 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Header
 
-from reference_robot.webservices.poses import require_pose
-from reference_robot.webservices.problems import Problem, not_yet
 from reference_robot.webservices.representation.messages import message_from, reader_of
+from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import Record, Text, shape_of
+from reference_robot.webservices.robot.target_poses import require_pose
 
 if TYPE_CHECKING:
     from reference_robot.names import Frames

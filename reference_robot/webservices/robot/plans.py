@@ -11,9 +11,9 @@ from nav2_msgs.action import ComputePathToPose
 from nav_msgs.msg import Path
 from nav_msgs.srv import GetPlan
 
-from reference_robot.webservices.poses import planar_pose, require_known_frame
-from reference_robot.webservices.problems import Problem, not_yet
 from reference_robot.webservices.representation.messages import reader_of
+from reference_robot.webservices.representation.problems import Problem, not_yet
+from reference_robot.webservices.robot.target_poses import planar_pose, require_known_frame
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import Pose
