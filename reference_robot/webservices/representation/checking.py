@@ -51,10 +51,10 @@ def _real(_shape: Real, plain: Any, where: str) -> float:
 
 
 def _whole(shape: Whole, plain: Any, where: str) -> int:
-    if type(plain) is float and plain.is_integer():
-        plain = int(plain)  # JSON knows one kind of number: 4.0 is 4
-    if type(plain) is int and shape.lowest <= plain <= shape.highest:
-        return plain
+    # JSON knows one kind of number: 4.0 is 4.
+    number = int(plain) if type(plain) is float and plain.is_integer() else plain
+    if type(number) is int and shape.lowest <= number <= shape.highest:
+        return number
     raise refused(where, plain, f"must be an integer from {shape.lowest} to {shape.highest}")
 
 

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import re
 from typing import TYPE_CHECKING, ClassVar, Final
 from urllib.parse import unquote_to_bytes
 
-from reference_robot.webservices.nodes.publishers import (
-    COFFEE_DELIVERY_MESSAGE_CODE,
-    COURIER_DELIVERY_MESSAGE_CODE,
-)
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import NUMBER
@@ -20,27 +15,27 @@ from reference_robot.webservices.resources.resource import (
     represented,
     wanted_format,
 )
-from reference_robot.webservices.robot.deliveries import Deliveries, DeliveryRequest
+from reference_robot.webservices.robot.deliveries import Deliveries, DeliveryRequest, UnusableFieldError
 
 if TYPE_CHECKING:
     from reference_robot.webservices.http.messages import Request, Response
 
-CODES: Final = frozenset({COURIER_DELIVERY_MESSAGE_CODE, COFFEE_DELIVERY_MESSAGE_CODE})
-
-_SEGMENT_NAMES: Final = ("depot_x", "depot_y", "dest_x", "dest_y", "source_x", "source_y")
+# The values of the path, in the order of the message's fields and by the path template's names.
+_COORDINATES: Final = ("depot_x", "depot_y", "dest_x", "dest_y", "source_x", "source_y")
+_NAMES: Final = ("code", *_COORDINATES)
 _PREFIX: Final = "/robot/app/delivery/"
-_ANY: Final = re.compile((f"{_PREFIX}([^/]*)" + "".join(f"/{name}/([^/]*)" for name in _SEGMENT_NAMES)).encode())
+_ANY: Final = re.compile((f"{_PREFIX}([^/]*)" + "".join(f"/{name}/([^/]*)" for name in _COORDINATES)).encode())
 _WELL_FORMED: Final = re.compile(
-    (f"{_PREFIX}([+-]?[0-9]{{1,40}})" + "".join(f"/{name}/({NUMBER})" for name in _SEGMENT_NAMES)).encode()
+    (f"{_PREFIX}([+-]?[0-9]{{1,40}})" + "".join(f"/{name}/({NUMBER})" for name in _COORDINATES)).encode()
 )
-_CODE: Final = re.compile(r"[+-]?[0-9]{1,40}")
-_NUMBER: Final = re.compile(NUMBER)
+_CODE: Final = re.compile(rb"[+-]?[0-9]{1,40}")
+_NUMBER: Final = re.compile(NUMBER.encode())
 
 
 class Delivery(Resource):
     """PUT publishes one DeliveryRequestMsg. The only resource with values in its path."""
 
-    path: ClassVar = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in _SEGMENT_NAMES)
+    path: ClassVar = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in _COORDINATES)
 
     def __init__(self, deliveries: Deliveries) -> None:
         self._deliveries = deliveries
@@ -53,21 +48,22 @@ class Delivery(Resource):
     def put(self, request: Request) -> Response:
         """Accept a delivery, 204; a body is ignored. 422 for codes other than 3 and 4 and for bad numbers."""
         match = _WELL_FORMED.fullmatch(request.path)
-        if match is None:
-            delivery = _spelled_out(request.path)
-        else:
-            code, depot_x, depot_y, dest_x, dest_y, source_x, source_y = match.groups()
-            delivery = DeliveryRequest(
-                int(code),
-                float(depot_x),
-                float(depot_y),
-                float(dest_x),
-                float(dest_y),
-                float(source_x),
-                float(source_y),
-            )
-        check(delivery)
-        self._deliveries.accept(delivery, "rest")
+        sent = _spelled_out(request.path) if match is None else match.groups()
+        code, depot_x, depot_y, dest_x, dest_y, source_x, source_y = sent
+        delivery = DeliveryRequest(
+            int(code),
+            float(depot_x),
+            float(depot_y),
+            float(dest_x),
+            float(dest_y),
+            float(source_x),
+            float(source_y),
+        )
+        try:
+            self._deliveries.accept(delivery, "rest")
+        except UnusableFieldError as error:
+            place = DeliveryRequest._fields.index(error.field)
+            raise error.refusal(_NAMES[place], _text(sent[place])) from error
         return NO_CONTENT
 
 
@@ -84,28 +80,19 @@ class DeliveryList(Resource):
         return represented(self._deliveries.listed(), "Deliveries", wanted_format(request))
 
 
-def check(request: DeliveryRequest) -> None:
-    """Raise the 422 for a code that is no delivery's and for a coordinate that is not finite."""
-    if request.message_code not in CODES:
-        raise Problem(422, f"code must be 3 (courier) or 4 (coffee), not {request.message_code}")
-    if not math.isfinite(sum(request)):
-        # Finite doubles may add up to an infinity; so look closer before refusing.
-        for name, value in zip(_SEGMENT_NAMES, request[1:], strict=True):
-            if not math.isfinite(value):
-                raise Problem(422, f"{name} must be finite, not {value}")
-
-
-def _spelled_out(path: bytes) -> DeliveryRequest:
-    """Read the values one by one: percent-encoded ones, and bad ones, which are named."""
+def _spelled_out(path: bytes) -> tuple[bytes, ...]:
+    """Return the values one by one, percent-decoded; what is no number is refused by its name."""
     match = _ANY.fullmatch(path)
     if match is None:
         raise Problem(404, "no such delivery")
-    code, *coordinates = (unquote_to_bytes(group).decode("utf-8", "replace") for group in match.groups())
+    code, *coordinates = values = tuple(unquote_to_bytes(group) for group in match.groups())
     if not _CODE.fullmatch(code):
-        raise Problem(422, f"code must be an integer, not {shown(code)}")
-    numbers = []
-    for name, text in zip(_SEGMENT_NAMES, coordinates, strict=True):
-        if not _NUMBER.fullmatch(text):
-            raise Problem(422, f"{name} must be a number, not {shown(text)}")
-        numbers.append(float(text))
-    return DeliveryRequest(int(code), *numbers)
+        raise Problem(422, f"code must be an integer, not {shown(_text(code))}")
+    for name, value in zip(_COORDINATES, coordinates, strict=True):
+        if not _NUMBER.fullmatch(value):
+            raise Problem(422, f"{name} must be a number, not {shown(_text(value))}")
+    return values
+
+
+def _text(value: bytes) -> str:
+    return value.decode("utf-8", "replace")

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections import deque
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from mybot_delivery_app.msg import DeliveryRequestMsg
 
-from reference_robot.webservices.representation.problems import not_yet
+from reference_robot.webservices.nodes.publishers import COFFEE_DELIVERY_MESSAGE_CODE, COURIER_DELIVERY_MESSAGE_CODE
+from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.representation.problems import Problem, not_yet
 
 if TYPE_CHECKING:
     from reference_robot.webservices.nodes.publishers import RobotPublishersNode
     from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
+_CODES: Final = frozenset({COURIER_DELIVERY_MESSAGE_CODE, COFFEE_DELIVERY_MESSAGE_CODE})
 _REMEMBERED: Final = 100  # the contract asks for the last 50
 _STATES: Final = frozenset({"queued", "active", "done", "failed", "dropped"})
 _NANOSECONDS: Final = 10**9
@@ -30,6 +34,24 @@ class DeliveryRequest(NamedTuple):
     destination_y: float
     source_x: float
     source_y: float
+
+
+class UnusableFieldError(ValueError):
+    """A field has a value that no delivery may have.
+
+    Args:
+        field: The message's field, one of ``DeliveryRequest._fields``.
+        rule: What the value must be.
+    """
+
+    def __init__(self, field: str, rule: str) -> None:
+        super().__init__(f"{field} {rule}")
+        self.field = field
+        self.rule = rule
+
+    def refusal(self, name: str, sent: str) -> Problem:
+        """Return the 422 in the words of an interface: its own name of the field, and the text that came in it."""
+        return Problem(422, f"{name} {self.rule}, not {shown(sent)}")
 
 
 class _Accepted(NamedTuple):
@@ -53,11 +75,13 @@ class Deliveries:
         self._accepted: deque[_Accepted] = deque(maxlen=_REMEMBERED)
 
     def accept(self, request: DeliveryRequest, interface: Literal["rest", "soap"]) -> None:
-        """Publish a request whose values have been checked: exactly one message.
+        """Publish a request: exactly one message.
 
         Raises:
+            UnusableFieldError: The code is no delivery's, or a coordinate is not finite.
             Problem: 503, when no delivery application listens: the message would be lost.
         """
+        _require_usable(request)
         if not self._publishers.delivery_is_served():
             raise not_yet("no delivery application listens on the robot")
         message = self._message
@@ -88,6 +112,16 @@ class Deliveries:
                 }
             )
         return entries
+
+
+def _require_usable(request: DeliveryRequest) -> None:
+    if request.message_code not in _CODES:
+        raise UnusableFieldError("message_code", "must be 3 (courier) or 4 (coffee)")
+    if not math.isfinite(sum(request)):
+        # Finite doubles may add up to an infinity; so look closer before refusing.
+        for field, value in request._asdict().items():
+            if not math.isfinite(value):
+                raise UnusableFieldError(field, "must be finite")
 
 
 def _state(accepted: _Accepted, missions: dict[DeliveryRequest, list[tuple[int, str]]]) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from geometry_msgs.msg import Pose
 
-from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.representation.checking import refused, shown
 from reference_robot.webservices.representation.problems import Problem
 
 if TYPE_CHECKING:
@@ -32,9 +32,8 @@ def require_known_frame(frame_id: str, frames: Frames, where: str) -> None:
 
 def require_unit(orientation: dict[str, float], where: str) -> None:
     """Raise the 422 for a quaternion whose length is not 1 within 1e-3."""
-    length = math.hypot(*orientation.values())
-    if not abs(length - 1) <= _UNIT_TOLERANCE:
-        raise Problem(422, f"{where} must have length 1 within {_UNIT_TOLERANCE}, not {length}")
+    if not abs(math.hypot(*orientation.values()) - 1) <= _UNIT_TOLERANCE:
+        raise refused(where, orientation, f"must have length 1 within {_UNIT_TOLERANCE}")
 
 
 def require_pose(stamped: dict[str, Any], frames: Frames, where: str) -> None:

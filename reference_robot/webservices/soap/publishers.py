@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from reference_robot.webservices.nodes.publishers import COFFEE_DELIVERY_MESSAGE_CODE
-from reference_robot.webservices.resources.delivery import check
-from reference_robot.webservices.robot.deliveries import Deliveries, DeliveryRequest
+from reference_robot.webservices.robot.deliveries import Deliveries, DeliveryRequest, UnusableFieldError
 from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.faults import SOAP, client_fault
 from reference_robot.webservices.soap.service import SoapService
@@ -41,16 +40,31 @@ class PublishersWebService(SoapService):
         }
 
     def _execute_delivery(self, wrapper: etree._Element) -> bytes:
-        request = _request(wrapper)
-        check(request)
-        self._deliveries.accept(request, "soap")
+        self._accept(wrapper)
         return self._done["ExecuteDeliveryRequest"]
 
     def _execute_coffee(self, wrapper: etree._Element) -> bytes:
-        request = _request(wrapper)._replace(message_code=COFFEE_DELIVERY_MESSAGE_CODE)
-        check(request)
-        self._deliveries.accept(request, "soap")
+        self._accept(wrapper, COFFEE_DELIVERY_MESSAGE_CODE)
         return self._done["ExecuteCoffeeRequest"]
+
+    def _accept(self, wrapper: etree._Element, code: int | None = None) -> None:
+        """Hand a request over, with the operation's own code where it has one.
+
+        Args:
+            wrapper: Valid by the XSD, which allows ``INF``, ``NaN`` and a missing ``arg0``.
+            code: The message code; None takes the message's.
+
+        Raises:
+            Fault: Client, where ``arg0`` is missing: there is nothing to deliver.
+            Problem: As ``Deliveries.accept``; 422 for what no delivery may have.
+        """
+        if not len(wrapper):
+            raise client_fault("arg0 is missing: it holds the delivery request")
+        sent = {str(element.tag): element.text or "" for element in wrapper[0]}
+        try:
+            self._deliveries.accept(_request(sent, code), "soap")
+        except UnusableFieldError as error:
+            raise error.refusal(error.field, sent[error.field]) from error
 
     def _empty_response(self, operation: str) -> bytes:
         return (
@@ -60,25 +74,17 @@ class PublishersWebService(SoapService):
         ).encode()
 
 
-def _request(wrapper: etree._Element) -> DeliveryRequest:
-    """Read a wrapper that is valid by the XSD; its values may still be INF or NaN, which ``check`` refuses.
-
-    Raises:
-        Fault: Client, where the optional ``arg0`` is missing: there is nothing to deliver.
-    """
-    if not len(wrapper):
-        raise client_fault("arg0 is missing: it holds the delivery request")
-    # XML Schema's sequence: depot_x, depot_y, destination_x, destination_y, message_code, source_x, source_y.
-    depot_x, depot_y, dest_x, dest_y, code, source_x, source_y = (part.text or "" for part in wrapper[0])
+def _request(sent: dict[str, str], code: int | None) -> DeliveryRequest:
     try:
-        return DeliveryRequest(
-            int(code),
-            float(depot_x),
-            float(depot_y),
-            float(dest_x),
-            float(dest_y),
-            float(source_x),
-            float(source_y),
-        )
+        asked = int(sent["message_code"])
     except ValueError as error:  # thousands of leading zeros: valid, and more than Python reads as an integer
-        raise client_fault(f"message_code is not read: {error}") from error
+        raise UnusableFieldError("message_code", "must be an integer of fewer digits") from error
+    return DeliveryRequest(
+        asked if code is None else code,
+        float(sent["depot_x"]),
+        float(sent["depot_y"]),
+        float(sent["destination_x"]),
+        float(sent["destination_y"]),
+        float(sent["source_x"]),
+        float(sent["source_y"]),
+    )

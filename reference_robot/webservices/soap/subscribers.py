@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from lxml import etree
 
+from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.writing import element_of
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.soap.description import ServiceDescription
@@ -87,5 +88,5 @@ def _finite(name: str, text: str) -> float:
     """Read a valid xs:double; INF and NaN never enter (contract, REST)."""
     number = float(text)
     if number - number != 0:
-        raise client_fault(f"{name} must be finite, not {text.strip()}")
+        raise client_fault(f"{name} must be finite, not {shown(text)}")
     return number
