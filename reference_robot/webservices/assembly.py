@@ -17,6 +17,7 @@ from reference_robot.webservices.resources.velocity import Velocity as VelocityR
 from reference_robot.webservices.rest import RestInterface
 from reference_robot.webservices.robot.deliveries import Deliveries
 from reference_robot.webservices.robot.goals import Goals
+from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner
 from reference_robot.webservices.robot.velocity import Velocity
 from reference_robot.webservices.soap.interface import SoapInterface
@@ -73,13 +74,13 @@ def interfaces(
     publishers, subscribers, calls = ros.publishers, ros.subscribers, ros.calls
     frames = configuration.names.frames
     goals = Goals(publishers, subscribers, calls, frames)
-    velocity = Velocity(publishers, subscribers, configuration.web, goals.is_active)
-    planner = Planner(subscribers, calls, frames)
+    odometry = LatestOdometry(subscribers)
+    velocity = Velocity(publishers, odometry, configuration.web, goals.is_active)
+    planner = Planner(subscribers, calls, odometry, frames)
     deliveries = Deliveries(publishers, subscribers)
-    pose = Pose(subscribers)
     rest_address = Address(endpoints.rest)
     resources = [
-        pose,
+        Pose(odometry),
         VelocityResource(velocity),
         LinearVelocity(velocity),
         Sensors(subscribers),
@@ -92,7 +93,7 @@ def interfaces(
     ]
     services = [
         PublishersWebService(deliveries),
-        SubscribersWebService(subscribers, pose, velocity, goals, planner),
+        SubscribersWebService(subscribers, odometry, velocity, goals, planner),
     ]
     return (
         RestInterface(resources, Delivery(deliveries), authorization),

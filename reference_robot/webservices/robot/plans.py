@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from reference_robot.names import Frames
     from reference_robot.webservices.nodes.calls import RosCalls
     from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+    from reference_robot.webservices.robot.odometry import LatestOdometry
 
 _LARGEST_TOLERANCE: Final = 3.4e38  # nav_msgs/GetPlan carries it as a float32
 
@@ -48,12 +49,16 @@ class Planner:
     Args:
         subscribers: The node with the planners' clients.
         calls: Waits for ROS.
+        odometry: Where a plan starts that names no start.
         frames: Those in which poses are taken.
     """
 
-    def __init__(self, subscribers: RobotSubscribersNode, calls: RosCalls, frames: Frames) -> None:
+    def __init__(
+        self, subscribers: RobotSubscribersNode, calls: RosCalls, odometry: LatestOdometry, frames: Frames
+    ) -> None:
         self._subscribers = subscribers
         self._calls = calls
+        self._odometry = odometry
         self._frames = frames
         self._read = reader_of(Path)
 
@@ -95,10 +100,7 @@ class Planner:
     def _start(self, query: PlanQuery) -> Pose:
         if query.start_x is not None and query.start_y is not None:
             return planar_pose(query.start_x, query.start_y, query.start_yaw or 0.0)
-        odometry = self._subscribers.odometry
-        if odometry is None:
-            raise not_yet("the robot has not published its odometry yet, from which a plan would start")
-        own = odometry.pose.pose
+        own = self._odometry.message().pose.pose
         x = own.position.x if query.start_x is None else query.start_x
         y = own.position.y if query.start_y is None else query.start_y
         pose = planar_pose(x, y, query.start_yaw or 0.0)

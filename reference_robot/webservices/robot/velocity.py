@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from reference_robot.webservices.configuration import WebSettings
     from reference_robot.webservices.nodes.publishers import RobotPublishersNode
-    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+    from reference_robot.webservices.robot.odometry import LatestOdometry
 
 _DISCOVERY: Final = 1.0  # seconds that a robot just found may take to be connected
 _DISCOVERY_STEP: Final = 0.02
@@ -28,7 +28,7 @@ class Velocity:
 
     Args:
         publishers: The node that publishes commands.
-        subscribers: The node that hears the odometry.
+        odometry: What the robot measures.
         settings: Limits and hold time.
         goal_is_active: Tells whether the robot follows a goal, and so takes no velocity from clients.
     """
@@ -36,12 +36,12 @@ class Velocity:
     def __init__(
         self,
         publishers: RobotPublishersNode,
-        subscribers: RobotSubscribersNode,
+        odometry: LatestOdometry,
         settings: WebSettings,
         goal_is_active: Callable[[], bool],
     ) -> None:
         self._publishers = publishers
-        self._subscribers = subscribers
+        self._odometry = odometry
         self._settings = settings
         self._goal_is_active = goal_is_active
         self._read = reader_of(Twist)
@@ -54,10 +54,7 @@ class Velocity:
         Raises:
             Problem: 503 before the first odometry.
         """
-        odometry = self._subscribers.odometry
-        if odometry is None:
-            raise not_yet("the robot has not published its odometry yet")
-        return self._read(odometry.twist.twist)
+        return self._read(self._odometry.message().twist.twist)
 
     async def command(self, twist: dict[str, Any]) -> None:
         """Publish a velocity once; the robot's own watchdog ends it after the hold time.

@@ -15,8 +15,8 @@ from reference_robot.webservices.soap.service import SoapService
 
 if TYPE_CHECKING:
     from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
-    from reference_robot.webservices.resources.pose import Pose
     from reference_robot.webservices.robot.goals import Goals
+    from reference_robot.webservices.robot.odometry import LatestOdometry
     from reference_robot.webservices.robot.velocity import Velocity
     from reference_robot.webservices.soap.service import Operation
 
@@ -28,7 +28,7 @@ class SubscribersWebService(SoapService):
 
     Args:
         subscribers: The node that knows the graph.
-        pose: The REST resource of the pose.
+        odometry: Where the robot is.
         velocity: Measures.
         goals: Knows the active goal.
         planner: Plans.
@@ -37,7 +37,7 @@ class SubscribersWebService(SoapService):
     def __init__(
         self,
         subscribers: RobotSubscribersNode,
-        pose: Pose,
+        odometry: LatestOdometry,
         velocity: Velocity,
         goals: Goals,
         planner: Planner,
@@ -45,7 +45,7 @@ class SubscribersWebService(SoapService):
         self.path = PATH
         self.description = ServiceDescription("subscribers", PATH)
         self._subscribers = subscribers
-        self._pose = pose
+        self._odometry = odometry
         self._velocity = velocity
         self._goals = goals
         self._planner = planner
@@ -54,7 +54,7 @@ class SubscribersWebService(SoapService):
     def operations(self) -> dict[str, Operation]:
         """Return the six operations."""
         return {
-            "GetPose": lambda _: self._response("GetPose", [self._pose.plain()]),
+            "GetPose": lambda _: self._response("GetPose", [self._odometry.plain()]),
             "GetVelocity": lambda _: self._response("GetVelocity", [self._velocity.measured()]),
             "GetSensors": lambda _: self._response("GetSensors", self._subscribers.sensors()),
             "GetNavigationServices": lambda _: self._response(
