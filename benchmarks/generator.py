@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from loadtests.measuring.recorder import Recorder
+from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable

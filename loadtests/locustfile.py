@@ -1,6 +1,6 @@
 """Users for plain Locust, with its web UI: `locust -f loadtests/locustfile.py --rest URL`.
 
-Closed users of both interfaces, wire and ordinary clients, as many of each as the UI is told. Locust's buckets of
+Closed users of both interfaces, wire and library clients, as many of each as the UI is told. Locust's buckets of
 whole milliseconds are replaced by microseconds, so that its percentiles say something at a robot's speed. For
 figures to rely on (open model, alternating blocks, intervals) there is `roaas load`.
 """
@@ -110,9 +110,15 @@ def workload_of(options: Any) -> Workload:
     try:
         settings = settings_of(options)
         found = Robot(
-            settings.rest, settings.publishers, settings.subscribers,
-            settings.publishers_wsdl, settings.subscribers_wsdl, settings.ca_file, settings.token, settings.timeout_s,
-        )  # fmt: skip
+            settings.rest,
+            settings.publishers,
+            settings.subscribers,
+            settings.publishers_wsdl,
+            settings.subscribers_wsdl,
+            settings.ca_file,
+            settings.token,
+            settings.timeout_s,
+        )
         addresses = {}
         documents = {}
         for name, operation in CATALOGUE.items():
@@ -126,8 +132,12 @@ def workload_of(options: Any) -> Workload:
             found.rest,
             addresses.get("publishers", found.publishers),
             addresses.get("subscribers", found.subscribers),
-            found.publishers_wsdl, found.subscribers_wsdl, found.ca_file, found.token, found.timeout_s,
-        )  # fmt: skip
+            found.publishers_wsdl,
+            found.subscribers_wsdl,
+            found.ca_file,
+            found.token,
+            found.timeout_s,
+        )
     except (SettingsError, WsdlError, CallError, EndpointError) as error:
         raise StopTest(f"cannot begin: {error}") from None
     return Workload(robot, OPERATIONS, 1, documents)

@@ -18,9 +18,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _ENDPOINT_TEXTS = (
-    "rest", "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint", "ca_file",
+    "rest",
+    "publishers_wsdl",
+    "subscribers_wsdl",
+    "publishers_endpoint",
+    "subscribers_endpoint",
+    "ca_file",
     "token_file",
-)  # fmt: skip
+)
 _ENDPOINT_NUMBERS = ("request_rate", "timeout_s")
 _LOAD_NUMBERS = ("max_rate", "max_duration_s")
 _FILES = ("ca_file", "token_file")

@@ -9,7 +9,7 @@ import gevent
 
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, answer_error
-from loadtests.clients.library import OrdinaryRest, OrdinarySoap
+from loadtests.clients.library import LibraryRest, LibrarySoap
 from loadtests.clients.payloads import Values, variants
 from loadtests.clients.wire import Connection, Request, now_ns
 
@@ -59,8 +59,8 @@ class Caller:
         self.workload = workload
         self.recorder = recorder
         self._wires: dict[tuple[str, int], Connection] = {}
-        self._rest: OrdinaryRest | None = None
-        self._soap: OrdinarySoap | None = None
+        self._rest: LibraryRest | None = None
+        self._soap: LibrarySoap | None = None
 
     def _wire(self, interface: str, operation: int) -> Connection:
         """The connection for an operation; those of one origin share it, as any HTTP client does."""
@@ -100,7 +100,7 @@ class Caller:
                 if connection.connects != connects:
                     recorder.count("connects")
             else:
-                timed = self._ordinary(interface, operation, payload)
+                timed = self._library(interface, operation, payload)
                 done = now_ns()
                 built, received, timing = timed.built_ns, timed.received_ns, timed.timing
         except CallError as error:
@@ -109,17 +109,17 @@ class Caller:
         recorder.record(segment, operation, due, start, built, received, done, server_ns(timing), queued=queued)
         return True
 
-    def _ordinary(self, interface: str, operation: int, payload: int) -> Any:
+    def _library(self, interface: str, operation: int, payload: int) -> Any:
         workload = self.workload
         name, values = workload.operations[operation], workload.values[operation][payload]
         try:
             with gevent.Timeout(workload.robot.timeout_s):  # requests has no deadline for a body that drips
                 if interface == "rest":
                     if self._rest is None:
-                        self._rest = OrdinaryRest(workload.robot)
+                        self._rest = LibraryRest(workload.robot)
                     return self._rest.call(name, values)
                 if self._soap is None:
-                    self._soap = OrdinarySoap(workload.robot, workload.documents)
+                    self._soap = LibrarySoap(workload.robot, workload.documents)
                 return self._soap.call(name, values)
         except gevent.Timeout:
             raise CallError("timeout", f"no complete answer within {workload.robot.timeout_s:g} s") from None

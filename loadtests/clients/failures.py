@@ -20,10 +20,6 @@ class CallError(Exception):
         self.kind = kind
 
 
-class CrewError(Exception):
-    """The load generator itself cannot work: a port in use, workers that do not come up."""
-
-
 #: Kinds that say that nobody listens there, as against somebody who answers badly.
 UNREACHABLE = frozenset({"refused", "resolve", "network", "tls"})
 

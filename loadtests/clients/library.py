@@ -1,4 +1,4 @@
-"""The ordinary clients: what a user's program would write, with its cost.
+"""The library clients: what a user's program would write, with its cost.
 
 SOAP through zeep: one Document (the parsed WSDL) for each process, for it takes milliseconds to build, and a
 transport for each user. REST through `requests`. Both pass through one urllib3 adapter that counts what is put
@@ -37,7 +37,7 @@ class Timed:
 
 
 class Sent:
-    """Requests put on the wire by all ordinary clients of this process, and calls that asked for them."""
+    """Requests put on the wire by all library clients of this process, and calls that asked for them."""
 
     requests = 0
     calls = 0
@@ -132,7 +132,7 @@ def read_document(location: str, robot: Robot) -> Document:
     return Document(location, transport, settings=zeep.Settings())
 
 
-class OrdinarySoap:
+class LibrarySoap:
     """A user's zeep client.
 
     Args:
@@ -180,7 +180,7 @@ def _binding(document: Document) -> str:
     raise CallError("content", f"the WSDL has no binding in {NAMESPACE}")
 
 
-class OrdinaryRest:
+class LibraryRest:
     """A user's REST client: requests, and the answer's JSON."""
 
     def __init__(self, robot: Robot) -> None:

@@ -29,13 +29,21 @@ COURIER, COFFEE = 3, 4  # the paper's message codes
 FIELDS = ("depot_x", "depot_y", "destination_x", "destination_y", "message_code", "source_x", "source_y")
 #: The same in the order of the REST path, with the path's names.
 PATH = (
-    ("depot_x", "depot_x"), ("depot_y", "depot_y"), ("dest_x", "destination_x"), ("dest_y", "destination_y"),
-    ("source_x", "source_x"), ("source_y", "source_y"),
-)  # fmt: skip
+    ("depot_x", "depot_x"),
+    ("depot_y", "depot_y"),
+    ("dest_x", "destination_x"),
+    ("dest_y", "destination_y"),
+    ("source_x", "source_x"),
+    ("source_y", "source_y"),
+)
 _EXAMPLE = {
-    "depot_x": 68.269, "depot_y": 38.718, "destination_x": 60.633, "destination_y": 37.51,
-    "source_x": 76.02, "source_y": 41.35,
-}  # fmt: skip
+    "depot_x": 68.269,
+    "depot_y": 38.718,
+    "destination_x": 60.633,
+    "destination_y": 37.51,
+    "source_x": 76.02,
+    "source_y": 41.35,
+}
 
 Values = dict[str, float]
 

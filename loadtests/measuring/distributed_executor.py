@@ -1,4 +1,4 @@
-"""A Locust master and its workers as a crew: processes of this machine, or of others."""
+"""A Locust master and its workers as a executor: processes of this machine, or of others."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import gevent
 from locust.exception import RPCError
 
-from loadtests.clients.failures import CrewError
+from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import LEAD_S, Member, boot_id, new_environment, now_ns
-from loadtests.measuring.recorder import Recorder
+from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,7 +28,7 @@ _READY_S = 60.0
 _GRACE_S = 15.0
 
 
-class LedCrew:
+class DistributedExecutor:
     """Workers led by a Locust master.
 
     Args:
@@ -52,7 +52,7 @@ class LedCrew:
         try:
             self.runner = self.environment.create_master_runner(host, port)
         except (SystemExit, RPCError) as error:
-            raise CrewError(
+            raise GeneratorError(
                 f"the master cannot listen on {host}:{port}: choose another --master-port ({error})"
             ) from None
         self.recorder = Recorder()
@@ -81,7 +81,7 @@ class LedCrew:
         """Start the workers of this machine, wait for all, and have their users come up.
 
         Raises:
-            CrewError: a worker could not get ready.
+            GeneratorError: a worker could not get ready.
         """
         here = "127.0.0.1" if self._host in {"*", "0.0.0.0"} else self._host  # noqa: S104 -- compared with, not bound to
         for _ in range(self._processes):
@@ -106,7 +106,7 @@ class LedCrew:
         self.runner.send_message("roaas_prepare", job)
         self._wait(lambda: self._prepared >= self._expected or bool(self._refusals), "workers are ready")
         if self._refusals:
-            raise CrewError(f"a worker cannot work: {self._refusals[0]}")
+            raise GeneratorError(f"a worker cannot work: {self._refusals[0]}")
         self.runner.start(users, spawn_rate=users)
 
     def _wait(self, reached: Callable[[], bool], what: str) -> None:
@@ -114,12 +114,12 @@ class LedCrew:
         while not reached():
             gevent.sleep(0.02)
             if self.stopped():
-                raise CrewError("interrupted while waiting for workers")
+                raise GeneratorError("interrupted while waiting for workers")
             dead = [child.returncode for child in self._children.values() if child.poll() is not None]
             if dead:
-                raise CrewError(f"a worker process ended at once, with exit code {dead[0]}")
+                raise GeneratorError(f"a worker process ended at once, with exit code {dead[0]}")
             if time.monotonic() > deadline:
-                raise CrewError(f"{self.runner.worker_count} of {self._expected} {what} in time")
+                raise GeneratorError(f"{self.runner.worker_count} of {self._expected} {what} in time")
 
     def _on_ready(self, environment: Any, msg: Any) -> None:
         del environment

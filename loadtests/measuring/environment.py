@@ -21,8 +21,17 @@ if TYPE_CHECKING:
 
 _SECRET = re.compile(r"^-.*(token|password|secret|key)\b(?!-file)", re.IGNORECASE)
 _PACKAGES = (
-    "roaas", "locust", "gevent", "httptools", "zeep", "requests", "urllib3", "lxml", "numpy", "hdrhistogram",
-)  # fmt: skip
+    "roaas",
+    "locust",
+    "gevent",
+    "httptools",
+    "zeep",
+    "requests",
+    "urllib3",
+    "lxml",
+    "numpy",
+    "hdrhistogram",
+)
 
 
 def describe(robot: Robot, about: dict[str, str], servers: dict[str, str | None], command: str) -> dict[str, Any]:
@@ -37,16 +46,26 @@ def describe(robot: Robot, about: dict[str, str], servers: dict[str, str | None]
     addresses = [address for address in (robot.rest, robot.publishers, robot.subscribers) if address]
     here = bool(addresses) and all(_is_here(Endpoint.parse(address).host) for address in addresses)
     return {
-        "cpu": _cpu_model(), "cpus": os.cpu_count() or 1, "memory_mb": psutil.virtual_memory().total // 2**20,
-        "kernel": platform.release(), "system": f"{platform.system()} {platform.machine()}",
-        "python": platform.python_version(), "versions": _versions(),
-        "command": command, "robot_command": _listener(addresses[0]) if here else None,
+        "cpu": _cpu_model(),
+        "cpus": os.cpu_count() or 1,
+        "memory_mb": psutil.virtual_memory().total // 2**20,
+        "kernel": platform.release(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "versions": _versions(),
+        "command": command,
+        "robot_command": _listener(addresses[0]) if here else None,
         "robot": {
-            "name": about.get("name"), "vendor": about.get("vendor"), "version": about.get("version"),
-            "rest": robot.rest, "publishers": robot.publishers, "subscribers": robot.subscribers,
-            "servers": servers, "same_machine": here,
+            "name": about.get("name"),
+            "vendor": about.get("vendor"),
+            "version": about.get("version"),
+            "rest": robot.rest,
+            "publishers": robot.publishers,
+            "subscribers": robot.subscribers,
+            "servers": servers,
+            "same_machine": here,
         },
-    }  # fmt: skip
+    }
 
 
 def _versions() -> dict[str, str]:

@@ -17,9 +17,9 @@ from locust import User, task
 from locust.env import Environment
 from locust.event import Events
 
-from loadtests.clients.failures import CrewError
-from loadtests.measuring.recorder import Recorder
+from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.user_session import Session
+from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,7 +43,7 @@ class RobotUser(User):
 
 @dataclass(slots=True)
 class Member:
-    """A process of the crew, as the result tells of it.
+    """A process of the executor, as the result tells of it.
 
     Attributes:
         accounted: arrivals of its share that its reports speak of.
@@ -61,7 +61,7 @@ class Member:
     done: bool = True
 
 
-class Crew(Protocol):
+class Executor(Protocol):
     """Carries out plans."""
 
     recorder: Recorder
@@ -88,9 +88,9 @@ def new_environment() -> Any:
     return Environment(user_classes=[RobotUser], events=Events(), stop_timeout=0)
 
 
-def busiest(crew: Crew) -> float | None:
+def busiest(executor: Executor) -> float | None:
     """The busiest process's share of a core in the plan that was carried out last."""
-    return max((member.cpu_share for member in crew.members if member.cpu_share is not None), default=None)
+    return max((member.cpu_share for member in executor.members if member.cpu_share is not None), default=None)
 
 
 def boot_id() -> str:
@@ -101,7 +101,7 @@ def boot_id() -> str:
         return ""
 
 
-class LocalCrew:
+class LocalExecutor:
     """This process alone."""
 
     def __init__(self) -> None:
@@ -123,7 +123,7 @@ class LocalCrew:
         self._session = self.environment.roaas_session = session
         self.recorder, self.pacing = session.recorder, session.pacer.pacing
         self.runner.start(users, spawn_rate=users)
-        with gevent.Timeout(30, CrewError(f"only {session.pacer.waiting} of {users} users came up within 30 s")):
+        with gevent.Timeout(30, GeneratorError(f"only {session.pacer.waiting} of {users} users came up within 30 s")):
             while session.pacer.waiting < users:
                 gevent.sleep(0.01)
 
@@ -131,7 +131,7 @@ class LocalCrew:
         """Carry out a plan."""
         session = self._session
         if session is None:
-            raise CrewError("run before prepare")
+            raise GeneratorError("run before prepare")
         origin = now_ns() + int(LEAD_S * _NS)
         work = gevent.spawn(session.run, plan, 0, origin, ceiling)
         try:

@@ -8,10 +8,10 @@ from gevent.pywsgi import WSGIServer
 from prometheus_client import CollectorRegistry, make_wsgi_app
 from prometheus_client.core import CounterMetricFamily, HistogramMetricFamily, Metric
 
-from loadtests.clients.failures import CrewError
-from loadtests.measuring.recorder import Cell, Recorder
+from loadtests.measuring.errors import GeneratorError
 from loadtests.schedule.plan import SERIES
 from loadtests.statistics.histogram import Histogram, Ints, edges_us
+from loadtests.statistics.recorder import Cell, Recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -80,7 +80,7 @@ def serve(collector: Collector, host: str, port: int) -> WSGIServer:
     """Serve /metrics.
 
     Raises:
-        CrewError: the port is in use.
+        GeneratorError: the port is in use.
     """
     registry = CollectorRegistry(auto_describe=False)
     registry.register(collector)
@@ -88,7 +88,7 @@ def serve(collector: Collector, host: str, port: int) -> WSGIServer:
     try:
         server.start()
     except OSError as error:
-        raise CrewError(
+        raise GeneratorError(
             f"the metrics port {host}:{port} is in use: choose another with --metrics-port ({error})"
         ) from None
     return server

@@ -13,7 +13,7 @@ from lxml import etree
 
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import UNREACHABLE, CallError, answer_error
-from loadtests.clients.library import OrdinaryRest, OrdinarySoap, new_session, read_document
+from loadtests.clients.library import LibraryRest, LibrarySoap, new_session, read_document
 from loadtests.clients.payloads import FIELDS, NAMESPACE, VARIANTS, differences, variants
 from loadtests.clients.wire import Answer, Connection
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from loadtests.clients.robot import Robot
-    from loadtests.statistics.summary import Name
+    from loadtests.schedule.plan import SeriesName
 
 _PARSER = etree.XMLParser(resolve_entities=False, no_network=True)
 #: Leaves of nav_msgs/Odometry that have to be in both interfaces' answers, in the same number.
@@ -40,9 +40,9 @@ class Findings:
         notes: what could not be compared.
     """
 
-    sizes: dict[Name, tuple[int, int]] = field(default_factory=dict)
+    sizes: dict[SeriesName, tuple[int, int]] = field(default_factory=dict)
     servers: dict[str, str | None] = field(default_factory=dict)
-    failures: dict[Name, CallError] = field(default_factory=dict)
+    failures: dict[SeriesName, CallError] = field(default_factory=dict)
     unequal: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -57,7 +57,7 @@ class Findings:
         return list(dict.fromkeys(worded))
 
 
-def preflight(robot: Robot, names: list[Name], seed: int) -> Findings:
+def preflight(robot: Robot, names: list[SeriesName], seed: int) -> Findings:
     """Call each series once; compare what the interfaces send and get."""
     findings = Findings()
     answers: dict[tuple[str, str], Answer] = {}
@@ -67,7 +67,7 @@ def preflight(robot: Robot, names: list[Name], seed: int) -> Findings:
             if client == "wire":
                 answers[operation, interface] = _wire_call(robot, name, seed, findings)
             else:
-                _ordinary_call(robot, operation, interface, seed)
+                _library_call(robot, operation, interface, seed)
         except CallError as error:
             findings.failures[name] = error
             if error.kind in UNREACHABLE or error.kind == "timeout":
@@ -82,7 +82,7 @@ def preflight(robot: Robot, names: list[Name], seed: int) -> Findings:
     return findings
 
 
-def _wire_call(robot: Robot, name: Name, seed: int, findings: Findings) -> Answer:
+def _wire_call(robot: Robot, name: SeriesName, seed: int, findings: Findings) -> Answer:
     operation, interface, _ = name
     request = robot.requests(interface, operation, seed)[0]
     connection = Connection(Endpoint.parse(robot.address(interface, operation) or ""), robot.timeout_s, robot.tls)
@@ -102,15 +102,15 @@ def _wire_call(robot: Robot, name: Name, seed: int, findings: Findings) -> Answe
     return answer
 
 
-def _ordinary_call(robot: Robot, operation: str, interface: str, seed: int) -> None:
+def _library_call(robot: Robot, operation: str, interface: str, seed: int) -> None:
     values = variants(operation, seed)[0]
     if interface == "rest":
-        OrdinaryRest(robot).call(operation, values)
+        LibraryRest(robot).call(operation, values)
         return
     location = robot.wsdl(operation) or ""
     try:
         document = read_document(location, robot)
-        client = OrdinarySoap(robot, {operation: document})
+        client = LibrarySoap(robot, {operation: document})
     except requests.RequestException as error:
         raise CallError("network", f"WSDL {location!r}: {error}") from None
     except CallError:
@@ -192,9 +192,10 @@ def _compare_received(robot: Robot, operation: str, seed: int, findings: Finding
     sent = variants(operation, seed)[0]
     for interface in ("rest", "soap"):
         matching = [
-            entry for entry in listed
+            entry
+            for entry in listed
             if isinstance(entry, dict) and entry.get("interface") == interface and _same(entry.get("request"), sent)
-        ]  # fmt: skip
+        ]
         if not matching:
             findings.unequal.append(f"{operation}: the robot does not list the request that was sent over {interface}")
 

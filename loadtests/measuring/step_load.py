@@ -5,20 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from loadtests.measuring.executor import busiest
-from loadtests.result.document import asked_of, step_operation
-from loadtests.schedule.plan import Plan
+from loadtests.schedule.arrivals import arrivals_due
+from loadtests.schedule.plan import Plan, step_operation
 from loadtests.statistics import steps
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from loadtests.measuring.executor import Crew
+    from loadtests.measuring.executor import Executor
     from loadtests.settings import Settings
 
 
-def climb(
+def step_load(
     first: Plan,
-    crew: Crew,
+    executor: Executor,
     settings: Settings,
     stopped: Callable[[], bool],
     announce: Callable[[Plan], None],
@@ -28,7 +28,7 @@ def climb(
 
     Args:
         first: the plan that was carried out before.
-        crew: who carries the steps out.
+        executor: who carries the steps out.
         settings: rates, length and thresholds.
         stopped: whether somebody wants an end.
         announce: told of each step's plan before it begins.
@@ -61,11 +61,11 @@ def climb(
         )
         used += len(plan.segments)
         announce(plan)
-        crew.run(plan, None, lambda _: stopped())
+        executor.run(plan, None, lambda _: stopped())
         for interface in list(standing):
-            asked = asked_of(plan, plan.length_s, phase="step", interface=interface)
-            result = steps.step_result(plan, crew.recorder, interface, asked, criterion)
-            found.append(result | {"cpu_share": busiest(crew)})
+            asked = arrivals_due(plan, plan.length_s, phase="step", interface=interface)
+            result = steps.step_result(plan, executor.recorder, interface, asked, criterion)
+            found.append(result | {"cpu_share": busiest(executor)})
             kept = "" if result["meets"] else f": {result['reason']}"
             tell(
                 f"step {rate:g}/s over {interface}: p50 {result['p50_ms'] or 0:.3f} ms, "

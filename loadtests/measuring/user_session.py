@@ -12,9 +12,9 @@ from loadtests.clients.callers import Caller, Workload
 from loadtests.clients.library import Sent, read_document
 from loadtests.clients.payloads import VARIANTS
 from loadtests.measuring.locust_feed import LocustFeed
-from loadtests.measuring.recorder import Recorder
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Arrival, Pacer
+from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,15 +10,15 @@ from loadtests import exits
 from loadtests.clients.payloads import CATALOGUE
 from loadtests.measuring.environment import describe
 from loadtests.measuring.preflight import Findings
-from loadtests.measuring.recorder import Recorder
 from loadtests.result.files import FORMAT
-from loadtests.schedule.arrivals import Schedule
-from loadtests.schedule.plan import GAP_S, MOVES, Plan
-from loadtests.statistics import steps, summary, verdict
+from loadtests.schedule.arrivals import Schedule, arrivals_due
+from loadtests.schedule.plan import GAP_S, Plan, step_operation
+from loadtests.statistics import figures, steps, verdict
+from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
-    from loadtests.measuring.executor import Crew
+    from loadtests.measuring.executor import Executor
     from loadtests.settings import Settings
 
 CLIENT_WORDS = {
@@ -26,10 +26,9 @@ CLIENT_WORDS = {
     "each sent once",
     "zeep": "as an ordinary user's program calls: zeep over SOAP, the requests library over REST",
 }
-_NS = 1_000_000_000
 
 
-class Gone(Exception):  # noqa: N818 -- an outcome, with its exit code
+class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
     """A run that ends before it measures."""
 
     def __init__(self, code: int, message: str) -> None:
@@ -58,60 +57,59 @@ class Outcome:
     invalid: list[str] = field(default_factory=list)
     interrupted: bool = False
     dead_at: float | None = None
-    crew: Crew | None = None
+    executor: Executor | None = None
     plan: Plan | None = None
     elapsed_s: float = 0.0
     cpu_share: float | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
 
 
-def compose(outcome: Outcome, plan: Plan, gone: Gone | None) -> tuple[int, dict[str, Any]]:
+def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[int, dict[str, Any]]:
     """Exit code and latency.json.
 
     Args:
         outcome: what happened.
         plan: the duel's plan, carried out or not.
-        gone: why the run ended before it measured, if it did.
+        aborted: why the run ended before it measured, if it did.
     """
-    crew, settings = outcome.crew, outcome.settings
-    recorder = crew.recorder if crew is not None else Recorder()
-    measured = summary.Measured(plan, recorder)
-    figures = _figures(outcome, measured)
-    pacing = crew.pacing if crew else ""
-    reasons, notes = ([str(gone)], []) if gone else verdict.invalid_because(figures, plan, pacing)
+    executor, settings = outcome.executor, outcome.settings
+    recorder = executor.recorder if executor is not None else Recorder()
+    measured = figures.Measured(plan, recorder)
+    generator = _generator(outcome, measured)
+    pacing = executor.pacing if executor else ""
+    reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
     workers, losses = _workers(outcome, plan)
-    judged = [] if gone else verdict.judge(measured, list(settings.thresholds))
-    code = _code(outcome, gone, reasons, judged)
+    judged = [] if aborted else verdict.judge(measured, list(settings.thresholds))
+    code = _code(outcome, aborted, reasons, judged)
     document = {
-        "format": FORMAT, "valid": not reasons, "invalid_because": reasons, "notes": outcome.notes + notes + losses,
-        "interrupted": outcome.interrupted or outcome.dead_at is not None, "exit_code": code,
-        "started": _stamp(outcome.started), "finished": _stamp(datetime.now(UTC)),
+        "format": FORMAT,
+        "valid": not reasons,
+        "invalid_because": reasons,
+        "notes": outcome.notes + notes + losses,
+        "interrupted": outcome.interrupted or outcome.dead_at is not None,
+        "exit_code": code,
+        "started": _stamp(outcome.started),
+        "finished": _stamp(datetime.now(UTC)),
         "environment": describe(outcome.robot, settings.about, outcome.findings.servers, settings.command),
-        "plan": _plan_words(settings, plan, pacing), "generator": figures, "workers": workers,
-        "series": summary.series(measured, outcome.findings.sizes), "comparisons": summary.comparisons(measured),
-        "noise_floor": summary.noise_floor(measured), "time_series": summary.time_series(measured),
-        "steps": outcome.steps, "knee": _knee(outcome, plan),
-        "errors": summary.errors(recorder, plan.operations) + _early_errors(outcome.findings), "thresholds": judged,
-    }  # fmt: skip
+        "plan": _plan_words(settings, plan, pacing),
+        "generator": generator,
+        "workers": workers,
+        "series": figures.series(measured, outcome.findings.sizes),
+        "comparisons": figures.comparisons(measured),
+        "noise_floor": figures.noise_floor(measured),
+        "time_series": figures.time_series(measured),
+        "steps": outcome.steps,
+        "knee": _knee(outcome, plan),
+        "errors": figures.errors(recorder, plan.operations) + _early_errors(outcome.findings),
+        "thresholds": judged,
+    }
     return code, document
 
 
-def asked_of(plan: Plan, elapsed_s: float, *, phase: str, interface: str | None = None) -> int:
-    """Arrivals of a phase that were due in the segments that were over by then."""
-    schedule = Schedule(plan, 0, 1)
-    return sum(
-        schedule.total(index)
-        for index, segment in enumerate(plan.segments)
-        if segment.phase == phase
-        and (interface is None or segment.interface == interface)
-        and segment.end_ns <= elapsed_s * _NS + 1
-    )
-
-
-def _figures(outcome: Outcome, measured: summary.Measured) -> dict[str, Any]:
+def _generator(outcome: Outcome, measured: figures.Measured) -> dict[str, Any]:
     plan = measured.plan
-    asked = sum(asked_of(plan, outcome.elapsed_s, phase=phase) for phase in ("duel", "aa"))
+    asked = sum(arrivals_due(plan, outcome.elapsed_s, phase=phase) for phase in ("duel", "aa"))
     elapsed_s = max(0.0, outcome.elapsed_s - plan.warmup_s)
     return verdict.generator_figures(measured, asked, elapsed_s, outcome.cpu_share)
 
@@ -126,9 +124,9 @@ def _endings(outcome: Outcome, plan: Plan) -> list[str]:
     return found
 
 
-def _code(outcome: Outcome, gone: Gone | None, reasons: list[str], judged: list[dict[str, Any]]) -> int:
-    if gone is not None:
-        return gone.code
+def _code(outcome: Outcome, aborted: RunAborted | None, reasons: list[str], judged: list[dict[str, Any]]) -> int:
+    if aborted is not None:
+        return aborted.code
     if outcome.interrupted:
         return exits.INTERRUPTED
     if reasons:
@@ -143,17 +141,24 @@ def _early_errors(findings: Findings) -> list[dict[str, Any]]:
     """Calls that failed before the run."""
     return [
         {
-            "operation": operation, "interface": interface, "client": client, "phase": "preflight",
-            "kind": failure.kind, "message": str(failure), "count": 1, "first_s": None, "last_s": None,
+            "operation": operation,
+            "interface": interface,
+            "client": client,
+            "phase": "preflight",
+            "kind": failure.kind,
+            "message": str(failure),
+            "count": 1,
+            "first_s": None,
+            "last_s": None,
         }
         for (operation, interface, client), failure in findings.failures.items()
-    ]  # fmt: skip
+    ]
 
 
 def _workers(outcome: Outcome, plan: Plan) -> tuple[list[dict[str, Any]], list[str]]:
     """The `workers`, and a sentence on each that was lost."""
     found, losses = [], []
-    present = outcome.crew.members if outcome.crew else []
+    present = outcome.executor.members if outcome.executor else []
     for number, member in enumerate(present):
         missing = None
         if member.state == "lost":
@@ -169,19 +174,18 @@ def _workers(outcome: Outcome, plan: Plan) -> tuple[list[dict[str, Any]], list[s
             )
         found.append(
             {
-                "id": member.id, "host": member.host, "pid": member.pid, "state": member.state,
-                "requests": member.requests, "cpu_share": summary.rounded(member.cpu_share),
-                "lost_at_s": summary.rounded(member.lost_at_s), "last_report_s": summary.rounded(member.last_report_s),
+                "id": member.id,
+                "host": member.host,
+                "pid": member.pid,
+                "state": member.state,
+                "requests": member.requests,
+                "cpu_share": figures.rounded(member.cpu_share),
+                "lost_at_s": figures.rounded(member.lost_at_s),
+                "last_report_s": figures.rounded(member.last_report_s),
                 "arrivals_lost": missing if member.state == "lost" else 0,
             }
-        )  # fmt: skip
+        )
     return found, losses
-
-
-def step_operation(operations: tuple[str, ...]) -> int:
-    """The operation of the stepped load: a read where there is one, for it goes far beyond what is usual."""
-    reads = [number for number, name in enumerate(operations) if name not in MOVES]
-    return reads[0] if reads else 0
 
 
 def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
@@ -194,17 +198,29 @@ def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
 
 def _plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
     return {
-        "model": "open" if plan.open_model else "closed", "arrivals": plan.arrivals if plan.open_model else None,
-        "rate": plan.rate, "users": plan.users, "duration_s": plan.duration_s, "warmup_s": plan.warmup_s,
-        "block_s": round(plan.block_s, 6), "gap_s": GAP_S, "blocks": plan.blocks, "seed": plan.seed,
-        "timeout_s": plan.timeout_s, "operations": list(plan.operations), "interfaces": list(plan.interfaces),
+        "model": "open" if plan.open_model else "closed",
+        "arrivals": plan.arrivals if plan.open_model else None,
+        "rate": plan.rate,
+        "users": plan.users,
+        "duration_s": plan.duration_s,
+        "warmup_s": plan.warmup_s,
+        "block_s": round(plan.block_s, 6),
+        "gap_s": GAP_S,
+        "blocks": plan.blocks,
+        "seed": plan.seed,
+        "timeout_s": plan.timeout_s,
+        "operations": list(plan.operations),
+        "interfaces": list(plan.interfaces),
         "clients": {name: CLIENT_WORDS[name] for name in plan.clients},
         "zeep_rate": plan.rate_of("zeep") if plan.open_model and "zeep" in plan.clients else None,
         "methods": {name: CATALOGUE[name].element for name in plan.operations},
-        "processes": plan.workers, "connections": plan.connections, "pacing": pacing,
+        "processes": plan.workers,
+        "connections": plan.connections,
+        "pacing": pacing,
         "limits": {"max_rate": settings.max_rate, "max_duration_s": settings.max_duration_s},
-        "step_rates": list(settings.step_rates), "step_s": settings.step_s if settings.step_rates else None,
-    }  # fmt: skip
+        "step_rates": list(settings.step_rates),
+        "step_s": settings.step_s if settings.step_rates else None,
+    }
 
 
 def _stamp(moment: datetime) -> str:

@@ -9,7 +9,7 @@ def _ms(value: float | None) -> str:
     return "       -" if value is None else f"{value:8.3f}"
 
 
-def final_words(document: dict[str, Any]) -> str:
+def summary(document: dict[str, Any]) -> str:
     """A table of the series, the comparisons of medians, thresholds, and whether it is worth anything."""
     lines = ["operation  interface  client     count  errors  service p50      p90      p99  response p99   (ms)"]
     for entry in document["series"]:

@@ -100,3 +100,15 @@ class Schedule:
         payloads = lot.integers(VARIANTS, size=len(due)).tolist()
         mine = slice((self.worker + segment) % self.workers, None, self.workers)
         return list(zip(due[mine], kinds.tolist()[mine], payloads[mine], strict=True))
+
+
+def arrivals_due(plan: Plan, elapsed_s: float, *, phase: str, interface: str | None = None) -> int:
+    """Arrivals of a phase that were due in the segments that were over by then."""
+    schedule = Schedule(plan, 0, 1)
+    return sum(
+        schedule.total(index)
+        for index, segment in enumerate(plan.segments)
+        if segment.phase == phase
+        and (interface is None or segment.interface == interface)
+        and segment.end_ns <= elapsed_s * _NS + 1
+    )

@@ -2,7 +2,7 @@
 
 A fair duel: REST and SOAP take turns in blocks of a tenth of a second or more, in quartets REST-SOAP-SOAP-REST
 or the reverse by lot (ABBA), so that a drift of the machine or the robot meets both alike. In every fifth
-quartet one interface meets itself under two names (A/A): what difference that shows is noise. The ordinary
+quartet one interface meets itself under two names (A/A): what difference that shows is noise. The library
 clients get quartets of their own, for their CPU time would delay the wire client's starts.
 """
 
@@ -19,9 +19,9 @@ CLIENTS = ("wire", "zeep")
 OPERATIONS = ("delivery", "coffee", "pose")
 MOVES = frozenset({"delivery", "coffee"})
 
-#: The ordinary clients' rate for each worker: a call costs some 1.5 ms of the generator's time, and a generator
+#: The library clients' rate for each worker: a call costs some 1.5 ms of the generator's time, and a generator
 #: that is busy for more than a fraction of it measures itself.
-ORDINARY_RATE = 100.0
+LIBRARY_RATE = 100.0
 GAP_S = 0.010
 _BLOCK_S = 0.1
 _MAX_BLOCKS = 600  # bounds memory: each block keeps its own histograms
@@ -29,6 +29,10 @@ _ARRIVALS_PER_BLOCK = 10
 _QUARTET = 4
 _LISTS = frozenset({"operations", "interfaces", "clients"})
 _NS = 1_000_000_000
+
+
+#: Names a series of the result: (operation, interface, client).
+SeriesName = tuple[str, str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +121,7 @@ class Plan:
     def rate_of(self, client: str) -> float:
         """Arrivals per second over all workers while a client has its turn."""
         rate = self.rate or 0.0
-        return rate if client == "wire" else min(rate, ORDINARY_RATE * self.workers)
+        return rate if client == "wire" else min(rate, LIBRARY_RATE * self.workers)
 
     @cached_property
     def segments(self) -> list[Segment]:
@@ -165,7 +169,7 @@ class Plan:
         return placed
 
     def _quartet(self, number: int, swapped: bool) -> list[Segment]:  # noqa: FBT001 -- private, the lot's outcome
-        """Four blocks. Of five quartets the second goes to the ordinary clients and the fourth to A/A."""
+        """Four blocks. Of five quartets the second goes to the library clients and the fourth to A/A."""
         turn = number % 5
         client = self.clients[-1] if turn == 1 else self.clients[0]
         if turn == 3:  # noqa: PLR2004 -- the fourth of five, as said above
@@ -209,3 +213,9 @@ SERIES = [
     for interface in INTERFACES
     for client in CLIENTS
 ]
+
+
+def step_operation(operations: tuple[str, ...]) -> int:
+    """The operation of the stepped load: a read where there is one, for it goes far beyond what is usual."""
+    reads = [number for number, name in enumerate(operations) if name not in MOVES]
+    return reads[0] if reads else 0

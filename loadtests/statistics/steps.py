@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from loadtests.measuring.recorder import Cell, Recorder
+from loadtests.statistics.figures import rounded
 from loadtests.statistics.histogram import Histogram
-from loadtests.statistics.resampling import SHARES
-from loadtests.statistics.summary import rounded
+from loadtests.statistics.intervals import SHARES
+from loadtests.statistics.recorder import Cell, Recorder
 
 if TYPE_CHECKING:
     from loadtests.schedule.plan import Plan
@@ -98,13 +98,19 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, asked: int, crit
         if value is not None and value >= below:
             reasons.append(f"{quantile} {time} time {value:.3f} ms is not below {below:g} ms")
     return {
-        "interface": interface, "client": "wire",
-        "offered_rate": rounded(plan.step_rate), "achieved_rate": rounded(achieved),
-        "count": whole.service.total, "errors": whole.errors, "dropped": whole.dropped,
-        "p50_ms": rounded(figure(whole.response, "p50")), "p99_ms": rounded(figure(whole.response, "p99")),
-        "max_ms": rounded(figure(whole.response, "max")), "meets": not reasons,
+        "interface": interface,
+        "client": "wire",
+        "offered_rate": rounded(plan.step_rate),
+        "achieved_rate": rounded(achieved),
+        "count": whole.service.total,
+        "errors": whole.errors,
+        "dropped": whole.dropped,
+        "p50_ms": rounded(figure(whole.response, "p50")),
+        "p99_ms": rounded(figure(whole.response, "p99")),
+        "max_ms": rounded(figure(whole.response, "max")),
+        "meets": not reasons,
         "reason": "; ".join(reasons) or None,
-    }  # fmt: skip
+    }
 
 
 def _answered_in_time(answered: int, last: Histogram, seconds: float) -> float:
@@ -135,10 +141,12 @@ def knee(results: list[dict[str, Any]], interfaces: tuple[str, ...], criterion: 
         busy = missed is not None and (missed["cpu_share"] or 0.0) > _BUSY
         found.append(
             {
-                "interface": interface, "highest_rate": highest,
+                "interface": interface,
+                "highest_rate": highest,
                 "first_rate_missed": missed["offered_rate"] if missed else None,
-                "criterion": criterion.words(interface), "reason": missed["reason"] if missed else None,
+                "criterion": criterion.words(interface),
+                "reason": missed["reason"] if missed else None,
                 "limited_by": None if missed is None else ("generator" if busy else "robot"),
             }
-        )  # fmt: skip
+        )
     return found

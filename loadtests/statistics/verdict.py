@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from loadtests.statistics.figures import Measured, plain_quantiles, quantiles, rounded
 from loadtests.statistics.histogram import Histogram, edges_us
-from loadtests.statistics.resampling import SHARES, at_most
-from loadtests.statistics.summary import Measured, bounds, plain_quantiles, quantiles, rounded
+from loadtests.statistics.intervals import SHARES, at_most, quantile_interval_ms
 
 if TYPE_CHECKING:
     from loadtests.schedule.plan import Plan
@@ -45,14 +45,20 @@ def generator_figures(measured: Measured, asked: int, elapsed_s: float, cpu_shar
                 lag.merge(measured.spans(phase, name).lag)
     started = completed + errors
     return {
-        "cpu_share": rounded(cpu_share), "lag_ms": plain_quantiles(lag),
+        "cpu_share": rounded(cpu_share),
+        "lag_ms": plain_quantiles(lag),
         "asked_rate": rounded(asked / elapsed_s) if plan.open_model and elapsed_s > 0 else None,
         "achieved_rate": rounded(started / elapsed_s) if elapsed_s > 0 else None,
-        "scheduled": asked if plan.open_model else started, "started": started, "completed": completed,
-        "late": late, "dropped": dropped, "errors": errors,
+        "scheduled": asked if plan.open_model else started,
+        "started": started,
+        "completed": completed,
+        "late": late,
+        "dropped": dropped,
+        "errors": errors,
         "error_share": rounded(errors / started) if started else 0.0,
-        "connects": recorder.counters.get("connects", 0), "resends": recorder.counters.get("resends", 0),
-    }  # fmt: skip
+        "connects": recorder.counters.get("connects", 0),
+        "resends": recorder.counters.get("resends", 0),
+    }
 
 
 def invalid_because(figures: dict[str, Any], plan: Plan, pacing: str) -> tuple[list[str], list[str]]:
@@ -119,7 +125,9 @@ def judge(measured: Measured, thresholds: list[Threshold]) -> list[dict[str, Any
         if threshold.quantile == "max":
             bound, reason = entry["measured_ms"], None if whole.total else "no samples"
         else:
-            interval, reason = bounds(blocks, threshold.time, threshold.quantile, measured.plan.seed)
+            interval, reason = quantile_interval_ms(
+                [getattr(cell, threshold.time) for cell in blocks], threshold.quantile, measured.plan.seed
+            )
             bound = rounded(interval[1]) if interval else None
         entry["bound_ms"], entry["reason"] = bound, reason
         if bound is None and threshold.quantile in SHARES and _surely_above(whole, threshold):

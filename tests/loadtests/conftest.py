@@ -31,11 +31,17 @@ class Toy:
     def both(self):
         """Options that name both interfaces."""
         return [
-            "--rest", self.url,
-            "--publishers-wsdl", str(CONTRACT / "publishers.wsdl"), "--publishers-endpoint", f"{self.url}/publishers",
-            "--subscribers-wsdl", str(CONTRACT / "subscribers.wsdl"),
-            "--subscribers-endpoint", f"{self.url}/subscribers",
-        ]  # fmt: skip
+            "--rest",
+            self.url,
+            "--publishers-wsdl",
+            str(CONTRACT / "publishers.wsdl"),
+            "--publishers-endpoint",
+            f"{self.url}/publishers",
+            "--subscribers-wsdl",
+            str(CONTRACT / "subscribers.wsdl"),
+            "--subscribers-endpoint",
+            f"{self.url}/subscribers",
+        ]
 
 
 @pytest.fixture
@@ -111,9 +117,27 @@ def certificate(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tls")
     cert, key = folder / "cert.pem", folder / "key.pem"
     subprocess.run(
-        ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2",
-         "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1",
-         "-keyout", key, "-out", cert],
-        check=True, capture_output=True,
-    )  # fmt: skip
+        [
+            "openssl",
+            "req",
+            "-x509",
+            "-newkey",
+            "ec",
+            "-pkeyopt",
+            "ec_paramgen_curve:P-256",
+            "-nodes",
+            "-days",
+            "2",
+            "-subj",
+            "/CN=localhost",
+            "-addext",
+            "subjectAltName=DNS:localhost,IP:127.0.0.1",
+            "-keyout",
+            key,
+            "-out",
+            cert,
+        ],
+        check=True,
+        capture_output=True,
+    )
     return cert, key

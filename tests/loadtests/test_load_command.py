@@ -41,9 +41,23 @@ def test_a_good_robot_is_measured(toy, load, tmp_path):
         '[[threshold]]\noperation="pose"\ninterface="rest"\nquantile="p50"\nbelow_ms=5000\ntime="service"\n'
     )
     run = load(
-        *toy().both(), "--allow-motion", "--operation", "delivery", "--operation", "coffee", "--operation", "pose",
-        *SHORT, "--thresholds", limits, "--steps", "--step-rates", "40,80", "--step-duration", "0.5",
-    )  # fmt: skip
+        *toy().both(),
+        "--allow-motion",
+        "--operation",
+        "delivery",
+        "--operation",
+        "coffee",
+        "--operation",
+        "pose",
+        *SHORT,
+        "--thresholds",
+        limits,
+        "--steps",
+        "--step-rates",
+        "40,80",
+        "--step-duration",
+        "0.5",
+    )
     result = well_formed(run)
     assert run.code == (0 if result["valid"] else 4), run.out + run.err
     wanted = {(o, i, c) for o in ("delivery", "coffee", "pose") for i in ("rest", "soap") for c in ("wire", "zeep")}
@@ -212,8 +226,17 @@ def test_ports_in_use(toy, load, option):
 def test_the_closed_model_and_the_histograms_while_they_grow(toy, load):
     port = free_port()
     process, finish = load.begin(
-        "--rest", toy().url, "--users", "2", "--duration", "3", "--warmup", "0.2", "--metrics-port", port,
-    )  # fmt: skip
+        "--rest",
+        toy().url,
+        "--users",
+        "2",
+        "--duration",
+        "3",
+        "--warmup",
+        "0.2",
+        "--metrics-port",
+        port,
+    )
     wait_for(process, r"[1-9]\d* requests answered")
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=5) as answer:
         text = answer.read().decode()

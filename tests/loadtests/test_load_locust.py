@@ -21,8 +21,12 @@ LOCUST = [sys.executable, "-m", "locust", "-f", ROOT / "loadtests" / "locustfile
 def test_plain_locust_calls_everything_over_both_interfaces(toy, tmp_path):
     run = subprocess.run(
         [*LOCUST, "--headless", "-u", "8", "-r", "8", "-t", "3s", *toy().both(), "--allow-motion", "--json"],
-        capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        cwd=tmp_path,
+    )
     entries = {entry["name"]: entry for entry in json.loads(run.stdout[run.stdout.index("[") :])}
     names = set(entries)
     assert {name.split()[1] + name.split()[2] for name in names} == {"restwire", "soapwire", "restzeep", "soapzeep"}, (
@@ -37,8 +41,12 @@ def test_plain_locust_moves_nothing_unasked_and_says_when_it_cannot_begin(toy, t
     robot = toy()
     run = subprocess.run(
         [*LOCUST, "--headless", "-u", "16", "-r", "16", "-t", "4s", "--rest", robot.url, "--json"],
-        capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        cwd=tmp_path,
+    )
     assert "pose rest" in run.stdout
     assert "delivery" not in run.stdout
     lost = subprocess.run(
@@ -57,15 +65,42 @@ def test_a_worker_from_elsewhere_joins_the_master(toy, load, tmp_path):
     token.write_text("s3same")
     robot = toy("--token", "s3same")
     process, finish = load.begin(
-        *robot.both(), "--token-file", token, "--rate", "60", "--duration", "2", "--warmup", "0.4", "--client", "wire",
-        "--processes", "0", "--expect-workers", "1", "--web-port", free_port(),
-    )  # fmt: skip
+        *robot.both(),
+        "--token-file",
+        token,
+        "--rate",
+        "60",
+        "--duration",
+        "2",
+        "--warmup",
+        "0.4",
+        "--client",
+        "wire",
+        "--processes",
+        "0",
+        "--expect-workers",
+        "1",
+        "--web-port",
+        free_port(),
+    )
     port = next(found[1] for line in process.stderr if (found := re.search(r"master on 127\.0\.0\.1:(\d+)", line)))
     worker = subprocess.Popen(
-        [sys.executable, "-m", "loadtests.measuring.node", "--worker", "--master-host", "127.0.0.1",
-         f"--master-port={port}", "--token-file", token, "--rate", "60"],
-        stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "loadtests.node",
+            "--worker",
+            "--master-host",
+            "127.0.0.1",
+            f"--master-port={port}",
+            "--token-file",
+            token,
+            "--rate",
+            "60",
+        ],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     run = finish()
     assert worker.wait(20) == 0, worker.stderr.read()
     worker.stderr.close()
@@ -116,9 +151,13 @@ def test_the_kubernetes_manifest_gives_options_that_there_are():
 
 def test_the_master_lingers_for_its_result_to_be_fetched():
     run = subprocess.run(
-        [sys.executable, "-m", "loadtests.measuring.node", "--master", "--expect-workers", "1"],
-        capture_output=True, text=True, timeout=30, check=False, env=os.environ | {"ROAAS_LINGER_S": "0.1"},
-    )  # fmt: skip
+        [sys.executable, "-m", "loadtests.node", "--master", "--expect-workers", "1"],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+        env=os.environ | {"ROAAS_LINGER_S": "0.1"},
+    )
     assert run.returncode == 2
     assert "no endpoint" in run.stderr
     assert "kept for 0.1 s" in run.stderr
@@ -133,7 +172,7 @@ def free_port():
 @pytest.mark.parametrize("words", [["--worker"], ["--worker", "--master-port", "1"]])
 def test_a_worker_has_to_know_its_master(words):
     run = subprocess.run(
-        [sys.executable, "-m", "loadtests.measuring.node", *words],
+        [sys.executable, "-m", "loadtests.node", *words],
         capture_output=True,
         text=True,
         timeout=30,

@@ -19,8 +19,10 @@ def robot(domain_id):
     """The reference robot: (REST URL, publishers' WSDL, subscribers' WSDL)."""
     process = subprocess.Popen(
         [sys.executable, "-m", "roaas", "robot", "--rest-port", "0", "--soap-port", "0", "--domain-id", str(domain_id)],
-        stdout=subprocess.PIPE, text=True, env=os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+    )
     found = re.search(r"ready rest=(\S+) soap=(\S+)", process.stdout.readline())
     assert found, "the robot did not come up"
     yield found[1], found[2], found[2].replace("publisher_ws", "subscriber_ws")
@@ -32,9 +34,20 @@ def robot(domain_id):
 def test_the_reference_robot_is_measured_over_both_interfaces(robot, load):
     rest, publishers, subscribers = robot
     run = load(
-        "--rest", rest, "--publishers-wsdl", publishers, "--subscribers-wsdl", subscribers,
-        "--allow-motion", "--rate", "100", "--duration", "4", "--warmup", "1",
-    )  # fmt: skip
+        "--rest",
+        rest,
+        "--publishers-wsdl",
+        publishers,
+        "--subscribers-wsdl",
+        subscribers,
+        "--allow-motion",
+        "--rate",
+        "100",
+        "--duration",
+        "4",
+        "--warmup",
+        "1",
+    )
     result = run.result
     jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text())).validate(result)
     assert run.code == (0 if result["valid"] else 4), run.err

@@ -3,8 +3,8 @@ from hdrh.histogram import HdrHistogram
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loadtests.measuring.recorder import Recorder
 from loadtests.statistics.histogram import BINS, HIGHEST_US, Histogram, bins_of, edges_us
+from loadtests.statistics.recorder import Recorder
 
 durations = st.lists(st.integers(0, 2 * HIGHEST_US * 1000), max_size=60)
 
@@ -70,11 +70,16 @@ def test_mean_and_extremes_are_exact():
 
 requests = st.lists(
     st.tuples(
-        st.integers(0, 3), st.integers(0, 1), st.integers(0, 10**9), st.integers(0, 10**9), st.integers(-1, 10**7),
-        st.booleans(), st.sampled_from(["", "closed", "timeout"]),
+        st.integers(0, 3),
+        st.integers(0, 1),
+        st.integers(0, 10**9),
+        st.integers(0, 10**9),
+        st.integers(-1, 10**7),
+        st.booleans(),
+        st.sampled_from(["", "closed", "timeout"]),
     ),
     max_size=40,
-)  # fmt: skip
+)
 SERIES = {0: 4, 1: 6, 2: 4, 3: 5}
 
 

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from loadtests.measuring.recorder import Cell, Recorder, Spans
-from loadtests.schedule.plan import SERIES, Plan
-from loadtests.statistics.histogram import Histogram
-from loadtests.statistics.resampling import (
+from loadtests.schedule.plan import SERIES, Plan, SeriesName
+from loadtests.statistics.intervals import (
     LEAST_BLOCKS,
     SHARES,
     Interval,
     compare,
-    interval_ms,
-    order_interval_ms,
-    samples_for_interval,
+    quantile_interval_ms,
     samples_for_point,
 )
+from loadtests.statistics.recorder import Cell, Recorder, Spans
+
+if TYPE_CHECKING:
+    from loadtests.statistics.histogram import Histogram
 
 _NS = 1_000_000_000
 COMPARED = ("mean", "p50", "p90", "p99")
 WIDTH_S = 1.0
 _DIGITS = 6  # nanoseconds
-
-#: (operation, interface, client)
-Name = tuple[str, str, str]
 
 
 def rounded(value: float | None) -> float | None:
@@ -70,7 +67,7 @@ class Measured:
         self.plan = plan
         self.recorder = recorder
 
-    def blocks(self, phase: str, name: Name, label: str | None = None) -> list[tuple[int, Cell]]:
+    def blocks(self, phase: str, name: SeriesName, label: str | None = None) -> list[tuple[int, Cell]]:
         """A series' cells with the pair that each belongs to, in order of time."""
         operation, interface, client = name
         number = self.plan.operations.index(operation)
@@ -85,20 +82,20 @@ class Measured:
                 found.append((segment.pair, cell))
         return found
 
-    def total(self, phase: str, name: Name) -> Cell:
+    def total(self, phase: str, name: SeriesName) -> Cell:
         """A series' cells added up."""
         whole = Cell()
         for _, cell in self.blocks(phase, name):
             whole.merge(cell)
         return whole
 
-    def spans(self, phase: str, name: Name) -> Spans:
+    def spans(self, phase: str, name: SeriesName) -> Spans:
         """Where a series' time went."""
         operation, interface, client = name
         key = (SERIES.index((phase, interface, client)), self.plan.operations.index(operation))
         return self.recorder.spans.get(key, Spans())
 
-    def names(self) -> list[Name]:
+    def names(self) -> list[SeriesName]:
         """All series of the plan."""
         return [
             (self.plan.operations[number], interface, client)
@@ -108,7 +105,7 @@ class Measured:
         ]
 
 
-def series(measured: Measured, sizes: dict[Name, tuple[int, int]]) -> list[dict[str, Any]]:
+def series(measured: Measured, sizes: dict[SeriesName, tuple[int, int]]) -> list[dict[str, Any]]:
     """The `series` of latency.json; `sizes` are octets of request and response, as seen before the run."""
     found = []
     for name in measured.names():
@@ -125,39 +122,33 @@ def series(measured: Measured, sizes: dict[Name, tuple[int, int]]) -> list[dict[
         request, response = sizes.get(name, (None, None))
         found.append(
             {
-                "operation": name[0], "interface": name[1], "client": name[2],
-                "count": whole.service.total, "errors": whole.errors, "late": whole.late, "dropped": whole.dropped,
-                "service_ms": service, "response_ms": plain_quantiles(whole.response),
-                "ci95_ms": intervals["service"], "response_ci95_ms": intervals["response"],
+                "operation": name[0],
+                "interface": name[1],
+                "client": name[2],
+                "count": whole.service.total,
+                "errors": whole.errors,
+                "late": whole.late,
+                "dropped": whole.dropped,
+                "service_ms": service,
+                "response_ms": plain_quantiles(whole.response),
+                "ci95_ms": intervals["service"],
+                "response_ci95_ms": intervals["response"],
                 "spans_ms": {
                     part: plain_quantiles(getattr(spans, part)) if getattr(spans, part).total else None
                     for part in ("build", "wire", "server", "parse")
                 },
-                "reasons": reasons, "request_bytes": request, "response_bytes": response,
-                "histogram": whole.service.encode(), "response_histogram": whole.response.encode(),
+                "reasons": reasons,
+                "request_bytes": request,
+                "response_bytes": response,
+                "histogram": whole.service.encode(),
+                "response_histogram": whole.response.encode(),
             }
-        )  # fmt: skip
+        )
     return found
 
 
-def bounds(blocks: list[Cell], time: str, quantile: str, seed: int) -> tuple[Interval | None, str | None]:
-    """The 95 % interval of a statistic of one series; or None and why there is none."""
-    histograms = [getattr(cell, time) for cell in blocks]
-    samples = sum(histogram.total for histogram in histograms)
-    needed = 2 if quantile == "mean" else samples_for_interval(SHARES[quantile])
-    if samples < needed:
-        return None, f"{samples} samples; a 95 % interval of {quantile} needs {needed}"
-    interval = interval_ms(histograms, quantile, seed)
-    if interval is None and quantile in SHARES:
-        whole = Histogram()
-        for histogram in histograms:
-            whole.merge(histogram)
-        interval = order_interval_ms(whole, SHARES[quantile])
-    return interval, None if interval else f"fewer than {LEAST_BLOCKS} blocks"
-
-
 def _interval_of(blocks: list[Cell], time: str, quantile: str, seed: int) -> tuple[list[float] | None, str | None]:
-    interval, reason = bounds(blocks, time, quantile, seed)
+    interval, reason = quantile_interval_ms([getattr(cell, time) for cell in blocks], quantile, seed)
     return rounded_interval(interval), reason
 
 
@@ -235,12 +226,15 @@ def time_series(measured: Measured) -> dict[str, Any]:
                 seconds[int(segment.start_ns / _NS / width + 1e-9)].merge(cell)
         points = [
             {
-                "t_s": round(second * width, 3), "count": cell.service.total, "errors": cell.errors,
-                "p50_ms": rounded(cell.response.quantile_ms(0.5)), "p99_ms": rounded(cell.response.quantile_ms(0.99)),
+                "t_s": round(second * width, 3),
+                "count": cell.service.total,
+                "errors": cell.errors,
+                "p50_ms": rounded(cell.response.quantile_ms(0.5)),
+                "p99_ms": rounded(cell.response.quantile_ms(0.99)),
                 "max_ms": rounded(cell.response.highest_ns / 1e6) if cell.response.total else None,
             }
             for second, cell in sorted(seconds.items())
-        ]  # fmt: skip
+        ]
         found.append({"operation": operation, "interface": interface, "client": client, "points": points})
     return {"width_s": width, "series": found}
 
@@ -252,10 +246,15 @@ def errors(recorder: Recorder, operations: tuple[str, ...]) -> list[dict[str, An
         phase, interface, client = SERIES[number]
         found.append(
             {
-                "operation": operations[operation], "interface": interface, "client": client, "phase": phase,
-                "kind": kind, "message": failure.message, "count": failure.count,
+                "operation": operations[operation],
+                "interface": interface,
+                "client": client,
+                "phase": phase,
+                "kind": kind,
+                "message": failure.message,
+                "count": failure.count,
                 "first_s": round(max(0.0, failure.first_ns / _NS), 3),
                 "last_s": round(max(0.0, failure.last_ns / _NS), 3),
             }
-        )  # fmt: skip
+        )
     return sorted(found, key=lambda entry: -int(str(entry["count"])))

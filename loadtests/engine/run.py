@@ -16,20 +16,21 @@ from typing import Any
 
 import gevent
 
-from loadtests.measuring.step_load import climb
-from loadtests.measuring.executor import Crew, LocalCrew, busiest
-from loadtests.result.document import Gone, Outcome, compose
+from loadtests.measuring.step_load import step_load
+from loadtests.measuring.executor import Executor, LocalExecutor, busiest
+from loadtests.result.document import RunAborted, Outcome, compose
 from loadtests.exits import INCONCLUSIVE, INTERRUPTED, UNREACHABLE, USAGE
-from loadtests.clients.failures import CallError, CrewError
-from loadtests.measuring.distributed_executor import LedCrew
+from loadtests.clients.failures import CallError
+from loadtests.measuring.errors import GeneratorError
+from loadtests.measuring.distributed_executor import DistributedExecutor
 from loadtests.measuring.metrics import Collector, serve
 from loadtests.schedule.plan import Plan
 from loadtests.measuring.preflight import preflight
-from loadtests.measuring.recorder import Recorder
+from loadtests.statistics.recorder import Recorder
 from loadtests.result.files import write
 from loadtests.clients.robot import Robot
 from loadtests.settings import Settings
-from loadtests.result.terminal import final_words
+from loadtests.result.terminal import summary
 from loadtests.clients.wsdl import WsdlError, address_in, fetch
 
 _DEAD_S = 3.0
@@ -82,7 +83,7 @@ class Run:
         """Read the addresses that only a WSDL knows.
 
         Raises:
-            Gone: a WSDL is wrong, or nobody answers.
+            RunAborted: a WSDL is wrong, or nobody answers.
         """
         services = {
             "publishers": ("ExecuteDeliveryRequest", "publishers_wsdl"),
@@ -96,16 +97,16 @@ class Run:
             try:
                 found[service] = address_in(fetch(location, self.robot), location, element)
             except WsdlError as error:
-                raise Gone(USAGE, str(error)) from None
+                raise RunAborted(USAGE, str(error)) from None
             except CallError as error:
-                raise Gone(UNREACHABLE, f"the robot cannot be reached: {error}") from None
+                raise RunAborted(UNREACHABLE, f"the robot cannot be reached: {error}") from None
         self.robot = self.outcome.robot = replace(self.robot, **found)
 
     def check(self) -> None:
         """Call everything once.
 
         Raises:
-            Gone: the robot does not answer as it should; what it did answer is kept for the result.
+            RunAborted: the robot does not answer as it should; what it did answer is kept for the result.
         """
         plan = self.first_plan()
         names = [
@@ -115,15 +116,15 @@ class Run:
             for number in plan.offered(interface, client)
         ]
         if not names:
-            raise Gone(USAGE, "no operation can be measured with these endpoints")
+            raise RunAborted(USAGE, "no operation can be measured with these endpoints")
         findings = self.outcome.findings = preflight(self.robot, names, self.settings.seed)
         self.outcome.notes += findings.notes
         if self.outcome.interrupted:
-            raise Gone(INTERRUPTED, "interrupted before the measurement began")
+            raise RunAborted(INTERRUPTED, "interrupted before the measurement began")
         if findings.unreachable:
-            raise Gone(UNREACHABLE, "the robot cannot be reached: " + "; ".join(findings.messages()))
+            raise RunAborted(UNREACHABLE, "the robot cannot be reached: " + "; ".join(findings.messages()))
         if findings.failures:
-            raise Gone(INCONCLUSIVE, "the robot does not answer as it should: " + "; ".join(findings.messages()))
+            raise RunAborted(INCONCLUSIVE, "the robot does not answer as it should: " + "; ".join(findings.messages()))
         self.outcome.invalid += [
             f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
         ]
@@ -181,34 +182,36 @@ class Run:
         """Come up, warm up, duel, step.
 
         Raises:
-            Gone: the generator cannot work.
+            RunAborted: the generator cannot work.
         """
         plan, settings = self.first_plan(), self.settings
         with ExitStack() as stack:
             try:
-                crew = self.outcome.crew = self._crew()
-                stack.callback(crew.close)
+                executor = self.outcome.executor = self._executor()
+                stack.callback(executor.close)
                 if settings.metrics_port is not None:
-                    self.collector = Collector(lambda: crew.recorder, settings.operations)
+                    self.collector = Collector(lambda: executor.recorder, settings.operations)
                     stack.callback(serve(self.collector, settings.web_host, settings.metrics_port).stop)
                 if settings.web_port is not None:
-                    self._web(crew, settings.web_host, settings.web_port)
-                crew.prepare(
+                    self._web(executor, settings.web_host, settings.web_port)
+                executor.prepare(
                     self.robot, settings.operations, settings.seed, zeep="zeep" in plan.clients, users=plan.connections
                 )
-            except CrewError as error:
-                raise Gone(INTERRUPTED if self.outcome.interrupted else USAGE, str(error)) from None
-            self._tell_plan(plan, crew)
-            self._carry_out(plan, crew)
-            self.outcome.cpu_share = busiest(crew)
+            except GeneratorError as error:
+                raise RunAborted(INTERRUPTED if self.outcome.interrupted else USAGE, str(error)) from None
+            self._tell_plan(plan, executor)
+            self._carry_out(plan, executor)
+            self.outcome.cpu_share = busiest(executor)
             self.outcome.plan = plan
             if settings.step_rates and not self.outcome.interrupted and self.outcome.dead_at is None:
-                self.outcome.steps += climb(plan, crew, settings, lambda: self.outcome.interrupted, self._number, tell)
+                self.outcome.steps += step_load(
+                    plan, executor, settings, lambda: self.outcome.interrupted, self._number, tell
+                )
 
-    def _crew(self) -> Crew:
+    def _executor(self) -> Executor:
         settings = self.settings
         if settings.expect:
-            return LedCrew(
+            return DistributedExecutor(
                 settings.master_host,
                 settings.master_port,
                 settings.processes,
@@ -216,29 +219,29 @@ class Run:
                 tell,
                 lambda: self.outcome.interrupted,
             )
-        return LocalCrew()
+        return LocalExecutor()
 
     @staticmethod
-    def _web(crew: Crew, host: str, port: int) -> None:
+    def _web(executor: Executor, host: str, port: int) -> None:
         """Locust's web UI, watching; it starts and stops nothing here."""
-        web = crew.environment.create_web_ui(host, port)
+        web = executor.environment.create_web_ui(host, port)
         gevent.sleep(0.2)
         if web.greenlet.ready():
-            raise CrewError(f"the web UI's port {port} is in use: choose another with --web-port")
+            raise GeneratorError(f"the web UI's port {port} is in use: choose another with --web-port")
         tell(f"Locust's web UI: http://{host}:{port}")
 
-    def _carry_out(self, plan: Plan, crew: Crew) -> None:
+    def _carry_out(self, plan: Plan, executor: Executor) -> None:
         """Run a plan, watching for its end, Ctrl-C and the robot's death."""
         self._number(plan)
         self.outcome.plan = plan
         self._alive_at = (0.0, 0)
         ceiling = self.settings.max_rate if not plan.open_model else None
-        crew.run(plan, ceiling, lambda elapsed: self._watch(plan, crew.recorder, elapsed))
+        executor.run(plan, ceiling, lambda elapsed: self._watch(plan, executor.recorder, elapsed))
 
     def _watch(self, plan: Plan, recorder: Recorder, elapsed: float) -> bool:
         """Whether to end now."""
         self.outcome.elapsed_s = max(0.0, min(elapsed, plan.length_s))
-        if os.getppid() != self._parent:  # whoever started us is gone
+        if os.getppid() != self._parent:  # whoever started us is aborted
             self.outcome.interrupted = True
         if elapsed - self._looked >= _LOOK_S and self.outcome.dead_at is None:
             self._looked = elapsed
@@ -262,12 +265,12 @@ class Run:
             self.collector.series_of.update(plan.series_of())
 
     @staticmethod
-    def _tell_plan(plan: Plan, crew: Crew) -> None:
+    def _tell_plan(plan: Plan, executor: Executor) -> None:
         load = f"{plan.rate:g} requests/s" if plan.open_model else f"{plan.users} users"
         tell(
             f"measuring {', '.join(plan.operations)} over {' and '.join(plan.interfaces)} at {load} "
             f"for {plan.duration_s:g} s after {plan.warmup_s:g} s of warm-up, {plan.blocks} blocks, "
-            f"paced by {crew.pacing}"
+            f"paced by {executor.pacing}"
         )
 
 
@@ -277,22 +280,22 @@ def carry_out(settings: Settings) -> int:
     run = Run(settings)
     for number in (signal.SIGINT, signal.SIGTERM):
         gevent.signal_handler(number, run.interrupt)
-    gone: Gone | None = None
+    aborted: RunAborted | None = None
     try:
         run.resolve()
         run.check()
         run.measure()
-    except Gone as reason:
-        gone = reason
-        tell(f"roaas load: {gone}")
+    except RunAborted as reason:
+        aborted = reason
+        tell(f"roaas load: {aborted}")
     except Exception as trouble:  # noqa: BLE001 -- our own fault: what was measured is kept, and called invalid
         traceback.print_exc()
-        gone = Gone(INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
-    code, document = compose(run.outcome, run.outcome.plan or run.first_plan(), gone)
-    if gone is None or gone.code != USAGE:
+        aborted = RunAborted(INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
+    code, document = compose(run.outcome, run.outcome.plan or run.first_plan(), aborted)
+    if aborted is None or aborted.code != USAGE:
         path = write(Path(settings.out), document)
         tell(f"written: {path}")
-    if gone is None:
-        sys.stdout.write(final_words(document))
+    if aborted is None:
+        sys.stdout.write(summary(document))
         sys.stdout.flush()
     return code

@@ -12,9 +12,19 @@ from loadtests.schedule.pacer import Pacer
 from loadtests.schedule.plan import CLIENTS, INTERFACES, Plan
 
 PLAN = Plan(
-    operations=("delivery", "pose"), interfaces=INTERFACES, clients=CLIENTS, rate=100.0, users=None, duration_s=20.0,
-    warmup_s=1.0, arrivals="constant", seed=1, timeout_s=10.0, workers=1, connections=32,
-)  # fmt: skip
+    operations=("delivery", "pose"),
+    interfaces=INTERFACES,
+    clients=CLIENTS,
+    rate=100.0,
+    users=None,
+    duration_s=20.0,
+    warmup_s=1.0,
+    arrivals="constant",
+    seed=1,
+    timeout_s=10.0,
+    workers=1,
+    connections=32,
+)
 
 
 def everything(plan, worker=0, workers=1):
@@ -24,9 +34,12 @@ def everything(plan, worker=0, workers=1):
 
 @settings(max_examples=30, deadline=None)
 @given(
-    st.integers(1, 7), st.sampled_from(["constant", "poisson"]), st.integers(0, 2**31), st.floats(1.0, 3000.0),
+    st.integers(1, 7),
+    st.sampled_from(["constant", "poisson"]),
+    st.integers(0, 2**31),
+    st.floats(1.0, 3000.0),
     st.floats(0.3, 4.0),
-)  # fmt: skip
+)
 def test_the_workers_shares_make_up_the_schedule(workers, arrivals, seed, rate, duration):
     plan = replace(PLAN, arrivals=arrivals, seed=seed, rate=rate, duration_s=duration)
     shares = [everything(plan, worker, workers) for worker in range(workers)]

@@ -1,4 +1,4 @@
-"""Confidence intervals by resampling blocks.
+"""Confidence intervals of medians, p99s and other quantiles, and of their differences, by resampling blocks.
 
 Requests that follow one another are not independent: a stall or a drift meets many at once. The unit that is
 drawn again is therefore the block (Carlstein 1986), and for a difference or a ratio the pair of neighbouring
@@ -100,6 +100,31 @@ def _interval(values: Floats) -> Interval | None:
     return float(low), float(high)
 
 
+def quantile_interval_ms(histograms: Sequence[Histogram], name: str, seed: int) -> tuple[Interval | None, str | None]:
+    """The 95 % interval of a mean or a quantile (p50, p99, ...) of one series, as latency.json gives it.
+
+    Args:
+        histograms: one for each block.
+        name: `mean` or a key of SHARES.
+        seed: fixes the draws.
+
+    Returns:
+        The interval by resampling blocks, or from the order of the samples where there are too few blocks; or None
+        and why there is none.
+    """
+    samples = sum(histogram.total for histogram in histograms)
+    needed = 2 if name == "mean" else samples_for_interval(SHARES[name])
+    if samples < needed:
+        return None, f"{samples} samples; a 95 % interval of {name} needs {needed}"
+    interval = resampled_interval_ms(histograms, name, seed)
+    if interval is None and name in SHARES:
+        whole = Histogram()
+        for histogram in histograms:
+            whole.merge(histogram)
+        interval = order_interval_ms(whole, SHARES[name])
+    return interval, None if interval else f"fewer than {LEAST_BLOCKS} blocks"
+
+
 def at_most(count: int, trials: int, share: float) -> float:
     """The probability that a binomial variable is at most `count`."""
     if count >= trials:
@@ -126,7 +151,7 @@ def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
     return (bounds[0] or 0.0), (bounds[1] or 0.0)
 
 
-def interval_ms(histograms: Sequence[Histogram], name: str, seed: int) -> Interval | None:
+def resampled_interval_ms(histograms: Sequence[Histogram], name: str, seed: int) -> Interval | None:
     """The 95 % interval of a statistic of one series, from its blocks; None with fewer than LEAST_BLOCKS."""
     filled = [histogram for histogram in histograms if histogram.total]
     if len(filled) < LEAST_BLOCKS:

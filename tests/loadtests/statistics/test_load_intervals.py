@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from loadtests.measuring.recorder import Recorder
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Plan
+from loadtests.statistics.figures import Measured, quantiles, series, time_series
 from loadtests.statistics.histogram import Histogram
-from loadtests.statistics.resampling import (
+from loadtests.statistics.intervals import (
     compare,
-    interval_ms,
     order_interval_ms,
+    resampled_interval_ms,
     samples_for_interval,
     samples_for_point,
 )
-from loadtests.statistics.summary import Measured, quantiles, series, time_series
+from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.thresholds import Threshold
 from loadtests.statistics.verdict import judge
 
@@ -46,7 +46,7 @@ def test_intervals_cover_the_truth_as_often_as_they_promise():
         drift = lot.normal(0, 0.05, size=(30, 1))
         rest = np.exp(lot.normal(0, 0.2, size=(30, 20)) + drift)
         soap = 1.5 * np.exp(lot.normal(0, 0.2, size=(30, 20)) + drift)
-        low, high = interval_ms([block(row) for row in rest], "p50", trial)
+        low, high = resampled_interval_ms([block(row) for row in rest], "p50", trial)
         medians += low <= 1.0 <= high
         found = compare([(block(a), block(b)) for a, b in zip(rest, soap, strict=True)], "p50", trial)
         ratios += found.ci95[0] <= 1.5 <= found.ci95[1]
@@ -103,9 +103,19 @@ def test_a_threshold_is_judged_by_what_is_certain(values, below, outcome):
 
 
 STALL = Plan(
-    operations=("pose",), interfaces=("rest", "soap"), clients=("wire", "zeep"), rate=100.0, users=None,
-    duration_s=20.0, warmup_s=0.0, arrivals="constant", seed=1, timeout_s=10.0, workers=1, connections=300,
-)  # fmt: skip
+    operations=("pose",),
+    interfaces=("rest", "soap"),
+    clients=("wire", "zeep"),
+    rate=100.0,
+    users=None,
+    duration_s=20.0,
+    warmup_s=0.0,
+    arrivals="constant",
+    seed=1,
+    timeout_s=10.0,
+    workers=1,
+    connections=300,
+)
 
 
 def simulated(plan, stall_from, stall_s, service_ms=1.0, *, open_model=True):

@@ -11,7 +11,7 @@ from urllib3 import Retry
 
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.failures import CallError
-from loadtests.clients.library import OrdinaryRest, Sent, new_session
+from loadtests.clients.library import LibraryRest, Sent, new_session
 from loadtests.clients.payloads import rest_request
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Connection, Request
@@ -98,7 +98,7 @@ def test_a_host_that_takes_no_connection():
             Connection(endpoint, 0.3).call(get(endpoint))
         assert caught.value.kind == "network"
         with pytest.raises(CallError, match="no connection within the deadline") as caught:
-            OrdinaryRest(Robot(endpoint.url, None, None, timeout_s=0.3)).call("pose", {})
+            LibraryRest(Robot(endpoint.url, None, None, timeout_s=0.3)).call("pose", {})
         assert caught.value.kind == "network"
         for one in waiting:
             one.close()

@@ -1,0 +1,1 @@
+"""One run from settings to the written result: addresses, plan, measurement, exit code."""
