@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 from conformance.contract.ledger import CLASSES
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.session import Session
-from conformance.transport.client import HttpClient, NoAnswerError
+from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from conformance.contract.statement import Statement
+    from conformance.transport.client import HttpClient
 
 _TEMPLATE = """\
 # Implementation conformance statement: what the vendor says of the robot, and what it is then judged by.
@@ -100,7 +101,7 @@ def _quoted(text: Any) -> str:
 def _openapi(rest: HttpClient) -> dict[str, Any]:
     try:
         answer = rest.send("GET", "/openapi.json").response
-        document = json.loads(answer.body) if answer and answer.ok else {}
+        document = json.loads(answer.body) if answer.ok else {}
     except (NoAnswerError, ValueError, RecursionError):
         return {}
     return document if isinstance(document, dict) else {}
@@ -125,8 +126,9 @@ def _claims(session: Session) -> tuple[list[str], dict[str, str]]:
     if session.rest and "rest" not in session.unreachable and "rest-formats" not in doubts:
         try:
             answer = session.rest.send("GET", session.rest_path(), headers=[("Accept", "application/xml")]).response
+            xml = answer.media_type == "application/xml"
         except NoAnswerError:
-            answer = None
-        if answer is None or answer.media_type != "application/xml":
+            xml = False
+        if not xml:
             doubts["rest-formats"] = "the robot did not send XML when asked for it"
     return list(CLASSES), doubts

@@ -5,7 +5,7 @@ from __future__ import annotations
 import traceback
 from typing import TYPE_CHECKING
 
-from conformance.transport.client import NoAnswerError
+from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.evidence import RefutedError
 
 if TYPE_CHECKING:
@@ -40,19 +40,21 @@ def settle(session: Session, ids: tuple[str, ...], judged: dict[str, int], error
 def _no_answer(session: Session, known: list[str], open_ids: list[str], error: NoAnswerError) -> None:
     if session.alive():
         for id_ in open_ids:
-            session.judge.check(id_, False, error.exchange, "an answer")  # noqa: FBT003 - the condition of check()
+            session.judge.check(id_, False, error.unanswered, "an answer")  # noqa: FBT003 - the condition of check()
         return
-    request = error.exchange.request
+    request = error.unanswered.request
     risked = [id_ for id_ in known if id_ in session.judge.at_risk]
     for id_ in risked:
         session.judge.check(
             id_,
             False,  # noqa: FBT003 - the condition of check()
-            error.exchange,
+            error.unanswered,
             "a robot that still answers after this request",
-            found=f"{error.exchange.problem}, and no answer to anything since",
+            found=f"{error.unanswered.problem}, and no answer to anything since",
         )
-    session.aborted = f"the robot stopped answering ({error.exchange.problem}, at {request.method} {request.url[:200]})"
+    session.aborted = (
+        f"the robot stopped answering ({error.unanswered.problem}, at {request.method} {request.url[:200]})"
+    )
     for id_ in open_ids:
         if id_ not in risked:
             session.judge.error(id_, session.aborted)

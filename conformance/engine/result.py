@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
 from conformance.contract.ledger import CLASS_TITLES
+from conformance.transport.exchange import Unanswered
 
 if TYPE_CHECKING:
     import datetime as dt
     from collections.abc import Mapping
 
     from conformance.engine.session import Session
-    from conformance.transport.exchange import Exchange
+    from conformance.transport.exchange import Attempt
     from conformance.verdict.evidence import Finding
     from conformance.verdict.verdicts import Verdict
 
@@ -126,7 +127,7 @@ def _failure(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _request(exchange: Exchange) -> dict[str, Any]:
+def _request(exchange: Attempt) -> dict[str, Any]:
     request = exchange.request
     curl = request.curl()
     if len(curl) > _SHOWN_CURL:
@@ -135,10 +136,10 @@ def _request(exchange: Exchange) -> dict[str, Any]:
     return {**shown, **_body(request.raw if request.raw is not None else request.body)}
 
 
-def _response(exchange: Exchange) -> dict[str, Any]:
-    response = exchange.response
-    if response is None:
+def _response(exchange: Attempt) -> dict[str, Any]:
+    if isinstance(exchange, Unanswered):
         return {"status": None, "headers": {}, "body": None, "elapsed_ms": None, "error": exchange.problem}
+    response = exchange.response
     return {
         "status": response.status,
         "headers": _headers(response.headers),

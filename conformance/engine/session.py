@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from conformance.contract.files import Contract
 from conformance.contract.statement import Statement
-from conformance.transport.client import Connection, HttpClient, NoAnswerError
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import NoAnswer, NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
@@ -119,11 +120,11 @@ class Session:
                 answer = client.send(method, target).response
             except NoAnswerError as none:
                 self.unreachable[name] = str(none)
-                if none.kind in {"refused", "tls"}:
+                if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS}:
                     return
                 continue
             self.unreachable.pop(name, None)
-            times.append(answer.elapsed_ms if answer else 0.0)
+            times.append(answer.elapsed_ms)
             if len(times) == _LOOKS:
                 break
         if times:
@@ -148,7 +149,7 @@ class Session:
                     try:
                         client.send(method, target, fresh=True, timeout_s=min(_GRACE_S, self.connection.timeout_s))
                     except NoAnswerError as none:
-                        if none.kind == "refused":
+                        if none.kind is NoAnswer.REFUSED:
                             break
                         continue
                     return True

@@ -44,7 +44,7 @@ def readable(session: Session, operation: Operation) -> Call:
         _SMALL[key] = ""
         for text in ("", "0", "1", "0.5"):
             answer = _with(call, required, text).send(session).response
-            if answer is not None and answer.ok:
+            if answer.ok:
                 _SMALL[key] = text
                 break
     return _with(call, required, _SMALL[key])
@@ -65,7 +65,7 @@ def answered(session: Session) -> list[Call]:
     found = []
     for call in reads(session):
         answer = call.send(session).response
-        if answer is not None and answer.status == 200:  # noqa: PLR2004 - RFC 9110 15.3.1
+        if answer.status == 200:  # noqa: PLR2004 - RFC 9110 15.3.1
             found.append(call)
     return found
 

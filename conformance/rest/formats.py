@@ -69,7 +69,7 @@ def disagreements(session: Session, call: Call, media_types: list[str]) -> tuple
 
 def _picture(exchange: Exchange, media_type: str, schema: Schema) -> dict[str, Any] | None:
     answer = exchange.response
-    if answer is None or not answer.ok or answer.media_type != media_type:
+    if not answer.ok or answer.media_type != media_type:
         return None
     try:
         return flattened(read(media_type, answer.body, schema))

@@ -13,14 +13,14 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.rest import declared, problem
 from conformance.rest.request_context import Sent
+from conformance.transport.exchange import Listener, NoAnswer
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
-    from conformance.transport.exchange import Exchange, Response
+    from conformance.transport.exchange import Exchange, Request, Response, Unanswered
 
 # Methods of which a server may say that it knows none (RFC 9110 15.6.2); the others it has to know.
 KNOWN_METHODS = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS"})
-_NO_HTTP = "the answer is no HTTP"
 
 
 def watch(session: Session) -> None:
@@ -29,7 +29,7 @@ def watch(session: Session) -> None:
         session.connection.listeners.append(Observer(session))
 
 
-class Observer:
+class Observer(Listener):
     """Judges exchanges.
 
     Args:
@@ -39,24 +39,11 @@ class Observer:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def __call__(self, exchange: Exchange) -> None:
+    def answered(self, exchange: Exchange) -> None:
         """Judge one exchange; what went to another interface is none of ours."""
-        session = self._session
-        if session.rest is None or self._is_soap(exchange.request.url):
-            return
-        sent = Sent.of(session.contract, session.rest.base_url, exchange.request)
+        session, answer = self._session, exchange.response
+        sent = self._seen(exchange.request)
         if sent is None:
-            return
-        answer = exchange.response
-        if answer is None:
-            if sent.usual and exchange.problem.startswith(_NO_HTTP):
-                session.judge.check(
-                    "http/framing",
-                    holds=False,
-                    exchange=exchange,
-                    expected="well-framed HTTP",
-                    found=exchange.problem,
-                )
             return
         self._judge_fields(exchange, answer, sent)
         if answer.body and not sent.is_head and is_json(answer.media_type):
@@ -67,6 +54,21 @@ class Observer:
         self._judge_server_error(exchange, answer, sent)
         if sent.operation is not None:
             declared.judge(session, exchange, answer, sent)
+
+    def unanswered(self, request: Unanswered) -> None:
+        """Judge an answer that is no HTTP, where the request gave no reason for it."""
+        sent = self._seen(request.request)
+        if sent is not None and sent.usual and request.kind is NoAnswer.MALFORMED:
+            self._session.judge.check(
+                "http/framing", holds=False, exchange=request, expected="well-framed HTTP", found=request.problem
+            )
+
+    def _seen(self, request: Request) -> Sent | None:
+        """The request, seen from the contract; None where it went to another interface."""
+        session = self._session
+        if session.rest is None or self._is_soap(request.url):
+            return None
+        return Sent.of(session.contract, session.rest.base_url, request)
 
     def _is_soap(self, url: str) -> bool:
         services = (self._session.publishers, self._session.subscribers)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from conformance.rest import problem
-from conformance.transport.client import NoAnswerError
+from conformance.transport.exchange import NoAnswer, NoAnswerError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,20 +58,22 @@ def judge_refusal(
     try:
         exchange = send()
     except NoAnswerError as none:
-        if closing and none.kind == "closed":
-            return judge.check(requirement, holds=True, exchange=none.exchange, expected="4xx, or a closed connection")
-        if none.kind not in {"closed", "garbage"} or not session.alive():
+        if closing and none.kind is NoAnswer.CLOSED:
+            return judge.check(
+                requirement, holds=True, exchange=none.unanswered, expected="4xx, or a closed connection"
+            )
+        if none.kind not in {NoAnswer.CLOSED, NoAnswer.MALFORMED} or not session.alive():
             raise
         return judge.check(
             requirement,
             holds=False,
-            exchange=none.exchange,
+            exchange=none.unanswered,
             expected=f"4xx for {what}",
             found=str(none),
             cause=f"{what.split(' at ', 1)[0]} {none.kind}",
         )
     answer = exchange.response
-    status = answer.status if answer else 0
+    status = answer.status
     refused = judge.check(
         requirement,
         refuses(status),
@@ -80,7 +82,7 @@ def judge_refusal(
         found=f"status {status}",
         cause=f"{what.split(' at ', 1)[0]} {status}",
     )
-    if not refused or answer is None:
+    if not refused:
         return False
     if json and malformed is not None:
         fitting = _MALFORMED if malformed else _INVALID
@@ -98,7 +100,7 @@ def judge_refusal(
 
 
 def _judge_detail(session: Session, exchange: Exchange, what: str, field: str, shown: str) -> None:
-    detail = problem.detail_of(exchange.response) if exchange.response else ""
+    detail = problem.detail_of(exchange.response)
     for requirement, wanted, named in (
         ("http/problem-detail", f"the field {field!r}", problem.names(detail, field) if field else True),
         ("http/problem-value", f"the value {shown!r}", shown in detail),

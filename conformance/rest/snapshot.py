@@ -26,8 +26,6 @@ _WINDOWS = 12
 def leaves(exchange: Exchange) -> Picture:
     """Status and every single value of a JSON answer, by place."""
     answer = exchange.response
-    if answer is None:
-        return {"status": 0}
     picture: Picture = {"status": answer.status}
     if answer.ok and is_json(answer.media_type):
         text = read_json(answer.body)

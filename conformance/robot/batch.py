@@ -70,7 +70,7 @@ class Batch:
         """
         self._observer.mark()
         sent = [one for order in orders for one in self._send(order)]
-        accepted = [one for one in sent if one.exchange.response is not None and one.exchange.response.ok]
+        accepted = [one for one in sent if one.exchange.response.ok]
         seen = self._observer.collect(len(accepted))
         return self._judge_each(accepted, seen) & self._judge_order(accepted, seen)
 

@@ -153,6 +153,6 @@ def observer_of(session: Session) -> DeliveryObserver:
     if session.rest is None:
         raise NoObserverError(reason)
     exchange = session.rest.send("GET", DELIVERIES, headers=ACCEPT_JSON)
-    if exchange.response is None or not exchange.response.ok:
+    if not exchange.response.ok:
         raise NoObserverError(f"{reason}, and the robot has no list of deliveries ({exchange.came})")
     return ListObserver(session.rest, session.effort.usual_ms / 1000)

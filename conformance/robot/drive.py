@@ -90,14 +90,14 @@ class Drive:
     def _judge_put(self, exchange: Exchange, velocity: Velocity, name: str) -> bool:
         self.answered = time.monotonic()
         answer = exchange.response
-        if answer is not None and answer.status == _BUSY and self.robot.goal()[0] is not None:
+        if answer.status == _BUSY and self.robot.goal()[0] is not None:
             raise BusyError("the robot follows a goal of its own")
         fastest = self._fastest or Velocity()
         self._fastest = Velocity(*(max(pair) for pair in zip(fastest, map(abs, velocity), strict=True)))
         kind, shape = ("Vector3", VECTOR3) if name == "linear-put" else ("Twist", TWIST)
         expected = f"200 with the accepted {kind}, or 204"
         problem = ""
-        if answer is None or answer.status not in {200, 204}:
+        if answer.status not in {200, 204}:
             problem = exchange.came
         elif answer.status == 200:  # noqa: PLR2004 - with content
             value, problem = read_as(answer, shape)

@@ -102,7 +102,7 @@ def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
     until = time.monotonic() + (robot.settle_s if seconds is None else seconds)
     while True:
         exchange = robot.get(GOAL_PATH)
-        if (exchange.response and exchange.response.status == 404) or time.monotonic() > until:  # noqa: PLR2004 - none
+        if exchange.response.status == 404 or time.monotonic() > until:  # noqa: PLR2004 - none
             return exchange
         time.sleep(_STEP_S)
 

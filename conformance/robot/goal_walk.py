@@ -88,12 +88,12 @@ class GoalMachine(RuleBasedStateMachine):
         self._robot.delete_goal()
         exchange = await_none(self._robot)
         self._active = None
-        return exchange.response is not None and exchange.response.status == _NONE
+        return exchange.response.status == _NONE
 
     def _look(self) -> bool:
         goal, exchange = self._robot.goal()
         if self._active is None:
-            none = exchange.response is not None and exchange.response.status == _NONE
+            none = exchange.response.status == _NONE
             return self._that("goal-none", none, exchange, "404 without an active goal")
         if goal is None and arrived(self._robot, self._pose):
             self._active = None
@@ -112,7 +112,7 @@ class GoalMachine(RuleBasedStateMachine):
     def _put_again(self, body: dict[str, Any], pose: Pose) -> bool:
         """The active goal's id: a repetition, or a contradiction."""
         exchange = put_goal(self._robot, body)
-        status = exchange.response.status if exchange.response else 0
+        status = exchange.response.status
         if arrived(self._robot, self._pose):
             return self._clear()
         if pose == self._pose:
@@ -124,7 +124,7 @@ class GoalMachine(RuleBasedStateMachine):
     def _put_new(self, body: dict[str, Any], pose: Pose) -> bool:
         """Another goal than the active one, or the first."""
         exchange = put_goal(self._robot, body)
-        status = exchange.response.status if exchange.response else 0
+        status = exchange.response.status
         displaces = self._active is not None
         if not self._that("goal-put", status in NEW, exchange, "201 or 202 for a new goal"):
             return False
@@ -140,13 +140,13 @@ class GoalMachine(RuleBasedStateMachine):
         if not self._look():
             return False
         exchange = self._robot.delete_goal()
-        status = exchange.response.status if exchange.response else 0
+        status = exchange.response.status
         if self._active is None:
             return self._that("goal-delete-none-success", status in {*CANCELLED, _NONE}, exchange, "404 or 204")
         near = arrived(self._robot, self._pose)
         self._active = None
         none = await_none(self._robot)
-        gone = none.response is not None and none.response.status == _NONE
+        gone = none.response.status == _NONE
         holds = (status in CANCELLED or (near and status == _NONE)) and gone
         return self._that("goal-delete", holds, exchange, "204, then 404 for GET", exchange.came if gone else none.came)
 

@@ -63,14 +63,14 @@ MESSAGE_TYPE: Final = Shape(_SENSORS["items"]["properties"]["type"])
 SERVICE_TYPE: Final = Shape(_SERVICES["items"]["properties"]["type"])
 
 
-def read_as(response: Response | None, shape: Shape, status: int = 200) -> tuple[Any, str]:
+def read_as(response: Response, shape: Shape, status: int = 200) -> tuple[Any, str]:
     """The value of a shape in an answer with a status.
 
     Returns:
         (value, ""), or (None, what is wrong with the answer).
     """
-    if response is None or response.status != status:
-        return None, f"status {response.status}" if response else "no answer"
+    if response.status != status:
+        return None, f"status {response.status}"
     text = read_json(response.body)
     problem = text.unreadable or shape.problem(text.value)
     return (None, problem) if problem else (text.value, "")

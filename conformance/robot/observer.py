@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from conformance.contract.statement import Limits
 from conformance.robot.geometry import length_of
 from conformance.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
+from conformance.transport.exchange import Listener
 
 if TYPE_CHECKING:
     from conformance.documents.json_schema import Shape
@@ -35,16 +36,12 @@ _TOO_MANY: Final = 429
 
 def observe(session: Session) -> None:
     """Let a run's readings be judged, once however often it is called."""
-    if session.rest is None or any(isinstance(getattr(one, "__self__", None), Observer) for one in _listeners(session)):
+    if session.rest is None or any(isinstance(one, Observer) for one in session.connection.listeners):
         return
-    session.connection.listeners.append(Observer(session).see)
+    session.connection.listeners.append(Observer(session))
 
 
-def _listeners(session: Session) -> list[Any]:
-    return list(session.connection.listeners)
-
-
-class Observer:
+class Observer(Listener):
     """Listens to the exchanges of one run."""
 
     def __init__(self, session: Session) -> None:
@@ -56,13 +53,13 @@ class Observer:
         self._last_stamp: tuple[int, int] | None = None
         self._last_received = 0.0
 
-    def see(self, exchange: Exchange) -> None:
+    def answered(self, exchange: Exchange) -> None:
         """Judge one exchange, where it is a plain reading."""
         reading = self._readings.get(exchange.request.url)
         if reading is None or exchange.request.method != "GET" or not self._plain(exchange):
             return
         response = exchange.response
-        if response is None or response.status == _TOO_MANY:
+        if response.status == _TOO_MANY:
             return
         path, id_, shape, expected = reading
         judge = self._session.judge

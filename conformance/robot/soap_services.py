@@ -57,6 +57,6 @@ def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> 
 def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
     """The ``return`` elements of a response, and what is wrong where it is none."""
     read: Envelope | None = read_answer(exchange)
-    if exchange.response is None or not exchange.response.ok or read is None or read.first is None or read.fault:
+    if not exchange.response.ok or read is None or read.first is None or read.fault:
         return [], f"no SOAP response: {exchange.came}"
     return [child for child in elements(read.first) if local(str(child.tag)) == "return"], ""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from conformance.documents.json_text import read_json
 from conformance.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
-from conformance.transport.client import HttpClient, NoAnswerError
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -100,11 +101,11 @@ class _Stiller:
             current = self._ask("GET", _GOAL, _ACCEPT)
             # Anything but a goal that can be read: there is none, or no such resource, or no telling. Whether the robot
             # moves is seen by its velocity.
-            if current is None or current.response is None or not current.response.ok or not _shows(current.response):
+            if current is None or not current.response.ok or not _shows(current.response):
                 return True
             if time.monotonic() > until:
                 return False
-            if cancelled is None or cancelled.response is None or not cancelled.response.ok:
+            if cancelled is None or not cancelled.response.ok:
                 time.sleep(_STEP_S)
 
     def _wait(self, until: float) -> str:
@@ -123,7 +124,7 @@ class _Stiller:
     def _speed(self) -> tuple[float, str]:
         """The greatest component of the measured velocity, and why it cannot be told."""
         read = self._ask("GET", _VELOCITY, _ACCEPT)
-        if read is not None and read.response is not None and read.response.status == _NOT_FOUND:
+        if read is not None and read.response.status == _NOT_FOUND:
             return 0.0, ""  # a robot without this resource: nothing says that it moves
         twist: Any
         odometry: Any

@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from conformance.robot.drive import BusyError, Drive
-from conformance.transport.client import NoAnswerError
+from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
     from collections.abc import Callable

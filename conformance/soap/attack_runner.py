@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final
 
 from conformance.soap.attacks import LEAKS, MARK
 from conformance.soap.calls import read_exchange
-from conformance.transport.client import NoAnswerError
+from conformance.transport.exchange import NoAnswer, NoAnswerError, Unanswered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from conformance.soap.attacks import Attack
     from conformance.soap.callback_server import Trap
-    from conformance.transport.exchange import Exchange
+    from conformance.transport.exchange import Attempt, Exchange
     from conformance.verdict.evidence import Judge
 
 _LEAK: Final = re.compile(LEAKS)
@@ -34,7 +34,7 @@ class Siege:
 
     Attributes:
         judge: takes what is seen.
-        send: sends an attack and returns the exchange, whether the robot answered or not.
+        send: sends an attack, and returns what became of it, whether the robot answered or not.
         ask: sends the harmless request.
         usual_ms: how long the robot takes for that.
         ids: the requirements that an attack is a case of.
@@ -43,12 +43,12 @@ class Siege:
     """
 
     judge: Judge
-    send: Callable[[Attack], Exchange]
+    send: Callable[[Attack], Attempt]
     ask: Callable[[], Exchange]
     usual_ms: float
     ids: Callable[[Attack], tuple[str, ...]] = lambda attack: (f"xml-security/{attack.name}",)
     troubles: int = 0
-    lured: list[tuple[Attack, Exchange, tuple[str, ...]]] = field(default_factory=list)
+    lured: list[tuple[Attack, Attempt, tuple[str, ...]]] = field(default_factory=list)
 
     def attack(self, attack: Attack) -> None:
         """Send one attack and judge what became of it.
@@ -60,19 +60,22 @@ class Siege:
             return
         ids = self.ids(attack)
         self.judge.at_risk = (*ids, "xml-security/responsive")
-        exchange = self.send(attack)
-        if exchange.response is None and not _closed(exchange):
+        attempt = self.send(attack)
+        if isinstance(attempt, Unanswered) and not _closed(attempt):
             self.troubles += 1
         for id_ in ids:
-            self._judge(id_, attack, exchange)
+            self._judge(id_, attack, attempt)
         if attack.lure:
-            self.lured.append((attack, exchange, ids))
-        self._well(attack, exchange)
+            self.lured.append((attack, attempt, ids))
+        self._well(attack, attempt)
         self.judge.at_risk = ()
 
-    def _judge(self, id_: str, attack: Attack, exchange: Exchange) -> None:
-        answer = read_exchange(exchange)
-        body = exchange.response.body if exchange.response is not None else b""
+    def _judge(self, id_: str, attack: Attack, attempt: Attempt) -> None:
+        refusal = f"a refusal, or the connection closed, for {attack.what}"
+        if isinstance(attempt, Unanswered):
+            self.judge.check(id_, _closed(attempt), attempt, refusal if attack.must_refuse else "an answer")
+            return
+        answer, body, exchange = read_exchange(attempt), attempt.response.body, attempt
         leak = _LEAK.search(body)
         if leak:
             found = f"the answer shows {ascii(leak[0][:60])[2:-1]!r}, of a file of the robot"
@@ -80,25 +83,23 @@ class Siege:
         elif attack.name == "internal-entity" and MARK.encode() in body and MARK.encode() not in attack.body:
             self.judge.check(id_, False, exchange, "an entity that is not expanded", found="the answer shows its text")  # noqa: FBT003 - the condition
         elif not attack.must_refuse:
-            self.judge.check(id_, exchange.response is not None or _closed(exchange), exchange, "an answer")
+            self.judge.check(id_, True, exchange, "an answer")  # noqa: FBT003 - the condition
         else:
             self.judge.check(
                 id_,
-                answer.fault is not None or answer.status >= _REFUSED or _closed(exchange),
+                answer.fault is not None or answer.status >= _REFUSED,
                 exchange,
-                f"a refusal, or the connection closed, for {attack.what}",
-                found=answer.told if exchange.response is not None else exchange.problem,
+                refusal,
+                found=answer.told,
                 cause=f"{attack.name} taken" if answer.taken else "",
             )
 
-    def _well(self, attack: Attack, exchange: Exchange) -> None:
+    def _well(self, attack: Attack, attempt: Attempt) -> None:
         """Ask the harmless request: one answer in time is enough, for a loaded machine is no attacked robot."""
         allowed = max(_ALWAYS_MS, _SLOWER * self.usual_ms)
         fastest = float("inf")
         for _ in range(_TRIES):
-            answer = self.ask().response
-            if answer is not None:
-                fastest = min(fastest, answer.elapsed_ms)
+            fastest = min(fastest, self.ask().response.elapsed_ms)
             if fastest <= allowed:
                 break
         else:
@@ -106,9 +107,9 @@ class Siege:
         self.judge.check(
             "xml-security/responsive",
             fastest <= allowed,
-            exchange,
+            attempt,
             f"an answer within {allowed:.0f} ms after {attack.what}",
-            found=f"{fastest:.0f} ms" if fastest < float("inf") else "no answer",
+            found=f"{fastest:.0f} ms",
             cause=f"slow after {attack.name}",
         )
 
@@ -130,7 +131,7 @@ def judge_calls(judge: Judge, trap: Trap, sieges: Iterable[Siege]) -> None:
             )
 
 
-def outcome(send: Callable[[], Exchange]) -> Exchange:
+def outcome(send: Callable[[], Exchange]) -> Attempt:
     """Send an attack; a connection that breaks is an outcome as well.
 
     Raises:
@@ -139,10 +140,11 @@ def outcome(send: Callable[[], Exchange]) -> Exchange:
     try:
         return send()
     except NoAnswerError as none:
-        if none.kind in {"refused", "tls", "unasked"}:
+        if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS, NoAnswer.CIRCUIT_OPEN}:
             raise
-        return none.exchange
+        return none.unanswered
 
 
-def _closed(exchange: Exchange) -> bool:
-    return exchange.response is None and ("closed" in exchange.problem or "broken" in exchange.problem)
+def _closed(attempt: Unanswered) -> bool:
+    """Whether the robot broke the connection off, be it in the middle of an answer, which is then malformed."""
+    return attempt.kind is NoAnswer.CLOSED or "closed" in attempt.problem

@@ -32,7 +32,7 @@ class Answer:
     @property
     def status(self) -> int:
         """HTTP status."""
-        return self.exchange.response.status if self.exchange.response else 0
+        return self.exchange.response.status
 
     @property
     def fault(self) -> Fault | None:
@@ -78,8 +78,6 @@ class Answer:
 
 def read_exchange(exchange: Exchange) -> Answer:
     """What an exchange comes to."""
-    if exchange.response is None:
-        return Answer(exchange, None, exchange.problem)
     if not exchange.response.body:
         return Answer(exchange, None, "an empty body")
     try:

@@ -104,8 +104,6 @@ def read_root(root: etree._Element) -> Envelope:
 
 def read_answer(exchange: Exchange) -> Envelope | None:
     """The message in an answer; None where the answer holds none (see read())."""
-    if exchange.response is None:
-        return None
     try:
         return read(exchange.response.body)
     except NotSoapError:

@@ -10,6 +10,7 @@ from lxml import etree
 from conformance.documents.xml import NotXmlError, elements, has_doctype, parse
 from conformance.documents.xml_names import ENVELOPE, clark, local, namespace
 from conformance.soap.envelope import Envelope, Fault, NotSoapError, read_root
+from conformance.transport.exchange import Listener
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -57,7 +58,7 @@ PASSIVE: Final = tuple(
 )
 
 
-class SoapObserver:
+class SoapObserver(Listener):
     """Judges every answer to a POST at one of the endpoints.
 
     Args:
@@ -69,10 +70,10 @@ class SoapObserver:
         self._judge = judge
         self._endpoints = endpoints
 
-    def __call__(self, exchange: Exchange) -> None:
+    def answered(self, exchange: Exchange) -> None:
         """Take an exchange, whatever it is."""
         request, response = exchange.request, exchange.response
-        if response is None or request.method != "POST" or request.url not in self._endpoints:
+        if request.method != "POST" or request.url not in self._endpoints:
             return
         self._that("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, exchange, "HTTP/1.1 or HTTP/1.0")
         self._that(

@@ -15,13 +15,14 @@ from conformance.contract.statement import StatementError
 from conformance.documents.wsdl import Description, DescriptionError, describe, faults, read_file
 from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL_SOAP, clark
-from conformance.transport.client import Connection, HttpClient, NoAnswerError
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from conformance.documents.xml_node import Node
-    from conformance.transport.exchange import Exchange
+    from conformance.transport.exchange import Attempt, Exchange
 
 MEDIA_TYPE = "text/xml; charset=utf-8"
 # How long the address in a WSDL is given to answer before the WSDL's own is taken instead, s.
@@ -51,7 +52,7 @@ class SoapService:
     wsdl_source: str | None = None
     wsdl: bytes | None = None
     wsdl_problem: str = ""
-    wsdl_exchange: Exchange | None = None
+    wsdl_exchange: Attempt | None = None
     contract_wsdl_path: Path | None = None
     address: str | None = None
     examples: dict[str, Node | None] = field(default_factory=dict, repr=False)
@@ -157,7 +158,7 @@ class SoapService:
                 exchange = client.send("GET", path)
         except NoAnswerError as none:
             raise OSError(str(none)) from none
-        if exchange.response is None or exchange.response.status != 200:  # noqa: PLR2004 - RFC 9110 15.3.1
+        if exchange.response.status != 200:  # noqa: PLR2004 - RFC 9110 15.3.1
             raise OSError(f"GET {path} is answered with {exchange.came}")
         return exchange.response.body
 
@@ -203,7 +204,7 @@ def open_service(
     )
 
 
-def _obtain(name: str, wsdl: str, connection: Connection) -> tuple[bytes | None, str, Exchange | None]:
+def _obtain(name: str, wsdl: str, connection: Connection) -> tuple[bytes | None, str, Attempt | None]:
     """The WSDL, why there is none, and the request for it."""
     if "://" not in wsdl:
         try:
@@ -215,9 +216,9 @@ def _obtain(name: str, wsdl: str, connection: Connection) -> tuple[bytes | None,
         with closing(HttpClient(base, connection)) as client:
             exchange = client.send("GET", path)
     except NoAnswerError as none:
-        return None, str(none), none.exchange
+        return None, str(none), none.unanswered
     answer = exchange.response
-    if answer is None or answer.status != 200:  # noqa: PLR2004 - RFC 9110 15.3.1
+    if answer.status != 200:  # noqa: PLR2004 - RFC 9110 15.3.1
         return None, f"GET {wsdl} is answered with {exchange.came}", exchange
     return answer.body, "", exchange
 

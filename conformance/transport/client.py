@@ -13,10 +13,18 @@ from urllib.parse import urlsplit
 import httpcore
 
 from conformance.transport.deadlines import MAX_ANSWER, DeadlineBackend, set_deadline, tls_context
-from conformance.transport.exchange import Exchange, Request, Response
+from conformance.transport.exchange import (
+    Exchange,
+    Listener,
+    NoAnswer,
+    NoAnswerError,
+    Request,
+    Response,
+    Unanswered,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
     from pathlib import Path
 
 Headers = tuple[tuple[str, str], ...]
@@ -28,20 +36,6 @@ _KEPT = 10
 _DROPS = 3
 
 
-class NoAnswerError(Exception):
-    """A request was sent and no HTTP response came.
-
-    Attributes:
-        exchange: the request, with ``problem`` saying what happened instead.
-        kind: "refused", "timeout", "closed", "garbage", "tls" or "unasked" (the endpoint hung before).
-    """
-
-    def __init__(self, exchange: Exchange, kind: str) -> None:
-        super().__init__(exchange.problem)
-        self.exchange = exchange
-        self.kind = kind
-
-
 @dataclass
 class Connection:
     """What all clients of one run share.
@@ -51,7 +45,7 @@ class Connection:
         ca_file: authorities to trust instead of the system's.
         token: bearer token, or None.
         request_rate: ceiling in requests per second, or None.
-        listeners: called with every exchange, also those without an answer.
+        listeners: told what became of every request.
         sent: how many requests have been sent.
     """
 
@@ -59,7 +53,7 @@ class Connection:
     ca_file: Path | None = None
     token: str | None = None
     request_rate: float | None = None
-    listeners: list[Callable[[Exchange], None]] = field(default_factory=list)
+    listeners: list[Listener] = field(default_factory=list)
     sent: int = 0
     _next_slot: float = 0.0
 
@@ -146,25 +140,22 @@ class HttpClient:
         request = Request(method, f"{self.scheme}://{self.authority}{self.prefix}{path}", shown, body)
         endpoint = f"{method} {_shape(path)}"
         if self._hangs[endpoint] >= _HANGS:
-            raise NoAnswerError(
-                Exchange(request, None, f"not asked: {endpoint} has not answered {_HANGS} times"), "unasked"
-            )
+            problem = f"not asked: {endpoint} has not answered {_HANGS} times"
+            raise NoAnswerError(Unanswered(request, problem, NoAnswer.CIRCUIT_OPEN))
         deadline = timeout_s or self.connection.timeout_s
         try:
             response = self._exchange(method, path, sent, body, deadline, fresh=fresh)
-        except NoAnswerError as none:
-            if none.kind == "timeout":
+        except _SilenceError as none:
+            if none.kind is NoAnswer.TIMEOUT:
                 self._hangs[endpoint] += 1
-            exchange = Exchange(request, None, none.exchange.problem)
-            self._tell(exchange)
-            raise NoAnswerError(exchange, none.kind) from none
+            unanswered = Unanswered(request, str(none), none.kind)
+            for listener in self.connection.listeners:
+                listener.unanswered(unanswered)
+            raise NoAnswerError(unanswered) from none
         exchange = Exchange(request, response)
-        self._tell(exchange)
-        return exchange
-
-    def _tell(self, exchange: Exchange) -> None:
         for listener in self.connection.listeners:
-            listener(exchange)
+            listener.answered(exchange)
+        return exchange
 
     def _fields(self, method: str, headers: Headers, body: bytes, *, close: bool) -> Headers:
         names = {name.lower() for name, _ in headers}
@@ -221,7 +212,7 @@ class HttpClient:
                 )
             except Exception as error:
                 none = _no_answer(error, deadline)
-                if none.kind == "closed" and not opened and attempt == 1 and not self._drops_requests():
+                if none.kind is NoAnswer.CLOSED and not opened and attempt == 1 and not self._drops_requests():
                     continue
                 raise none from error
             finally:
@@ -249,23 +240,30 @@ def _read(answer: httpcore.Response) -> bytes:
     return b"".join(chunks)
 
 
-def _no_answer(error: Exception, deadline: float) -> NoAnswerError:
+class _SilenceError(Exception):
+    """Why one attempt brought no answer; the message says it in words."""
+
+    def __init__(self, problem: str, kind: NoAnswer) -> None:
+        super().__init__(problem)
+        self.kind = kind
+
+
+def _no_answer(error: Exception, deadline: float) -> _SilenceError:
     """Sort what went wrong on the wire; anything that is no network error is the suite's own and is raised again."""
-    nothing = Request("", "")
     text = str(error) or type(error).__name__
     if isinstance(error, httpcore.TimeoutException):
-        return NoAnswerError(Exchange(nothing, None, f"no answer within {deadline:g} s"), "timeout")
+        return _SilenceError(f"no answer within {deadline:g} s", NoAnswer.TIMEOUT)
     if isinstance(error, httpcore.RemoteProtocolError):
         if "disconnected" in text:
-            return NoAnswerError(Exchange(nothing, None, "connection closed without an answer"), "closed")
-        return NoAnswerError(Exchange(nothing, None, f"the answer is no HTTP: {text}"), "garbage")
+            return _SilenceError("connection closed without an answer", NoAnswer.CLOSED)
+        return _SilenceError(f"the answer is no HTTP: {text}", NoAnswer.MALFORMED)
     if isinstance(error, httpcore.ConnectError):
-        kind = "tls" if "SSL" in text or "certificate" in text.lower() else "refused"
-        return NoAnswerError(Exchange(nothing, None, f"no connection: {text}"), kind)
+        kind = NoAnswer.TLS if "SSL" in text or "certificate" in text.lower() else NoAnswer.REFUSED
+        return _SilenceError(f"no connection: {text}", kind)
     if isinstance(error, ssl.SSLError):
-        return NoAnswerError(Exchange(nothing, None, f"no connection: {text}"), "tls")
+        return _SilenceError(f"no connection: {text}", NoAnswer.TLS)
     if isinstance(error, httpcore.NetworkError | OSError):
-        return NoAnswerError(Exchange(nothing, None, f"connection broken: {text}"), "closed")
+        return _SilenceError(f"connection broken: {text}", NoAnswer.CLOSED)
     raise error
 
 

@@ -6,6 +6,7 @@ import base64
 import gzip
 import shlex
 from dataclasses import dataclass
+from enum import StrEnum
 
 _CURL_PLAIN_LIMIT = 4000
 
@@ -117,22 +118,81 @@ class Response:
 
 @dataclass(frozen=True)
 class Exchange:
-    """A request with its answer, or with the reason why none came.
+    """A request with its answer.
 
     Attributes:
         request: what was sent.
-        response: what came, or None.
-        problem: why there is no response ("no answer within 10 s", "connection closed without an answer", ...).
+        response: what came.
     """
 
     request: Request
-    response: Response | None
-    problem: str = ""
+    response: Response
 
     @property
     def came(self) -> str:
         """What came, in a few words for a finding."""
-        if self.response is None:
-            return self.problem
         kind = f", {self.response.media_type}" if self.response.media_type else ""
         return f"status {self.response.status}{kind}"
+
+
+class NoAnswer(StrEnum):
+    """Why no answer came."""
+
+    REFUSED = "refused"
+    TIMEOUT = "timeout"
+    CLOSED = "closed"
+    TLS = "tls"
+    MALFORMED = "malformed"
+    # The endpoint has hung before, so nothing was sent.
+    CIRCUIT_OPEN = "circuit-open"
+
+
+@dataclass(frozen=True)
+class Unanswered:
+    """A request to which no HTTP response came.
+
+    Attributes:
+        request: what was sent.
+        problem: what happened instead ("no answer within 10 s", "connection closed without an answer", ...).
+        kind: the same as one of a few.
+    """
+
+    request: Request
+    problem: str
+    kind: NoAnswer
+
+    @property
+    def came(self) -> str:
+        """What came, in a few words for a finding: nothing, and why."""
+        return self.problem
+
+
+# What became of a request: what a finding can be shown by.
+Attempt = Exchange | Unanswered
+
+
+class NoAnswerError(Exception):
+    """A request was sent and no HTTP response came.
+
+    Attributes:
+        unanswered: the request, and what happened instead.
+    """
+
+    def __init__(self, unanswered: Unanswered) -> None:
+        super().__init__(unanswered.problem)
+        self.unanswered = unanswered
+
+    @property
+    def kind(self) -> NoAnswer:
+        """What happened, as one of a few."""
+        return self.unanswered.kind
+
+
+class Listener:
+    """Is told what became of every request; each kind that it does not override, it lets pass."""
+
+    def answered(self, exchange: Exchange) -> None:
+        """An answer came."""
+
+    def unanswered(self, request: Unanswered) -> None:
+        """None came."""

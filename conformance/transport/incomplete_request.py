@@ -7,8 +7,7 @@ import socket
 import struct
 from typing import TYPE_CHECKING, Final, Self
 
-from conformance.transport.client import NoAnswerError
-from conformance.transport.exchange import Exchange, Request
+from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Unanswered
 
 if TYPE_CHECKING:
     from conformance.transport.client import HttpClient
@@ -61,8 +60,8 @@ class PartialRequest:
                 self._socket = client.connection.tls().wrap_socket(self._socket, server_hostname=client.host)
             self._socket.sendall(octets)
         except OSError as error:
-            problem = f"no connection: {error}"
-            raise NoAnswerError(Exchange(self.request, None, problem), "refused") from error
+            unanswered = Unanswered(self.request, f"no connection: {error}", NoAnswer.REFUSED)
+            raise NoAnswerError(unanswered) from error
 
     def __enter__(self) -> Self:
         return self

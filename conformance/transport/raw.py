@@ -11,11 +11,11 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from conformance.transport.client import NoAnswerError
-from conformance.transport.exchange import Exchange, Request, Response
+from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
 
 if TYPE_CHECKING:
     from conformance.transport.client import HttpClient
+    from conformance.transport.exchange import Attempt
 
 _STATUS_LINE = re.compile(rb"HTTP/1\.([01]) (\d{3})(?: [^\r\n]*)?")
 _FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*([^\r\n]*?)[ \t]*")
@@ -82,7 +82,7 @@ def talk(client: HttpClient, octets: bytes, *, timeout_s: float | None = None, a
     try:
         link = _connect(client, deadline)
     except OSError as error:
-        raise NoAnswerError(Exchange(request, None, f"no connection: {error}"), "refused") from error
+        raise NoAnswerError(Unanswered(request, f"no connection: {error}", NoAnswer.REFUSED)) from error
     received = bytearray()
     closed, sent_all = False, True
     with link:
@@ -229,8 +229,8 @@ def _chunks(rest: bytes) -> tuple[bytes, bytes]:
         _field(line)
 
 
-def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) -> tuple[Exchange, bytes]:
-    """The first answer as an exchange, and what follows it; an answer that cannot be read is told as its problem.
+def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) -> tuple[Attempt, bytes]:
+    """The first answer as an exchange, and what follows it; one that cannot be read is none, for that reason.
 
     Args:
         client: which robot.
@@ -240,12 +240,13 @@ def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) ->
     """
     request = shown(client, octets)
     if not came.octets:
-        problem = "connection closed without an answer" if came.closed else "no answer within the deadline"
-        return Exchange(request, None, problem), b""
+        if came.closed:
+            return Unanswered(request, "connection closed without an answer", NoAnswer.CLOSED), b""
+        return Unanswered(request, "no answer within the deadline", NoAnswer.TIMEOUT), b""
     try:
         response, rest = parse(came.octets, method, closed=came.closed, elapsed_ms=came.elapsed_ms)
     except FramingError as error:
-        return Exchange(request, None, str(error)), b""
+        return Unanswered(request, str(error), NoAnswer.MALFORMED), b""
     return Exchange(request, response), rest
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from conformance.transport.exchange import Exchange
+    from conformance.transport.exchange import Attempt
 
 # Findings of one requirement that are shown; more causes than this are the same story.
 MAX_FINDINGS = 5
@@ -26,13 +26,13 @@ class Finding:
     Attributes:
         message: what was found.
         expected: what the requirement asks for.
-        exchange: the smallest failing request with its answer, or None where none was sent.
+        exchange: the smallest failing request with what became of it, or None where none was sent.
         seen: how often it was found.
     """
 
     message: str
     expected: str
-    exchange: Exchange | None
+    exchange: Attempt | None
     seen: int = 1
 
 
@@ -76,7 +76,7 @@ class Judge:
         self,
         requirement: str,
         holds: bool,  # noqa: FBT001 - reads as a sentence: judge.check(id, answer.status == 200, ...)
-        exchange: Exchange | None,
+        exchange: Attempt | None,
         expected: str,
         *,
         found: str = "",
@@ -120,7 +120,7 @@ class Judge:
         self,
         requirement: str,
         holds: bool,  # noqa: FBT001 - as check()
-        exchange: Exchange | None,
+        exchange: Attempt | None,
         expected: str,
         *,
         found: str = "",

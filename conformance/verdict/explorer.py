@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
 from hypothesis.errors import Flaky
 from hypothesis.stateful import RuleBasedStateMachine, run_state_machine_as_test
 
-from conformance.transport.client import NoAnswerError
+from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.evidence import RefutedError
 
 if TYPE_CHECKING:

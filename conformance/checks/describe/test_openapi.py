@@ -26,7 +26,7 @@ def _document(rest: HttpClient) -> tuple[Any, Exchange, str]:
     """The description, the exchange that brought it, and what is wrong with it."""
     exchange = rest.send("GET", _PATH, headers=[("Accept", "application/json")])
     answer = exchange.response
-    if answer is None or answer.status != 200:
+    if answer.status != 200:
         return None, exchange, exchange.came
     if "json" not in answer.media_type:
         return None, exchange, f"it is sent as {answer.media_type or 'no media type'}"
@@ -76,15 +76,15 @@ def _judge_there(session: Session, judge: Judge, call: Call) -> None:
     operation = call.operation
     asked = operation.safe and allowed(session, operation)
     exchange = call.send(session) if asked else Call(operation, call.values).send(session, method="OPTIONS")
-    status = exchange.response.status if exchange.response else 0
+    status = exchange.response.status
     if asked and status == 404 and operation.declared(404) is not None:
         # The resource may well be there with nothing in it: its methods tell.
         exchange = call.send(session, method="OPTIONS")
-        status = exchange.response.status if exchange.response else 0
+        status = exchange.response.status
         asked = False
-    there = status not in {0, 404, 405, 501}
+    there = status not in {404, 405, 501}
     if there and not asked:
-        allow = (exchange.response.header("allow") or "") if exchange.response else ""
+        allow = exchange.response.header("allow") or ""
         there = not allow or operation.method in {name.strip() for name in allow.split(",")}
     judge.check(
         "describe/openapi-behaviour",

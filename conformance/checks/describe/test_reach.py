@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.engine.session import INTERFACES
-from conformance.transport.client import NoAnswerError
+from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
-    from conformance.transport.exchange import Exchange
+    from conformance.transport.exchange import Attempt
     from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("reach")
@@ -27,7 +27,7 @@ def test_interfaces_answer(roaas: Session, judge: Judge) -> None:
 
     A class whose prerequisite is missing fails; it is not skipped.
     """
-    found: dict[str, tuple[str, Exchange | None]] = {name: _look(roaas, name) for name in roaas.interfaces}
+    found: dict[str, tuple[str, Attempt | None]] = {name: _look(roaas, name) for name in roaas.interfaces}
     for class_ in roaas.claims:
         needed, any_of = _needed(roaas, class_)
         problems = {name: found[name] for name in needed if found[name][0]}
@@ -61,7 +61,7 @@ def _needed(session: Session, class_: str) -> tuple[tuple[str, ...], bool]:
     return tuple(name for name in named if name in session.interfaces), False
 
 
-def _look(session: Session, name: str) -> tuple[str, Exchange | None]:
+def _look(session: Session, name: str) -> tuple[str, Attempt | None]:
     """Why an interface is not there, or an empty text; with the evidence."""
     target = getattr(session, name)
     if target is None:
@@ -72,7 +72,7 @@ def _look(session: Session, name: str) -> tuple[str, Exchange | None]:
             return "", exchange
         exchange = target.post(_ENVELOPE)
     except NoAnswerError as none:
-        return f"{name}: {none}", none.exchange
+        return f"{name}: {none}", none.unanswered
     # Anything that handles POST will do here: a fault, a 4xx for the empty Body, even a server error.
-    status = exchange.response.status if exchange.response else 0
+    status = exchange.response.status
     return (f"{name}: POST is answered {status}" if status in {404, 405, 501} else ""), exchange

@@ -35,7 +35,7 @@ def _read(rest: HttpClient) -> tuple[list[Described], Exchange, str]:
     """The operations, the exchange that brought them, and what is wrong."""
     exchange = rest.send("GET", _PATH)
     answer = exchange.response
-    if answer is None or answer.status != 200:
+    if answer.status != 200:
         return [], exchange, exchange.came
     if answer.media_type not in _MEDIA_TYPES:
         return [], exchange, f"it is sent as {answer.media_type or 'no media type'}"

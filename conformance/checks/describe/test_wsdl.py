@@ -14,14 +14,15 @@ from conformance.documents.xml_names import WSDL_SOAP, clark
 from conformance.soap import comparison
 from conformance.soap.callable_services import rounds
 from conformance.soap.wsdl_rules import RULES
-from conformance.transport.client import HttpClient, NoAnswerError
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from conformance.engine.session import Session
     from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Exchange
+    from conformance.transport.exchange import Attempt, Exchange
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
 
@@ -39,7 +40,7 @@ _COMPARED: dict[str, tuple[Callable[[Description, Description], Iterator[str]], 
 class _Served:
     """The description that a robot serves: the request for it, and what is wrong with it."""
 
-    exchange: Exchange | None
+    exchange: Exchange
     description: Description | None
     problem: str
 
@@ -69,7 +70,7 @@ def _served(service: SoapService) -> _Served:
     with closing(HttpClient(f"{parts.scheme}://{parts.netloc}", service.client.connection)) as client:
         exchange = client.send("GET", f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/")
     answer = exchange.response
-    if answer is None or answer.status != 200:
+    if answer.status != 200:
         return _Served(exchange, None, exchange.came)
     if "xml" not in answer.media_type:
         return _Served(exchange, None, f"{exchange.came}, which is not XML")
@@ -141,7 +142,7 @@ def test_address(roaas: Session, judge: Judge) -> None:
             )
 
 
-def _answers(service: SoapService, location: str) -> tuple[Exchange | None, str]:
+def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
     """Ask at an address with an empty Body, which does nothing; what is wrong there."""
     try:
         parts = urlsplit(location)
@@ -162,8 +163,8 @@ def _answers(service: SoapService, location: str) -> tuple[Exchange | None, str]
                 authorized=ours,
             )
     except NoAnswerError as none:
-        return none.exchange, str(none)
-    status = exchange.response.status if exchange.response else 0
+        return none.unanswered, str(none)
+    status = exchange.response.status
     return exchange, f"POST is answered {status}" if status in {404, 405, 501} else ""
 
 

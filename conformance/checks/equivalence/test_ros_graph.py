@@ -97,7 +97,7 @@ def test_velocity_is_published(roaas: Session, probe: Probe, judge: Judge, effor
 
 def _judge_one(robot: Robot, probe: Probe, judge: Judge, wanted: Velocity) -> bool:
     exchange = robot.put_velocity(wanted)
-    if exchange.response is None or not exchange.response.ok:
+    if not exchange.response.ok:
         return True
     until = time.monotonic() + _ARRIVES_S
     seen: list[Velocity] = []

@@ -30,8 +30,8 @@ def test_requests_without_a_token(roaas: Session, rest: HttpClient, judge: Judge
 
 
 def _judge(judge: Judge, exchange: Exchange, *, asked: bool) -> None:
-    status = exchange.response.status if exchange.response else 0
-    challenge = exchange.response.header("www-authenticate") if exchange.response else None
+    status = exchange.response.status
+    challenge = exchange.response.header("www-authenticate")
     if status == 401:
         judge.check(
             "http/authentication", bool(challenge), exchange, "WWW-Authenticate with 401", found="no WWW-Authenticate"

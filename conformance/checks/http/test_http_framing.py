@@ -8,6 +8,7 @@ import pytest
 
 from conformance.rest.applicable import is_slow, reads
 from conformance.transport import raw
+from conformance.transport.exchange import Unanswered
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -47,11 +48,11 @@ def test_every_octet_of_an_answer(roaas: Session, rest: HttpClient, judge: Judge
     for turn, call in enumerate(calls * turns):
         for method in ("GET", "OPTIONS") if turn < len(calls) else ("GET",):
             octets = raw.head(rest, method, call.path, "Accept: application/json", "Connection: close")
-            exchange, surplus = raw.read_one(rest, octets, raw.talk(rest, octets), method)
-            fault = exchange.problem or (
-                f"{len(surplus)} octets behind the answer: {surplus[:40]!r}" if surplus else ""
-            )
-            judge.check("http/framing", not fault, exchange, "one well-framed answer", found=fault)
+            attempt, surplus = raw.read_one(rest, octets, raw.talk(rest, octets), method)
+            fault = attempt.problem if isinstance(attempt, Unanswered) else ""
+            if surplus:
+                fault = f"{len(surplus)} octets behind the answer: {surplus[:40]!r}"
+            judge.check("http/framing", not fault, attempt, "one well-framed answer", found=fault)
 
 
 @pytest.mark.phase("reading")
@@ -62,12 +63,14 @@ def test_answers_stay_aligned(roaas: Session, rest: HttpClient, judge: Judge) ->
     for method in ("GET", "HEAD", "OPTIONS"):
         octets = raw.head(rest, method, path) + raw.head(rest, "GET", path, "Connection: close")
         came = raw.talk(rest, octets)
-        exchange, behind = raw.read_one(rest, octets, came, method)
-        if behind and exchange.response is not None:
+        attempt, behind = raw.read_one(rest, octets, came, method)
+        if behind:
             # Nothing behind is fine: a robot may close after one answer.
-            exchange, behind = raw.read_one(rest, octets, raw.rest_of(came, behind), "GET")
-        fault = exchange.problem or (f"{len(behind)} octets behind the second answer" if behind else "")
-        judge.check("http/framing", not fault, exchange, f"two well-framed answers, to {method} and GET", found=fault)
+            attempt, behind = raw.read_one(rest, octets, raw.rest_of(came, behind), "GET")
+        fault = attempt.problem if isinstance(attempt, Unanswered) else ""
+        if behind:
+            fault = f"{len(behind)} octets behind the second answer"
+        judge.check("http/framing", not fault, attempt, f"two well-framed answers, to {method} and GET", found=fault)
 
 
 @pytest.mark.phase("input")
@@ -85,14 +88,14 @@ def test_fields_that_have_to_be_refused(roaas: Session, rest: HttpClient, judge:
     ):
         judge.at_risk = (id_,)
         came = raw.talk(rest, octets, timeout_s=_patience(roaas), answers=1)
-        exchange, _ = raw.read_one(rest, octets, came, "GET")
-        status = exchange.response.status if exchange.response else 0
+        attempt, _ = raw.read_one(rest, octets, came, "GET")
+        status = 0 if isinstance(attempt, Unanswered) else attempt.response.status
         judge.check(
             id_,
             status == 400 or (closing and came.closed and not came.octets),
-            exchange,
+            attempt,
             "400, or a closed connection" if closing else "400",
-            found=f"status {status}" if status else exchange.problem,
+            found=f"status {status}" if status else attempt.came,
             cause=f"{status}",
         )
 
@@ -104,14 +107,14 @@ def test_octets_that_are_no_request(roaas: Session, rest: HttpClient, judge: Jud
     judge.at_risk = ("http/malformed-request",)
     for octets in _GARBAGE:
         came = raw.talk(rest, octets, timeout_s=_patience(roaas), answers=1)
-        exchange, _ = raw.read_one(rest, octets, came, "GET")
-        status = exchange.response.status if exchange.response else 0
+        attempt, _ = raw.read_one(rest, octets, came, "GET")
+        status = 0 if isinstance(attempt, Unanswered) else attempt.response.status
         judge.check(
             "http/malformed-request",
             400 <= status < 500 or status == 505 or (came.closed and not came.octets),
-            exchange,
+            attempt,
             "400, another 4xx, 505, or a closed connection",
-            found=f"status {status} for {octets[:40]!r}" if status else exchange.problem,
+            found=f"status {status} for {octets[:40]!r}" if status else attempt.came,
             cause=f"{status} {came.closed}",
         )
     _first(roaas).send(roaas)

@@ -35,7 +35,7 @@ _BODIES: Final = (
 def _put(rest: HttpClient, judge: Judge, name: str, path: str, expected: str) -> bool:
     exchange = rest.send("PUT", path)
     answer = exchange.response
-    return judge.check(f"rest-delivery/{name}", answer is not None and answer.ok, exchange, expected)
+    return judge.check(f"rest-delivery/{name}", answer.ok, exchange, expected)
 
 
 @pytest.mark.requirement("rest-delivery/put", "rest-delivery/put-no-content", "rest-delivery/put-repeated")
@@ -45,8 +45,8 @@ def test_deliveries(rest: HttpClient, judge: Judge, explore: Explorer) -> None:
     def try_delivery(delivery: Delivery) -> None:
         first = rest.send("PUT", delivery.rest_path)
         again = rest.send("PUT", delivery.rest_path)
-        status = first.response.status if first.response else 0
-        repeated = again.response.status if again.response else 0
+        status = first.response.status
+        repeated = again.response.status
         judge.check("rest-delivery/put", 200 <= status < 300, first, "2xx for a delivery")
         if 200 <= status < 300:
             judge.check("rest-delivery/put-no-content", status == 204, first, "204 for a delivery")
@@ -71,7 +71,7 @@ def test_numbers_in_any_form(rest: HttpClient, judge: Judge, explore: Explorer) 
         exchange = rest.send("PUT", path_of(*written))
         judge.require(
             "rest-delivery/put-range",
-            exchange.response is not None and exchange.response.ok,
+            exchange.response.ok,
             exchange,
             "2xx, whatever the finite double and however it is written",
             cause=exchange.came,
@@ -91,7 +91,7 @@ def test_a_body_is_ignored(rest: HttpClient, judge: Judge, effort: Effort) -> No
         exchange = rest.send("PUT", _PAPER.rest_path, headers=(("Content-Type", media_type),), body=body)
         judge.check(
             "rest-delivery/put-body",
-            exchange.response is not None and exchange.response.ok,
+            exchange.response.ok,
             exchange,
             f"2xx for a delivery with a body of {media_type}, which is ignored",
         )
@@ -105,7 +105,7 @@ def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, 
         values = list(_VALID)
         values[place] = text
         exchange = rest.send("PUT", path_of(*values))
-        status = exchange.response.status if exchange.response else 0
+        status = exchange.response.status
         judge.check(
             f"rest-delivery/{name}",
             400 <= status < 500,

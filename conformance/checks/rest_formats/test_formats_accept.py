@@ -55,7 +55,7 @@ def test_default_format(roaas: Session, judge: Judge) -> None:
             continue
         for accept in ("", "*/*", "*/*;q=0.5"):
             exchange = call.send(roaas, ("Accept", accept))
-            media_type = exchange.response.media_type if exchange.response else ""
+            media_type = exchange.response.media_type
             judge.check(
                 _DEFAULT,
                 media_type == "application/json",
@@ -86,13 +86,13 @@ def _judge_preferred(session: Session, judge: Judge, call: Call, id_: str, text:
     best = max(quality(name, accept) for name in formats)
     exchange = call.send(session, ("Accept", accept))
     answer = exchange.response
-    sent = answer.media_type if answer is not None and answer.ok else ""
+    sent = answer.media_type if answer.ok else ""
     # A robot may have further formats of its own, and send one that is liked as well.
     fine = quality(sent, accept) >= best if sent else best == 0
     liked = [name for name in formats if quality(name, accept) == best]
     judge.check(
         id_,
-        fine and (sent != "" or (answer is not None and answer.status == 406)),
+        fine and (sent != "" or (answer.status == 406)),
         exchange,
         f"{' or '.join(liked) if best else '406'} for Accept: {accept}",
         found=exchange.came,

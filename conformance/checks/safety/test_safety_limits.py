@@ -65,7 +65,7 @@ def _judge_refused(robot: Robot, judge: Judge, bad: Velocity) -> None:
     if any(bad[:3]):
         exchanges.append(robot.put_linear(bad))
     for exchange in exchanges:
-        status = exchange.response.status if exchange.response else 0
+        status = exchange.response.status
         refused = judge.check(
             "safety/limits-refused",
             400 <= status < 500,
@@ -129,7 +129,7 @@ def _judge_component(robot: Robot, judge: Judge, component: int) -> None:
         if component < 3:
             exchanges.append((LINEAR, robot.put_linear(wanted)))
         for path, exchange in exchanges:
-            status = exchange.response.status if exchange.response else 0
+            status = exchange.response.status
             refused = 400 <= status < 500
             does = not refused and abs(value) == 0.1 and _does(robot, wanted)
             judge.check(

@@ -13,7 +13,7 @@ from conformance.soap.callable_services import askable, rounds
 from conformance.soap.calls import Answer, ask, call, read_exchange
 from conformance.soap.envelope import envelope
 from conformance.soap.valid_messages import quiet_example
-from conformance.transport.client import NoAnswerError
+from conformance.transport.exchange import NoAnswer, NoAnswerError
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -84,9 +84,9 @@ def test_malformed(roaas: Session, judge: Judge, effort: Effort) -> None:
             try:
                 answer = ask(apart, body)
             except NoAnswerError as none:
-                if none.kind != "timeout":
+                if none.kind is not NoAnswer.TIMEOUT:
                     raise
-                judge.check("soap-basic-profile/R1125", False, none.exchange, f"an answer to {what}")
+                judge.check("soap-basic-profile/R1125", False, none.unanswered, f"an answer to {what}")
                 # One deadline is enough to know it.
                 break
             _judge_malformed(judge, answer, what)
@@ -118,9 +118,9 @@ def _truncated(judge: Judge, service: SoapService) -> None:
             timeout_s=min(_TRUNCATED_S, service.client.connection.timeout_s),
         )
     except NoAnswerError as none:
-        if none.kind == "refused":
+        if none.kind is NoAnswer.REFUSED:
             raise
-        judge.check("soap-basic-profile/R1113", False, none.exchange, "status 400 for a truncated document")
+        judge.check("soap-basic-profile/R1113", False, none.unanswered, "status 400 for a truncated document")
         return
     finally:
         apart.client.close()
@@ -139,7 +139,7 @@ def test_methods(roaas: Session, judge: Judge, effort: Effort) -> None:
                 headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
                 body=body if method in {"PUT", "PATCH"} else b"",
             )
-            status = exchange.response.status if exchange.response else 0
+            status = exchange.response.status
             judge.check(
                 "soap-basic-profile/R1114",
                 status == 405 or (method == "GET" and _is_description(exchange)),
@@ -152,7 +152,7 @@ def test_methods(roaas: Session, judge: Judge, effort: Effort) -> None:
 def _is_description(exchange: Exchange) -> bool:
     """Whether an answer is a WSDL or a schema."""
     try:
-        root = parse(exchange.response.body if exchange.response is not None else b"", doctype=True)
+        root = parse(exchange.response.body, doctype=True)
     except NotXmlError:
         return False
     return root.tag in {clark(WSDL, "definitions"), clark(XSD, "schema")}

@@ -9,7 +9,7 @@ import pytest
 from conformance.soap import delivery_messages as paper
 from conformance.soap.callable_services import rounds
 from conformance.soap.valid_messages import example
-from conformance.transport.client import NoAnswerError
+from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session

@@ -91,7 +91,7 @@ def _valid_call(session: Session, operation: Operation) -> Call:
 def _valid(session: Session, judge: Judge, call: Call, requirement: str) -> bool:
     """Whether the valid request is taken, so that a refusal of another one has to do with what was changed."""
     exchange = call.send(session)
-    if exchange.response is not None and (exchange.response.ok or exchange.response.status == 409):
+    if exchange.response.ok or exchange.response.status == 409:
         return True
     judge.skip(requirement, f"a valid {call.operation.id} is answered {exchange.came}, so nothing was made of it")
     return False

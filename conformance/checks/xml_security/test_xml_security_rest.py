@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lxml import etree
 
     from conformance.engine.session import Session
-    from conformance.transport.exchange import Exchange
+    from conformance.transport.exchange import Attempt, Exchange
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
 
@@ -53,7 +53,7 @@ def _carrier(rest: HttpClient, path: str) -> Carrier:
     exchange = rest.send("GET", path, headers=(("Accept", _XML),))
     answer = exchange.response
     plain = Carrier(f"<message>{VALUE}</message>", "message", "1")
-    if answer is None or not answer.ok:
+    if not answer.ok:
         return plain
     try:
         root = parse(answer.body)
@@ -101,7 +101,7 @@ def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
 
 
 def _siege(roaas: Session, rest: HttpClient, method: str, path: str, *, alone: bool) -> Siege:
-    def send(attack: Attack) -> Exchange:
+    def send(attack: Attack) -> Attempt:
         apart = HttpClient(rest.base_url, rest.connection)
         headers = (("Content-Type", _XML), ("Accept", "*/*"), *attack.headers)
         deadline = min(_DEADLINE_S, rest.connection.timeout_s)
@@ -121,5 +121,5 @@ def _siege(roaas: Session, rest: HttpClient, method: str, path: str, *, alone: b
         must = own in ledger and ledger[own].level == "MUST" and attack.name not in _NOT_HERE
         return (*((own,) if alone else ()), *((_REST,) if must else ()))
 
-    times = [answer.elapsed_ms for answer in (ask().response for _ in range(5)) if answer is not None]
+    times = [ask().response.elapsed_ms for _ in range(5)]
     return Siege(roaas.judge, send, ask, statistics.median(times), ids)

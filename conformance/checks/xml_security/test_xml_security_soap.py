@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from conformance.engine.session import Session
     from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Exchange
+    from conformance.transport.exchange import Attempt, Exchange
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
 
@@ -72,7 +72,7 @@ def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
 def _siege(judge: Judge, service: SoapService, message: Node) -> Siege:
     document = envelope([message]).written()
 
-    def send(attack: Attack) -> Exchange:
+    def send(attack: Attack) -> Attempt:
         apart = service.apart()
         try:
             deadline = min(_DEADLINE_S, service.client.connection.timeout_s)
@@ -83,7 +83,7 @@ def _siege(judge: Judge, service: SoapService, message: Node) -> Siege:
     def ask() -> Exchange:
         return service.post(document)
 
-    times = [answer.elapsed_ms for answer in (ask().response for _ in range(5)) if answer is not None]
+    times = [ask().response.elapsed_ms for _ in range(5)]
     return Siege(judge, send, ask, statistics.median(times))
 
 

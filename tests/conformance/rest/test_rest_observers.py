@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from conformance.engine.session import Session
 from conformance.rest.observers import Observer, watch
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import Exchange, Request, Response
+from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 
 BASE = "http://robot:7003/r2"
 TWIST = {part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")}
@@ -24,8 +24,11 @@ def seen(method, path, status, headers=(), body=b"", *, sent=(("Accept", "*/*"),
     session = Session()
     session.rest = HttpClient(BASE, session.connection)
     request = Request(method, BASE + path, (("Host", "robot:7003"), *sent), content, raw)
-    response = None if status is None else Response(status, tuple(headers), body, 1.0)
-    Observer(session)(Exchange(request, response, problem))
+    if status is None:
+        kind = NoAnswer.CLOSED if "closed" in problem else NoAnswer.MALFORMED
+        Observer(session).unanswered(Unanswered(request, problem, kind))
+    else:
+        Observer(session).answered(Exchange(request, Response(status, tuple(headers), body, 1.0)))
     return set(session.judge.refuted())
 
 
@@ -48,7 +51,7 @@ def test_good_answers_raise_no_alarm():
 def test_what_went_elsewhere_is_nobody_s_affair():
     session = Session()
     session.rest = HttpClient(BASE, session.connection)
-    Observer(session)(Exchange(Request("GET", "http://robot:7003/r2d2/x"), Response(500, (), b"", 1.0)))
+    Observer(session).answered(Exchange(Request("GET", "http://robot:7003/r2d2/x"), Response(500, (), b"", 1.0)))
     assert not session.judge.refuted()
 
 

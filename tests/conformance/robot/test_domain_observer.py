@@ -41,7 +41,7 @@ def see(session: Session, path: str, value: object, *, status: int = 200, header
     request = Request(method, _BASE + path, (("Host", "robot:7003"), *headers))
     exchange = Exchange(request, Response(status, (("Content-Type", "application/json"),), body, 0.0))
     for listener in session.connection.listeners:
-        listener(exchange)
+        listener.answered(exchange)
 
 
 def found(session: Session) -> set[str]:

@@ -7,12 +7,12 @@ import pytest
 from conformance.robot.geometry import Pose, length_of, quaternion_of, wrapped, yaw_of
 from conformance.robot.path import judge_path
 from conformance.robot.robot import Odometry, Velocity
-from conformance.transport.exchange import Exchange, Request
+from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Judge
 
 _IDS = {"rest-resources/pose-motion", "rest-resources/pose-rotation"}
 _START = Pose(1.0, 2.0, 0.3)
-_EVIDENCE = Exchange(Request("GET", "http://robot/robot/pose/"), None, "made up")
+_EVIDENCE = Exchange(Request("GET", "http://robot/robot/pose/"), Response(200, (), b"", 1.0))
 
 
 def drive(v: float, w: float, start: Pose, change=lambda pose: pose, seconds: float = 1.0) -> tuple[list, list]:

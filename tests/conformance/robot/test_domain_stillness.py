@@ -11,6 +11,7 @@ import pytest
 from conformance.engine.session import Session
 from conformance.robot.stopping import bring_to_rest, leave_at_rest
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Listener
 
 _STILL = {part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")}
 
@@ -35,6 +36,18 @@ class Body:
             self.speed = json.loads(body)["linear"]["x"] if self.obeys else self.speed
             return 204, None
         return 200, {**_STILL, "linear": {"x": self.speed, "y": 0.0, "z": 0.0}}
+
+
+class Heard(Listener):
+    """Remembers what it is told."""
+
+    def __init__(self) -> None:
+        self.exchanges: list[object] = []
+
+    def answered(self, exchange) -> None:
+        self.exchanges.append(exchange)
+
+    unanswered = answered
 
 
 @contextmanager
@@ -115,7 +128,7 @@ def test_leaving_judges_nothing_and_stops_the_robot():
     body = Body(2, 0.3)
     with serving(body) as url:
         made = session(url)
-        heard: list[object] = []
-        made.connection.listeners.append(heard.append)
+        heard = Heard()
+        made.connection.listeners.append(heard)
         leave_at_rest(made)
-    assert (body.goals, body.speed, heard) == (0, 0.0, [])
+    assert (body.goals, body.speed, heard.exchanges) == (0, 0.0, [])

@@ -19,7 +19,8 @@ from conformance.contract.statement import Endpoints, Statement
 from conformance.engine.outcome import settle
 from conformance.engine.session import Session
 from conformance.selftest.independent_robots import plain
-from conformance.transport.client import Connection, NoAnswerError
+from conformance.transport.client import Connection
+from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
 

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from conformance.transport.exchange import Exchange, Request, Response
+from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_what_came_is_told_in_a_few_words():
     request = Request("GET", "http://127.0.0.1/")
     answer = Response(200, (("Content-Type", "Application/JSON; charset=utf-8"),), b"{}", 1.0)
     assert Exchange(request, answer).came == "status 200, application/json"
-    assert Exchange(request, None, "no answer within 10 s").came == "no answer within 10 s"
+    assert Unanswered(request, "no answer within 10 s", NoAnswer.TIMEOUT).came == "no answer within 10 s"
 
 
 def test_several_fields_of_one_name_are_one_list():

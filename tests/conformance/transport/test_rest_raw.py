@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from conformance.transport.client import Connection, HttpClient, NoAnswerError
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import NoAnswerError
 from conformance.transport.raw import FramingError, head, parse, talk
 
 
