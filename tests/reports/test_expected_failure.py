@@ -1,0 +1,61 @@
+"""A failure that the baseline expects, from the robot to junit.xml: one meaning in every file on the way."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+from lxml import etree
+
+EXPECTED = "soap-delivery/reachable"  # the robot's SOAP services are claimed and not named
+BASELINE = '[[expected]]\nrequirement = "{}"\nreason = "ticket 7"\nexpires = {}\n'
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[str]:
+    """Yield the REST address of an independent robot."""
+    command = [
+        sys.executable,
+        "-m",
+        "conformance.selftest.independent_robots",
+        "plain",
+        "--rest-port=0",
+        "--soap-port=0",
+    ]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process.stdout.readline().split()[1].removeprefix("rest=")
+        finally:
+            process.kill()
+
+
+def certified(robot, folder, expires):
+    """Run a certification with a baseline; return its requirement in result.json and its test case in junit.xml."""
+    baseline = folder / "known.toml"
+    baseline.write_text(BASELINE.format(EXPECTED, expires), encoding="utf-8")
+    command = [sys.executable, "-m", "roaas", "certify", f"--rest={robot}", "--class=soap-delivery", "--effort=quick"]
+    run = subprocess.run(
+        [*command, f"--baseline={baseline}", f"--out={folder}"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert "Traceback" not in run.stderr
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    requirement = next(item for item in result["requirements"] if item["id"] == EXPECTED)
+    return requirement, etree.parse(folder / "junit.xml").find(f".//testcase[@name='{EXPECTED}']")
+
+
+def test_an_expected_failure_is_skipped_with_its_reason(robot, tmp_path):
+    requirement, case = certified(robot, tmp_path, "2999-12-31")
+    assert requirement["verdict"] == "warn"
+    assert requirement["expected_failure"] == {"reason": "ticket 7", "expires": "2999-12-31"}
+    assert case.find("skipped").get("message") == "Expected by the baseline until 2999-12-31: ticket 7"
+    assert case.find("failure") is None
+    for page in ("certificate.html", "certificate.md"):
+        assert "ticket 7 (until 2999-12-31)" in (tmp_path / page).read_text(encoding="utf-8")
+
+
+def test_a_failure_whose_entry_has_expired_is_a_failure(robot, tmp_path):
+    requirement, case = certified(robot, tmp_path, "2020-12-31")
+    assert requirement["verdict"] == "fail"
+    assert "expected_failure" not in requirement
+    assert case.find("failure") is not None
