@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
-from conformance.selftest.mutants.changes import SOAP, TNS, instead, rewritten, soap, xml
+from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, rewritten, soap, xml
 from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.mutants.soap_profile import coded, is_fault
 from conformance.selftest.mutants.soap_services import enveloped, fault
@@ -119,6 +119,11 @@ def _headed(request: Request) -> bool:
     )
 
 
+def _paged(response: Response) -> None:
+    response.status, response.reason, response.body = 200, "", b"<html><body>OK</body></html>"
+    response.put("Content-Type", "text/html")
+
+
 def _for_others(request: Request) -> bool:
     return _mandatory(request) and b"actor" in request.body and b"actor/next" not in request.body
 
@@ -215,5 +220,11 @@ MUTANTS = (
         "A mandatory header block for another actor is a fault.",
         "mustunderstand-actor",
         instead(_for_others, fault("MustUnderstand", "not understood")),
+    ),
+    _mutant(
+        "bp-sometimes-a-page",
+        "One answer in 50 is a page with 200.",
+        "content-type",
+        altered(posted, _paged, anything, nth=50),
     ),
 )

@@ -53,14 +53,6 @@ def _without(name: str) -> Callable[[Any], None]:
     return edit
 
 
-def _said(name: str, value: str) -> Callable[[Any], None]:
-    def edit(root: Any) -> None:
-        for node in named(root, name):
-            node.text = value
-
-    return edit
-
-
 def _content(root: Any) -> None:
     body = named(root, "Body")[0]
     for wrapper in body:
@@ -70,15 +62,6 @@ def _content(root: Any) -> None:
 def _other_namespace(root: Any) -> None:
     for wrapper in named(root, "Body")[0]:
         wrapper.tag = etree.QName("http://ros-ws.org", etree.QName(wrapper).localname).text
-
-
-def _reversed_path(root: Any) -> None:
-    poses = named(root, "poses")
-    if len(poses) > 1:
-        parent = poses[0].getparent()
-        for pose in poses:
-            parent.remove(pose)
-        parent.extend(reversed(poses))
 
 
 def _written(pattern: bytes) -> Callable[[Request], bool]:
@@ -114,6 +97,10 @@ def _coffee_for_all(root: Any) -> None:
         wrapper.tag = f"{{{TNS}}}ExecuteCoffeeRequestResponse"
 
 
+def _unavailable(response: Response) -> None:
+    response.status, response.reason, response.body = 503, "", b""
+
+
 def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
     return Mutant(name, says, (id_,), "soap", make)
 
@@ -141,6 +128,12 @@ MUTANTS = (
         instead(_COFFEE, fault("Client", "Cannot find dispatch method")),
     ),
     _mutant(
+        "soap-coffee-sometimes-503",
+        "One coffee in 50 is refused with 503.",
+        "soap-delivery/coffee",
+        altered(_COFFEE, _unavailable, nth=50),
+    ),
+    _mutant(
         "soap-response-full",
         "The response wrapper holds a value.",
         "soap-delivery/response-valid",
@@ -165,6 +158,12 @@ MUTANTS = (
         instead(_written(rb">\s*[+-]?[\d.]+[eE][+-]?\d+\s*<"), fault("Client", "no number")),
     ),
     _mutant(
+        "soap-no-plus",
+        "Numbers with a plus sign are a fault.",
+        "soap-delivery/range",
+        instead(_written(rb">\s*\+[\d.]"), fault("Client", "plus sign")),
+    ),
+    _mutant(
         "soap-no-negatives",
         "Negative doubles are a fault.",
         "soap-delivery/range",
@@ -181,6 +180,12 @@ MUTANTS = (
         "A default namespace is a fault.",
         "soap-delivery/syntax",
         instead(_written(rb"\sxmlns=[\"']http"), fault("Client", "default namespace")),
+    ),
+    _mutant(
+        "soap-one-prefix",
+        "An Envelope of another prefix than soapenv is a fault.",
+        "soap-delivery/syntax",
+        instead(_written(rb"<(?!soapenv:)(?:[\w.-]+:)?Envelope"), fault("Client", "no soapenv:Envelope")),
     ),
     _mutant(
         "soap-no-cdata",
@@ -240,18 +245,6 @@ MUTANTS = (
         altered(soap("GetNavigationServices"), tree(_without("name"))),
     ),
     _mutant("soap-no-goal-page", "Without a goal, GetGoal is a page.", "soap-subscribers/goal", lambda: _no_goal_page),
-    _mutant(
-        "soap-plan-reversed",
-        "GetPlan gives the way back.",
-        "soap-subscribers/plan",
-        altered(soap("GetPlan"), tree(_reversed_path)),
-    ),
-    _mutant(
-        "soap-plan-other-frame",
-        "GetPlan's path is in another frame.",
-        "soap-subscribers/plan",
-        altered(soap("GetPlan"), tree(_said("frame_id", "base_link"))),
-    ),
     _mutant(
         "soap-plan-none-empty",
         "Where there is no plan, GetPlan gives an empty one.",

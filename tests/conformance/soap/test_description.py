@@ -138,3 +138,38 @@ def test_the_contract_keeps_its_own_rules():
         contract = read_file(CONTRACT_DIR / f"{name}.wsdl")
         assert {rule: list(check(contract)) for rule, check in RULES.items() if list(check(contract))} == {}
         assert contract.shape(clark(SPACE, "NoSuchElement")) is None
+
+
+def problems(old: str, new: str) -> dict[str, list[str]]:
+    """What is wrong with the contract's WSDL where a regular expression of it and of its schema is replaced."""
+    spoiled = [re.sub(old.encode(), new.encode(), document) for document in (WSDL, XSD)]
+    assert spoiled != [WSDL, XSD]
+    robot, _ = layout(spoiled[0], {"http://robot:5555/publishers.xsd": spoiled[1]})
+    comparisons = (comparison.names, comparison.operations, comparison.types, comparison.actions)
+    found = {compare.__name__: list(compare(CONTRACT, robot)) for compare in comparisons}
+    return found | {rule: list(check(robot)) for rule, check in RULES.items()}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        ('(<wsdl:service name=")', r"\1X", "names"),
+        ("http://soap.turtlebot.mybot.org/", "http://soap.example.org/", "names"),
+        ("ExecuteCoffeeRequest", "Other", "operations"),
+        ('soapAction=""', 'soapAction="urn:x"', "operations"),
+        (":double", ":int", "types"),
+        ('(name="depot_x")', r'\1 minOccurs="0"', "types"),
+        ('Action="[^"]*"', 'Action="urn:x"', "actions"),
+        (' transport="[^"]*"', "", "R2701"),
+        ('transport="[^"]*"', 'transport="urn:smtp"', "R2702"),
+        ('style="document"', 'style="rpc"', "R2705"),
+        ('use="literal"', 'use="encoded"', "R2706"),
+        ('use="literal"', 'use="literal" namespace="urn:x"', "R2716"),
+        ('(<wsdl:part [^>]*)element="', r'\1type="', "R2204"),
+        (r'(<wsdl:part [^>]*element="\w+:)', r"\1No", "R2206"),
+        (r"(?s)(<wsdl:operation .*?</wsdl:operation>)(?=.*portType>)", r"\1\1", "R2304"),
+        (r"encoding=.[\w-]+.", "encoding='iso-8859-1'", "R4003"),
+    ],
+)
+def test_a_wrong_description_breaks_its_rule(old, new, rule):
+    assert problems(old, new)[rule]

@@ -1,0 +1,111 @@
+"""Robots whose subscribers service gives wrong values, wrong plans, or values in a wrong form."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from conformance.selftest.mutants.changes import altered, named, rewritten, soap, text, tree
+from conformance.selftest.mutants.mutant import Mutant
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.selftest.wire import Request
+
+_POSE, _VELOCITY, _PLAN = soap("GetPose"), soap("GetVelocity"), soap("GetPlan")
+
+
+def _first_is(parent: str, child: str, value: str) -> Callable[[Any], None]:
+    def edit(root: Any) -> None:
+        for node in named(root, parent)[:1]:
+            named(node, child)[0].text = value
+
+    return edit
+
+
+def _swapped(root: Any) -> None:
+    for node in named(root, "position"):
+        node[:2] = [node[1], node[0]]
+
+
+def _emptied(root: Any) -> None:
+    for node in named(root, "return"):
+        node.getparent().remove(node)
+
+
+def _said(name: str, value: str) -> Callable[[Any], None]:
+    def edit(root: Any) -> None:
+        for node in named(root, name):
+            node.text = value
+
+    return edit
+
+
+def _reversed_path(root: Any) -> None:
+    poses = named(root, "poses")
+    if len(poses) > 1:
+        parent = poses[0].getparent()
+        for pose in poses:
+            parent.remove(pose)
+        parent.extend(reversed(poses))
+
+
+def _elsewhere(request: Request) -> None:
+    request.body = re.sub(rb"(<(?:\w+:)?x>)[^<]*", rb"\g<1>7.5", request.body)
+
+
+def _in_map(request: Request) -> None:
+    request.body = request.body.replace(b"no_such_frame", b"map")
+
+
+def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
+    return Mutant(name, says, (f"soap-subscribers/{id_}",), "soap", make)
+
+
+MUTANTS = (
+    _mutant(
+        "soap-pose-not-unit",
+        "GetPose's quaternion is three long.",
+        "pose",
+        altered(_POSE, tree(_first_is("orientation", "w", "3.0"))),
+    ),
+    _mutant(
+        "soap-velocity-nan",
+        "GetVelocity says NaN.",
+        "velocity",
+        altered(_VELOCITY, tree(_first_is("linear", "x", "NaN"))),
+    ),
+    _mutant(
+        "soap-sensors-short-types",
+        "GetSensors names types without their kind.",
+        "sensors",
+        altered(soap("GetSensors"), text("/msg/", "/")),
+    ),
+    _mutant(
+        "soap-read-order",
+        "Responses have y before x.",
+        "response-valid",
+        altered(_POSE, tree(_swapped)),
+    ),
+    _mutant(
+        "soap-read-empty",
+        "Responses hold nothing that a client finds.",
+        "interop",
+        altered(soap("Get[A-Z][A-Za-z]+"), tree(_emptied)),
+    ),
+    _mutant(
+        "soap-plan-reversed",
+        "GetPlan gives the way back.",
+        "plan",
+        altered(_PLAN, tree(_reversed_path)),
+    ),
+    _mutant(
+        "soap-plan-other-frame",
+        "GetPlan's path is in another frame.",
+        "plan",
+        altered(_PLAN, tree(_said("frame_id", "base_link"))),
+    ),
+    _mutant("soap-plan-elsewhere", "GetPlan plans to another place.", "plan", rewritten(_PLAN, _elsewhere)),
+    _mutant("soap-plan-any-frame", "GetPlan takes any frame for map.", "plan-none", rewritten(_PLAN, _in_map)),
+)
