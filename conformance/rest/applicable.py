@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import random
-import zlib
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import operations_of
 from conformance.rest.calls import Call, example_call
-from conformance.robot.stopping import bring_to_rest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -17,10 +14,7 @@ if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
     from conformance.engine.session import Session
 
-# A robot on a network nearby answers sooner, even one that is written in Python and on a loaded machine.
-_SLOW_MS = 50.0
 NO_MOTION = "it moves the robot, and --allow-motion was not given"
-Item = TypeVar("Item")
 
 
 def reads(session: Session) -> list[Call]:
@@ -75,7 +69,9 @@ def allowed(session: Session, operation: Operation) -> bool:
     return session.allow_motion or not operation.motion
 
 
-def need(session: Session, ids: Sequence[str], wanted: Callable[[Operation], bool], what: str) -> list[Operation]:
+def applicable_operations(
+    session: Session, ids: Sequence[str], wanted: Callable[[Operation], bool], what: str
+) -> list[Operation]:
     """The operations that a check is about.
 
     Where the contract has none, its requirements do not apply; where none may be sent, they are skipped. Requirements
@@ -94,31 +90,4 @@ def need(session: Session, ids: Sequence[str], wanted: Callable[[Operation], boo
             session.judge.skip(id_, NO_MOTION)
         else:
             session.judge.unclaimed(id_, f"the contract has no operation that {what}")
-    return few(session, usable, 2)
-
-
-def calm(session: Session) -> None:
-    """Bring the robot to rest, where it may have been moved."""
-    if session.allow_motion:
-        bring_to_rest(session)
-
-
-def is_slow(session: Session) -> bool:
-    """Whether each request costs so much time that few have to do (an Arduino takes hundreds of milliseconds)."""
-    return session.effort.usual_ms > _SLOW_MS
-
-
-def few(session: Session, items: Sequence[Item], count: int) -> list[Item]:
-    """All items with a robot that answers quickly; with a slow one ``count`` of them, spread evenly."""
-    if not is_slow(session) or len(items) <= count:
-        return list(items)
-    return [items[index * len(items) // count] for index in range(count)]
-
-
-def sampled(session: Session, items: Sequence[Item], standard: int, name: str) -> list[Item]:
-    """So many of the items as the effort allows (``standard`` at standard effort), the same ones for one seed."""
-    count = session.effort.cases(standard)
-    if len(items) <= count:
-        return list(items)
-    chooser = random.Random(zlib.crc32(f"{session.seed}/{name}".encode()))  # noqa: S311 - no secret
-    return [items[index] for index in sorted(chooser.sample(range(len(items)), count))]
+    return session.effort.subsample(usable, 2)

@@ -115,6 +115,19 @@ def mutations(value: Any, schema: Schema) -> list[Mutation]:
     return [item for item in made if is_invalid(item.body, schema)]
 
 
+def near_misses(value: Any, schema: Schema, number: Path) -> list[Mutation]:
+    """The mutations that a lenient reader would take for the valid value, one of whose numbers is at ``number``."""
+    nearly_all = json_text(value).encode()[:-1]
+    made = [item for item in (*_of_text(value), *_of_root(value)) if nearly_all in item.body]
+    for place in places(value, schema):
+        if place.path == number:
+            non_finite = (item for item in _of_leaf(value, place) if item.requirement == "json-non-finite")
+            made += [*_of_type(value, place), *non_finite]
+        elif place.path in {(), number[:-1]}:
+            made += _of_object(value, place)
+    return [item for item in made if is_invalid(item.body, schema)]
+
+
 def is_invalid(body: bytes, schema: Schema) -> bool:
     """Whether what is really sent breaks the contract: confirmed on the octets, not on the value that was meant."""
     text = read_json(body)

@@ -8,9 +8,9 @@ from __future__ import annotations
 from email.utils import parsedate_to_datetime
 from typing import TYPE_CHECKING
 
-from conformance.documents import traceback
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
+from conformance.documents.traceback import inside_shown
 from conformance.rest import declared, problem
 from conformance.rest.request_context import Sent
 from conformance.transport.exchange import Listener, NoAnswer
@@ -49,7 +49,15 @@ class Observer(Listener):
         if answer.body and not sent.is_head and is_json(answer.media_type):
             self._judge_json(exchange, answer)
         if answer.status >= 400:  # noqa: PLR2004 - RFC 9110 15
-            traceback.judge(session.judge, exchange, answer)
+            inside = inside_shown(answer.body)
+            session.judge.check(
+                "http/no-traceback",
+                not inside,
+                exchange,
+                "an error without the inside of the program",
+                found=f"the answer shows {inside!r}",
+                cause="traceback",
+            )
             problem.judge(session, exchange, answer, sent)
         self._judge_server_error(exchange, answer, sent)
         if sent.operation is not None:

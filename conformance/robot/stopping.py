@@ -47,6 +47,12 @@ def bring_to_rest(session: Session) -> str:
     return still.bring(_CANCEL_S, limits.settle_s + _GRACE_S + 8 * session.effort.usual_ms / 1000)
 
 
+def stop_robot(session: Session) -> None:
+    """Bring the robot to rest, where it may have been moved."""
+    if session.allow_motion:
+        bring_to_rest(session)
+
+
 def leave_at_rest(session: Session) -> None:
     """Stop the robot at the end of a run, also one that was interrupted, and also a robot that hardly answers.
 

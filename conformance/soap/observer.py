@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from lxml import etree
 
+from conformance.documents.traceback import inside_shown
 from conformance.documents.xml import NotXmlError, elements, has_doctype, parse
 from conformance.documents.xml_names import ENVELOPE, clark, local, namespace
 from conformance.soap.envelope import Envelope, Fault, NotSoapError, read_root
@@ -26,11 +27,6 @@ _FAULT_CHILDREN: Final = frozenset({"faultcode", "faultstring", "faultactor", "d
 _FAULT_CODES: Final = frozenset({"VersionMismatch", "MustUnderstand", "Client", "Server"})
 _CHARSET: Final = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
 _DECLARED: Final = re.compile(rb"""\A(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
-# How programs show their inside: Python, Java, .NET, Go, C++.
-_INSIDE: Final = re.compile(
-    rb"Traceback \(most recent call last\)|File \"[^\"\n]+\", line \d+|\bat [\w$.]+\([\w$]+\.(?:java|kt|scala):\d+\)"
-    rb"|\bat [\w$.<>]+\(.*\) in \S+:line \d+|goroutine \d+ \[|<(?:\w+:)?stackTrace\b|terminate called after"
-)
 PASSIVE: Final = tuple(
     f"soap-basic-profile/{name}"
     for name in (
@@ -76,12 +72,13 @@ class SoapObserver(Listener):
         if request.method != "POST" or request.url not in self._endpoints:
             return
         self._that("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, exchange, "HTTP/1.1 or HTTP/1.0")
+        inside = inside_shown(response.body)
         self._that(
             "fault-no-traceback",
-            not _INSIDE.search(response.body),
+            not inside,
             exchange,
             "an answer without a traceback",
-            lambda: f"the answer shows {_shown(_INSIDE.search(response.body))}",
+            lambda: f"the answer shows {inside!r}",
         )
         if response.body:
             self._document(exchange, response, self._endpoints[request.url])
@@ -226,7 +223,3 @@ def _has_instruction(root: etree._Element) -> bool:
 
 def _type(response: Response) -> str:
     return f"Content-Type {response.header('content-type')!r}"
-
-
-def _shown(match: re.Match[bytes] | None) -> str:
-    return ascii(match[0][:80])[2:-1] if match else ""

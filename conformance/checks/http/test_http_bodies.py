@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.rest.applicable import calm, few, need
+from conformance.rest.applicable import applicable_operations
 from conformance.rest.calls import JSON, Call, example_call
+from conformance.robot.stopping import stop_robot
 from conformance.transport.exchange import NoAnswer, NoAnswerError
 
 if TYPE_CHECKING:
@@ -44,8 +45,8 @@ def _accepted(exchange: Exchange) -> bool:
 def _valid(session: Session, judge: Judge, ids: tuple[str, ...]) -> Iterator[Call]:
     """A valid request for each operation that takes JSON and is answered as one should be."""
     tried = 0
-    for operation in need(session, ids, _takes_json, "takes JSON"):
-        calm(session)
+    for operation in applicable_operations(session, ids, _takes_json, "takes JSON"):
+        stop_robot(session)
         call = example_call(session, operation)
         exchange = call.send(session)
         if _accepted(exchange):
@@ -54,15 +55,15 @@ def _valid(session: Session, judge: Judge, ids: tuple[str, ...]) -> Iterator[Cal
         else:
             for id_ in ids:
                 judge.note(id_, f"a valid {operation.id} is answered {exchange.came}, so it was not tried")
-    calm(session)
+    stop_robot(session)
 
 
 @pytest.mark.requirement("http/unsupported-media-type")
 def test_media_types_that_are_not_taken(roaas: Session, judge: Judge) -> None:
     """A valid body under another media type, and under none at all, is not looked at."""
-    for operation in need(roaas, ["http/unsupported-media-type"], _takes_json, "takes JSON"):
+    for operation in applicable_operations(roaas, ["http/unsupported-media-type"], _takes_json, "takes JSON"):
         call = example_call(roaas, operation)
-        for media_type in few(roaas, _OTHERS, 2):
+        for media_type in roaas.effort.subsample(_OTHERS, 2):
             if media_type in operation.bodies:
                 continue
             exchange = call.send(roaas, ("Content-Type", media_type))
@@ -81,7 +82,7 @@ def test_media_types_that_are_not_taken(roaas: Session, judge: Judge) -> None:
 def test_charset_parameter(roaas: Session, judge: Judge) -> None:
     """application/json is the same with a charset parameter as without."""
     for call in _valid(roaas, judge, ("http/charset",)):
-        for media_type in few(roaas, _CHARSETS, 1):
+        for media_type in roaas.effort.subsample(_CHARSETS, 1):
             exchange = call.send(roaas, ("Content-Type", media_type))
             judge.check(
                 "http/charset",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.rest.applicable import is_slow, reads
+from conformance.rest.applicable import reads
 from conformance.transport import raw
 from conformance.transport.exchange import Unanswered
 
@@ -44,7 +44,7 @@ def test_every_octet_of_an_answer(roaas: Session, rest: HttpClient, judge: Judge
     Often enough for a robot that is wrong one time in fifty: client libraries do not see what is behind an answer.
     """
     calls = reads(roaas)
-    turns = -(-_IN_ALL // max(1, len(calls))) if not is_slow(roaas) else 1
+    turns = -(-_IN_ALL // max(1, len(calls))) if not roaas.effort.slow else 1
     for turn, call in enumerate(calls * turns):
         for method in ("GET", "OPTIONS") if turn < len(calls) else ("GET",):
             octets = raw.head(rest, method, call.path, "Accept: application/json", "Connection: close")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.rest.accept import quality
-from conformance.rest.applicable import answered, few, sampled
+from conformance.rest.applicable import answered
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -22,7 +22,7 @@ _NOTHING = ("image/png", "application/vnd.roaas-nobody-has-this", "audio/*;q=0.5
 def test_no_acceptable_format(roaas: Session, judge: Judge) -> None:
     """Where nothing that the robot has is acceptable, it says so."""
     cases = [(call, accept) for call in answered(roaas) for accept in _NOTHING]
-    for call, accept in sampled(roaas, cases, 120, "not acceptable"):
+    for call, accept in roaas.effort.draw(cases, 120, f"{roaas.seed}/not acceptable"):
         exchange = call.send(roaas, ("Accept", accept))
         status = exchange.response.status
         judge.check(
@@ -38,13 +38,13 @@ def test_no_acceptable_format(roaas: Session, judge: Judge) -> None:
 @pytest.mark.requirement("http/q-zero")
 def test_quality_zero(roaas: Session, judge: Judge) -> None:
     """A format with q=0 is not sent, whatever else is: another one, or 406."""
-    for call in few(roaas, answered(roaas), 2):
+    for call in roaas.effort.subsample(answered(roaas), 2):
         first = call.operation.formats[0] if call.operation.formats else "application/json"
         others = [name for name in call.operation.formats if name != first]
         refused = [f"{first};q=0", f"{first};q=0.000, */*", f"{first} ; q=0"]
         refused += [f"{name};q=0, {first};q=0, */*;q=0.5" for name in others[:1]]
         refused += [f"{name};q=0" for name in others]
-        for accept in sampled(roaas, refused, 20, call.operation.id):
+        for accept in roaas.effort.draw(refused, 20, f"{roaas.seed}/{call.operation.id}"):
             exchange = call.send(roaas, ("Accept", accept))
             answer = exchange.response
             sent = answer.media_type if answer.ok else ""

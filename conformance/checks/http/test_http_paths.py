@@ -8,7 +8,7 @@ from urllib.parse import urljoin, urlsplit
 import pytest
 
 from conformance.documents.openapi import known_path, resources_of
-from conformance.rest.applicable import few, reads, sampled
+from conformance.rest.applicable import reads
 from conformance.rest.calls import example_call
 from conformance.rest.observers import KNOWN_METHODS
 from conformance.transport.exchange import NoAnswer, NoAnswerError
@@ -44,8 +44,8 @@ def _unknown_paths(session: Session) -> list[str]:
 def test_unknown_paths(roaas: Session, rest: HttpClient, judge: Judge) -> None:
     """An unknown path is 404 for every method, and its problem is judged by the observers."""
     paths = _unknown_paths(roaas)
-    for path in sampled(roaas, paths, 10 * _FEW_PATHS, "unknown paths"):
-        for method in few(roaas, _METHODS, 3):
+    for path in roaas.effort.draw(paths, 10 * _FEW_PATHS, f"{roaas.seed}/unknown paths"):
+        for method in roaas.effort.subsample(_METHODS, 3):
             exchange = rest.send(method, path)
             status = exchange.response.status
             judge.check(

@@ -9,10 +9,11 @@ import pytest
 
 from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import operations_of
-from conformance.rest.applicable import calm, few, need, reads
+from conformance.rest.applicable import applicable_operations, reads
 from conformance.rest.calls import JSON, example_call
 from conformance.rest.mutations import mutations
 from conformance.rest.refusals import judge_refusal
+from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -54,15 +55,15 @@ def test_problem_of_a_query(roaas: Session, judge: Judge) -> None:
 @pytest.mark.requirement(*_IDS, "strict-input/json-missing", "strict-input/json-type")
 def test_problem_of_a_body(roaas: Session) -> None:
     """A field that is missing or of another type is named in the problem."""
-    calm(roaas)
-    for operation in need(roaas, (), lambda item: JSON in item.bodies, "takes JSON"):
+    stop_robot(roaas)
+    for operation in applicable_operations(roaas, (), lambda item: JSON in item.bodies, "takes JSON"):
         call = example_call(roaas, operation)
         made = [
             item
             for item in mutations(call.value, operation.bodies[JSON].schema)
             if item.requirement in {"json-missing", "json-type"} and (item.shown or "missing" in item.name)
         ]
-        for item in few(roaas, made[:: max(1, len(made) // 6)], 2):
+        for item in roaas.effort.subsample(made[:: max(1, len(made) // 6)], 2):
             judge_refusal(
                 roaas,
                 partial(call.carrying(item.body).send, roaas),
@@ -72,4 +73,4 @@ def test_problem_of_a_body(roaas: Session) -> None:
                 shown=item.shown,
                 malformed=item.malformed,
             )
-    calm(roaas)
+    stop_robot(roaas)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.rest.applicable import is_slow, reads
+from conformance.rest.applicable import reads
 from conformance.rest.observers import watch
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def test_each_resource_is_read_over_and_over(roaas: Session, effort: Effort) -> 
     watch(roaas)
     calls = reads(roaas)
     rounds = effort.cases(_EACH)
-    if calls and not is_slow(roaas):
+    if calls and not roaas.effort.slow:
         rounds = max(rounds, math.ceil(_IN_ALL / len(calls)))
     for turn in range(rounds):
         for call in calls[turn % len(calls) :] + calls[: turn % len(calls)]:

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.rest.applicable import calm, few, need, reads
+from conformance.rest.applicable import applicable_operations, reads
 from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.effects import reader_of, settles_at
 from conformance.rest.snapshot import changed, changes_by_itself, leaves, snapshot
+from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -37,7 +38,7 @@ def test_reading_changes_nothing(roaas: Session, judge: Judge) -> None:
 def test_reading_changes_nothing_after_input(roaas: Session, judge: Judge) -> None:
     """The same when the robot has something to lose: a list that is not empty, a value that was set."""
     if roaas.allow_motion:
-        calm(roaas)
+        stop_robot(roaas)
         _judge_safe(roaas, judge)
 
 
@@ -49,9 +50,9 @@ def test_reading_leaves_what_was_put(roaas: Session, judge: Judge) -> None:
     What does not last twice as long by itself is not judged: a goal ends when it is reached.
     """
     calls = [Call(call.operation, call.values) for call in reads(roaas)]
-    others = few(roaas, calls, 1)
-    for operation in need(roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts"):
-        calm(roaas)
+    others = roaas.effort.subsample(calls, 1)
+    for operation in applicable_operations(roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts"):
+        stop_robot(roaas)
         call = example_call(roaas, operation)
         reader = reader_of(roaas, call)
         if reader is None or _is_there(reader.send(roaas)):
@@ -69,7 +70,7 @@ def test_reading_leaves_what_was_put(roaas: Session, judge: Judge) -> None:
             "what was put still there after HEAD and OPTIONS",
             found=f"{operation.template} is answered {exchange.came} after HEAD and OPTIONS, and 200 before",
         )
-    calm(roaas)
+    stop_robot(roaas)
 
 
 def _put_and_watch(
@@ -80,7 +81,7 @@ def _put_and_watch(
     Returns:
         Whether it does, the last reading, and how long all of it took, s.
     """
-    calm(session)
+    stop_robot(session)
     call.send(session)
     started = time.monotonic()
     exchange = reader.send(session)
@@ -103,7 +104,7 @@ def _judge_safe(session: Session, judge: Judge) -> None:
 
     A robot that changes by itself changes in some turns; one whose safe methods have effects changes in every turn.
     """
-    calls = few(session, reads(session), 3)
+    calls = session.effort.subsample(reads(session), 3)
     suspects: dict[tuple[str, str], Exchange] = {}
     for turn in range(_TURNS):
         before = snapshot(session, calls)
@@ -137,14 +138,14 @@ def _judge_safe(session: Session, judge: Judge) -> None:
 @pytest.mark.requirement("http/put-idempotent")
 def test_put_twice(roaas: Session, judge: Judge) -> None:
     """The same PUT twice succeeds twice, and leaves the resource as PUT once does."""
-    wanted = need(roaas, ["http/put-idempotent"], lambda item: item.method == "PUT", "is a PUT")
+    wanted = applicable_operations(roaas, ["http/put-idempotent"], lambda item: item.method == "PUT", "is a PUT")
     for operation in wanted:
-        calm(roaas)
+        stop_robot(roaas)
         call = example_call(roaas, operation)
         first, once, second = _pair(roaas, call)
         if second.response.status == 409:
             # A goal of the robot's own may have begun in between: once more from the start.
-            calm(roaas)
+            stop_robot(roaas)
             first, once, second = _pair(roaas, call)
         if not _accepted(judge, "http/put-idempotent", operation.id, first):
             continue
@@ -160,7 +161,7 @@ def test_put_twice(roaas: Session, judge: Judge) -> None:
         )
         # What a single PUT reaches is judged elsewhere; here, that two do not add up.
         if fine and once:
-            calm(roaas)
+            stop_robot(roaas)
             call.send(roaas)
             judge.check(
                 "http/put-idempotent",
@@ -170,7 +171,7 @@ def test_put_twice(roaas: Session, judge: Judge) -> None:
                 found=f"after the second {operation.id}, {once}",
                 cause=f"{operation.id} effect",
             )
-    calm(roaas)
+    stop_robot(roaas)
 
 
 def _pair(session: Session, call: Call) -> tuple[Exchange, str | None, Exchange]:
@@ -193,11 +194,13 @@ def _accepted(judge: Judge, requirement: str, id_: str, exchange: Exchange) -> b
 @pytest.mark.requirement("http/delete-idempotent")
 def test_delete_twice(roaas: Session, judge: Judge) -> None:
     """After one DELETE another one is answered 2xx or 404, and the resource stays as it is."""
-    wanted = need(roaas, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "is a DELETE")
+    wanted = applicable_operations(
+        roaas, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "is a DELETE"
+    )
     by_path = {call.operation.template: call for call in reads(roaas)}
     for operation in wanted:
         for attempt in (1, 2):
-            calm(roaas)
+            stop_robot(roaas)
             call = example_call(roaas, operation)
             call.send(roaas)
             read = by_path.get(operation.template)

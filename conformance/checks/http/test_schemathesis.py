@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis.errors import Unsatisfiable
 
-from conformance.rest.applicable import allowed, calm, few, is_slow, sampled
+from conformance.rest.applicable import allowed
 from conformance.rest.motion_guard import Harmless
 from conformance.rest.refusals import judge_refusal
 from conformance.rest.validity import INVALID, VALID, validity
+from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
@@ -84,22 +85,22 @@ def test_reading_operations(roaas: Session, judge: Judge, explore: Explorer) -> 
 def test_moving_operations(roaas: Session, judge: Judge, explore: Explorer) -> None:
     """What may move the robot: invalid requests, and a few valid ones made fit for it."""
     harmless = Harmless(roaas)
-    calm(roaas)
+    stop_robot(roaas)
     for target in _targets(roaas, moving=True):
         _run(roaas, judge, explore, harmless, target)
-        calm(roaas)
+        stop_robot(roaas)
 
 
 def _run(session: Session, judge: Judge, explore: Explorer, harmless: Harmless, target: Target) -> None:
-    coverage = sampled(session, list(target.coverage()), _COVERAGE, f"coverage {target.label}")
-    for item in few(session, [*target.examples(), *coverage], 1):
+    coverage = session.effort.draw(list(target.coverage()), _COVERAGE, f"{session.seed}/coverage {target.label}")
+    for item in session.effort.subsample([*target.examples(), *coverage], 1):
         _judge_made(session, judge, harmless, item)
 
     def fuzz(item: Made | None) -> None:
         if item is not None:
             _judge_made(session, judge, harmless, item)
 
-    if is_slow(session) or not target.has_input:
+    if session.effort.slow or not target.has_input:
         return
     for negative in (True, False):
         try:
@@ -161,6 +162,6 @@ def test_walk_along_the_links(roaas: Session, rest: HttpClient, judge: Judge, ex
         def validate_response(self, *_: Any, **__: Any) -> None:
             """The observers have judged it."""
 
-    calm(roaas)
+    stop_robot(roaas)
     explore.machine(Walk, cases=4, steps=5)
-    calm(roaas)
+    stop_robot(roaas)

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest")]
 # What the list holds at least.
 _LEAST = 50
-_SLOW_MS = 50.0
 
 
 def _read(rest: HttpClient, judge: Judge) -> list[Delivery] | None:
@@ -52,7 +51,7 @@ def test_list_of_many(rest: HttpClient, judge: Judge, effort: Effort) -> None:
     if _read(rest, judge) is None:
         pytest.skip("the robot's list of deliveries cannot be read")
     # A robot that takes its time is asked for fewer.
-    many = _LEAST + 5 if effort.usual_ms < _SLOW_MS else 5
+    many = 5 if effort.slow else _LEAST + 5
     sent = [Delivery(3 + index % 2, 0.5, index + 0.25, -1.0, 1e300, 1e-300, index / 3) for index in range(many)]
     for delivery in sent:
         rest.send("PUT", delivery.rest_path, fresh=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.rest.accept import quality
-from conformance.rest.applicable import answered, few, sampled
+from conformance.rest.applicable import answered
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -50,7 +50,7 @@ _MATRIX = (
 @pytest.mark.requirement(_DEFAULT)
 def test_default_format(roaas: Session, judge: Judge) -> None:
     """Whoever asks for nothing, or for anything, gets JSON."""
-    for call in few(roaas, answered(roaas), 3):
+    for call in roaas.effort.subsample(answered(roaas), 3):
         if "application/json" not in call.operation.formats:
             continue
         for accept in ("", "*/*", "*/*;q=0.5"):
@@ -68,14 +68,14 @@ def test_default_format(roaas: Session, judge: Judge) -> None:
 @pytest.mark.requirement(_Q, _SPECIFIC)
 def test_preferred_format(roaas: Session, judge: Judge) -> None:
     """What the client would rather have is what it gets."""
-    calls = [call for call in few(roaas, answered(roaas), 3) if len(call.operation.formats) > 1]
+    calls = [call for call in roaas.effort.subsample(answered(roaas), 3) if len(call.operation.formats) > 1]
     if not calls:
         for id_ in (_Q, _SPECIFIC):
             judge.unclaimed(id_, "the contract has no answers in more than one format")
     cases = [(call, id_, text) for call in calls for id_, text in _MATRIX]
     # With little effort each line of the matrix is tried with one resource, another one for each line.
     once = [(calls[index % len(calls)], *_MATRIX[index]) for index in range(len(_MATRIX))] if calls else []
-    for call, id_, text in once + sampled(roaas, cases, len(cases), "accept"):
+    for call, id_, text in once + roaas.effort.draw(cases, len(cases), f"{roaas.seed}/accept"):
         _judge_preferred(roaas, judge, call, id_, text)
 
 

@@ -8,10 +8,11 @@ import pytest
 
 from conformance.documents.representation import UnreadableError, flattened, local_name, parse_xml, read
 from conformance.documents.writing import xml_bytes
-from conformance.rest.applicable import calm, need
+from conformance.rest.applicable import applicable_operations
 from conformance.rest.calls import XML, Call, example_call, root_name
 from conformance.rest.effects import reader_of, settles_at
 from conformance.rest.formats import disagreements
+from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -27,8 +28,10 @@ _ID = "rest-formats/xml-input"
 @pytest.mark.requirement("rest-formats/same-values", "rest-formats/xml-root")
 def test_formats_of_what_was_put(roaas: Session, judge: Judge) -> None:
     """A resource that is there only when something was put (a goal) has the same values in all formats as well."""
-    for operation in need(roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts something"):
-        calm(roaas)
+    for operation in applicable_operations(
+        roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts something"
+    ):
+        stop_robot(roaas)
         call = example_call(roaas, operation)
         reader = reader_of(roaas, call)
         if reader is None or _is_there(reader.send(roaas)):
@@ -58,7 +61,7 @@ def test_formats_of_what_was_put(roaas: Session, judge: Judge) -> None:
                 "a root named after the type",
                 found=f"the root element is {local_name(form)!r} and not {wanted!r}",
             )
-    calm(roaas)
+    stop_robot(roaas)
 
 
 def _is_there(exchange: Exchange) -> bool:
@@ -68,14 +71,14 @@ def _is_there(exchange: Exchange) -> bool:
 @pytest.mark.requirement(_ID)
 def test_xml_is_taken(roaas: Session, judge: Judge) -> None:
     """A valid value as XML is accepted, and has the effect that it has as JSON."""
-    for operation in need(roaas, [_ID], lambda item: XML in item.bodies, "takes XML"):
-        calm(roaas)
+    for operation in applicable_operations(roaas, [_ID], lambda item: XML in item.bodies, "takes XML"):
+        stop_robot(roaas)
         call = example_call(roaas, operation, XML)
         plain = example_call(roaas, operation).send(roaas)
         if not (plain.response.ok or plain.response.status == 409):
             judge.note(_ID, f"a valid {operation.id} as JSON is answered {plain.came}, so it was not tried as XML")
             continue
-        calm(roaas)
+        stop_robot(roaas)
         like = _sent_form(roaas, call)
         body = xml_bytes(call.value, root_name(operation.bodies[XML].schema) or "value", like)
         for accept in ("application/json", XML):
@@ -104,7 +107,7 @@ def test_xml_is_taken(roaas: Session, judge: Judge) -> None:
                     found=other,
                     cause=f"{operation.id} effect",
                 )
-    calm(roaas)
+    stop_robot(roaas)
 
 
 def _sent_form(session: Session, call: Call) -> etree._Element | None:

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.rest.applicable import calm, few, need, sampled
+from conformance.rest.applicable import applicable_operations
 from conformance.rest.calls import JSON, example_call
 from conformance.rest.mutations import Mutation, mutations
 from conformance.rest.refusals import judge_refusal
+from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
@@ -46,8 +47,8 @@ _EACH = 50
 def test_mutations_are_refused(roaas: Session, judge: Judge, effort: Effort) -> None:
     """Each named mutation of a valid body is refused with 4xx, and the next valid one is taken as before."""
     possible: set[str] = set()
-    for operation in need(roaas, (*_IDS, *_STATUSES), lambda item: JSON in item.bodies, "takes JSON"):
-        calm(roaas)
+    for operation in applicable_operations(roaas, (*_IDS, *_STATUSES), lambda item: JSON in item.bodies, "takes JSON"):
+        stop_robot(roaas)
         call = example_call(roaas, operation)
         by_name = _by_requirement(call, operation)
         possible |= {name for name, made in by_name.items() if made}
@@ -56,9 +57,10 @@ def test_mutations_are_refused(roaas: Session, judge: Judge, effort: Effort) -> 
             _say_unjudged(judge, operation, first.came)
             continue
         for name, made in by_name.items():
-            for item in few(roaas, sampled(roaas, made, _count(effort, name), f"{operation.id} {name}"), 1):
+            drawn = effort.draw(made, _count(effort, name), f"{roaas.seed}/{operation.id} {name}")
+            for item in effort.subsample(drawn, 1):
                 _try(roaas, judge, call, item)
-        calm(roaas)
+        stop_robot(roaas)
         again = call.send(roaas)
         judge.check(
             "http/no-server-error",
@@ -67,7 +69,7 @@ def test_mutations_are_refused(roaas: Session, judge: Judge, effort: Effort) -> 
             f"a valid {operation.id} taken after all that was refused",
             found=again.came,
         )
-    calm(roaas)
+    stop_robot(roaas)
     for name in _NAMES if possible else ():
         if name not in possible:
             judge.unclaimed(f"strict-input/{name}", "no body of the contract can be wrong in this way")
@@ -110,4 +112,4 @@ def _try(session: Session, judge: Judge, call: Call, item: Mutation) -> None:
         closing=item.requirement == "json-depth",
     )
     if not refused:
-        calm(session)
+        stop_robot(session)

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.rest.applicable import calm, few, is_slow, need, readable, sampled
+from conformance.rest.applicable import applicable_operations, readable
 from conformance.rest.calls import Call, example_call
 from conformance.rest.parameters import Wrong, wrong_texts
 from conformance.rest.refusals import judge_refusal
+from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
@@ -31,7 +32,7 @@ def _has(where: str, operation: Operation) -> bool:
 @pytest.mark.requirement(_QUERY, "http/problem-detail", "http/problem-value")
 def test_query_parameters(roaas: Session, judge: Judge) -> None:
     """Text, nothing, NaN, Infinity and 1e400 are refused where a number belongs."""
-    for operation in need(roaas, [_QUERY], partial(_has, "query"), "takes numbers in its query"):
+    for operation in applicable_operations(roaas, [_QUERY], partial(_has, "query"), "takes numbers in its query"):
         call = _valid_call(roaas, operation)
         if not _valid(roaas, judge, call, _QUERY):
             continue
@@ -48,7 +49,7 @@ def test_missing_query_parameters(roaas: Session, judge: Judge) -> None:
     def required(operation: Operation) -> bool:
         return any(item.required for item in operation.parameter("query"))
 
-    for operation in need(roaas, [_MISSING], required, "requires a query parameter"):
+    for operation in applicable_operations(roaas, [_MISSING], required, "requires a query parameter"):
         call = _valid_call(roaas, operation)
         if not _valid(roaas, judge, call, _MISSING):
             continue
@@ -71,7 +72,7 @@ def test_missing_query_parameters(roaas: Session, judge: Judge) -> None:
 @pytest.mark.requirement(_PATH, "http/problem-detail", "http/problem-value")
 def test_path_parameters(roaas: Session, judge: Judge) -> None:
     """Text, nothing, NaN, Infinity, 1e400 and values not enumerated are refused in a path."""
-    for operation in need(roaas, [_PATH], partial(_has, "path"), "takes numbers in its path"):
+    for operation in applicable_operations(roaas, [_PATH], partial(_has, "path"), "takes numbers in its path"):
         call = example_call(roaas, operation)
         if not _valid(roaas, judge, call, _PATH):
             continue
@@ -81,7 +82,7 @@ def test_path_parameters(roaas: Session, judge: Judge) -> None:
                 continue  # two slashes in a row are another path, which servers may shorten
             _try(roaas, call, item, _PATH)
         if operation.motion:
-            calm(roaas)
+            stop_robot(roaas)
 
 
 def _valid_call(session: Session, operation: Operation) -> Call:
@@ -105,10 +106,10 @@ def _chosen(session: Session, wrong: list[Wrong], standard: int, operation: Oper
     named: dict[str, Wrong] = {}
     for item in wrong:
         named.setdefault(item.name, item)
-    if is_slow(session):
-        return few(session, wrong, 6)
+    if session.effort.slow:
+        return session.effort.subsample(wrong, 6)
     basic = list(dict.fromkeys([*first.values(), *named.values()]))
-    return list(dict.fromkeys(basic + sampled(session, wrong, standard, operation.id)))
+    return list(dict.fromkeys(basic + session.effort.draw(wrong, standard, f"{session.seed}/{operation.id}")))
 
 
 def _try(session: Session, call: Call, item: Wrong, requirement: str) -> None:
@@ -122,4 +123,4 @@ def _try(session: Session, call: Call, item: Wrong, requirement: str) -> None:
         json=False,
     )
     if not refused and call.operation.motion:
-        calm(session)
+        stop_robot(session)

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.rest.applicable import calm, few, need, sampled
+from conformance.rest.applicable import applicable_operations
 from conformance.rest.calls import XML, example_call, root_name
 from conformance.rest.refusals import judge_refusal
 from conformance.rest.xml_mutations import xml_mutations
+from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -25,9 +26,9 @@ _EACH = 80
 def test_xml_mutations_are_refused(roaas: Session, judge: Judge) -> None:
     """Each named mutation of a valid XML body is refused with 4xx."""
     taken = 0
-    operations = need(roaas, [_ID], lambda item: XML in item.bodies, "takes XML")
+    operations = applicable_operations(roaas, [_ID], lambda item: XML in item.bodies, "takes XML")
     for operation in operations:
-        calm(roaas)
+        stop_robot(roaas)
         call = example_call(roaas, operation, XML)
         exchange = call.send(roaas)
         answer = exchange.response
@@ -37,10 +38,10 @@ def test_xml_mutations_are_refused(roaas: Session, judge: Judge) -> None:
         taken += 1
         schema = operation.bodies[XML].schema
         made = xml_mutations(call.value, schema, root_name(schema) or "value")
-        for name, body in few(roaas, sampled(roaas, made, _EACH, operation.id), 3):
+        for name, body in roaas.effort.subsample(roaas.effort.draw(made, _EACH, f"{roaas.seed}/{operation.id}"), 3):
             wrong = call.carrying(body)
             if not judge_refusal(roaas, partial(wrong.send, roaas), _ID, name, json=False):
-                calm(roaas)
-    calm(roaas)
+                stop_robot(roaas)
+    stop_robot(roaas)
     if not taken and "rest-formats" not in roaas.claims:
         judge.unclaimed(_ID, "the robot takes no XML")

@@ -7,7 +7,7 @@ from conformance.documents.json_schema import shape_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.writing import json_text, xml_bytes
 from conformance.rest.calls import minimal
-from conformance.rest.mutations import is_invalid, mutations
+from conformance.rest.mutations import is_invalid, mutations, near_misses
 from conformance.rest.parameters import wrong_texts
 from conformance.rest.xml_mutations import xml_mutations
 
@@ -75,3 +75,18 @@ def test_wrong_texts_of_numbers_and_codes():
     texts = {item.name: [wrong.text for wrong in wrong_texts(item)] for item in plan.parameters}
     assert texts["frame_id"] == []
     assert "-1" in texts["tolerance"]
+
+
+def test_near_misses_hold_what_the_valid_body_asks_for():
+    body = next(item for item in TAKING if item.id == "putVelocity").bodies["application/json"]
+    made = near_misses(body.examples[0], body.schema, ("linear", "x"))
+    names = {item.name for item in made}
+    assert names >= {
+        "cut short",
+        "an array as root",
+        "NaN at linear.x",
+        "x missing at linear",
+        "linear twice at the body",
+    }
+    assert not names & {"no octets", "null as root", "null at angular.z"}
+    assert all(is_invalid(item.body, body.schema) for item in made)

@@ -11,7 +11,7 @@ from conformance.contract.files import Contract
 from conformance.contract.statement import Endpoints, Statement
 from conformance.documents.openapi import operations_of
 from conformance.engine.session import Session
-from conformance.rest.applicable import answered, few, need, readable, reads, sampled
+from conformance.rest.applicable import answered, applicable_operations, readable, reads
 from conformance.rest.calls import example_call
 from conformance.rest.effects import reader_of, settles_at
 from conformance.rest.formats import disagreements
@@ -85,17 +85,18 @@ def test_what_changes_is_told_from_what_is_steady(session, library):
 
 
 def test_a_slow_robot_is_asked_less(session):
-    assert few(session, range(10), 3) == list(range(10))
+    assert session.effort.subsample(range(10), 3) == list(range(10))
     session.effort = Effort("standard", usual_ms=300)
-    assert few(session, range(10), 3) == [0, 3, 6]
-    assert len(sampled(session, range(100), 50, "name")) == 3
-    assert sampled(session, range(100), 50, "name") == sampled(session, range(100), 50, "name")
+    assert session.effort.subsample(range(10), 3) == [0, 3, 6]
+    assert len(session.effort.draw(range(100), 50, "0/name")) == 3
+    assert session.effort.draw(range(100), 50, "0/name") == session.effort.draw(range(100), 50, "0/name")
 
 
 def test_what_moves_needs_permission(session):
-    assert need(session, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "deletes") == []
+    ids = ["http/delete-idempotent"]
+    assert applicable_operations(session, ids, lambda item: item.method == "DELETE", "deletes") == []
     assert "allow-motion" in session.judge.evidence["http/delete-idempotent"].skips[0]
-    assert need(session, ["http/safe"], lambda item: item.method == "PATCH", "patches") == []
+    assert applicable_operations(session, ["http/safe"], lambda item: item.method == "PATCH", "patches") == []
     assert "no operation that patches" in session.judge.evidence["http/safe"].unclaimed
     wanted = Made("DELETE", "/books/5", "", b"")
     assert Harmless(session).made(wanted) is None
