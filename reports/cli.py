@@ -6,10 +6,10 @@ from typing import NoReturn
 import click
 
 from reports.errors import ReportError, ResultUnreadableError
-from reports.pages import write_page
+from reports.pages.page import write_page
+from reports.pages.untrusted import visible
 from reports.reading import LATENCY_NAME, read_latency
 from reports.rendering import render
-from reports.untrusted import visible
 
 EXIT_OK = 0
 EXIT_SLOWER = 1
@@ -58,7 +58,7 @@ def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
     or nothing in them could be judged.
     """
     # They load matplotlib and numpy, which `roaas report` of a certificate does without.
-    from reports import comparison, comparison_pages  # noqa: PLC0415 - see above
+    from reports.latency import comparison, comparison_page  # noqa: PLC0415 - see above
 
     names = _latency_file(old), _latency_file(new)
     texts = str(names[0]), str(names[1])
@@ -66,14 +66,14 @@ def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
         found = comparison.compare(read_latency(names[0]), read_latency(names[1]), texts, threshold / 100)
         if out is not None:
             pages = {
-                "compare.html": comparison_pages.comparison_html(found, texts),
-                "compare.md": comparison_pages.comparison_markdown(found, texts),
+                "compare.html": comparison_page.comparison_html(found, texts),
+                "compare.md": comparison_page.comparison_markdown(found, texts),
             }
             _write(out, pages)
     except ReportError as error:
         _refuse(error)
-    verdict = comparison_pages.verdict(found)
-    click.echo(comparison_pages.table(found))
+    verdict = comparison_page.verdict(found)
+    click.echo(comparison_page.table(found))
     for remark in found.remarks:
         click.echo(f"\n{visible(remark)}", nl=False)
     click.echo(f"\n{verdict.words}. {visible(verdict.sentence)}")

@@ -15,7 +15,7 @@ from reports.errors import (
     ResultMissingError,
     ResultUnreadableError,
 )
-from reports.untrusted import excerpt
+from reports.pages.untrusted import excerpt
 
 SCHEMA_DIR = Path(__file__).parent / "schemas"
 RESULT_FORMAT = "roaas-result/1"

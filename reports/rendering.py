@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from reports.certificate import certificate_html, certificate_markdown
+from reports.certificate.junit import junit
+from reports.certificate.page import certificate_html, certificate_markdown
 from reports.errors import ReportError, ResultMissingError, ResultUnreadableError
-from reports.junit import junit
-from reports.pages import write_page
+from reports.pages.page import write_page
 from reports.reading import LATENCY_NAME, RESULT_NAME, read_latency, read_result
 
 
@@ -64,7 +64,7 @@ def _conformance(path: Path) -> dict[str, str]:
 
 def _latency(path: Path) -> dict[str, str]:
     # Loads matplotlib and numpy, which a certificate does without: that is worth half a second.
-    from reports.latency import latency_html, latency_markdown  # noqa: PLC0415 - see above
+    from reports.latency.page import latency_html, latency_markdown  # noqa: PLC0415 - see above
 
     document = read_latency(path)
     return {

@@ -16,7 +16,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from reports.untrusted import beginning, code_block, code_span, excerpt, plain, visible
+from reports.pages.untrusted import beginning, code_block, code_span, excerpt, plain, visible
 
 TEMPLATE_DIR = Path(__file__).parent / "templates"
 

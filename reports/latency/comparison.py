@@ -19,8 +19,8 @@ from statistics import NormalDist
 from typing import Any
 
 from reports.errors import ResultsIncompatibleError
-from reports.histograms import Series, all_series
-from reports.numbers import rate
+from reports.latency.distributions import Series, all_series
+from reports.latency.numbers import rate
 
 QUANTILES = ("p50", "p99")
 _ASCENDING = ("p50", "p90", "p99")

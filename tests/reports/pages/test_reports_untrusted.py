@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from reports.untrusted import beginning, code_block, code_span, excerpt, plain, visible
+from reports.pages.untrusted import beginning, code_block, code_span, excerpt, plain, visible
 
 ANY_TEXT = st.text(st.characters(exclude_categories=()))
 

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from reports.figures.canvas import COLOUR, MARK, Panel, Picture, drawing, gather, log_time_axis
-from reports.histograms import Distribution, Floats, Series
+from reports.latency.distributions import Distribution, Floats, Series
+from reports.latency.figures.canvas import COLOUR, MARK, Panel, Picture, drawing, gather, log_time_axis
 
 _POINTS = 220
 _NINES = (0.0, 0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999)

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from reports.figures.canvas import COLOUR, SOFT, Panel, Picture, drawing, gather, log_time_axis
-from reports.figures.spectrum import Key, curve, quantile_axis
-from reports.histograms import Series
+from reports.latency.distributions import Series
+from reports.latency.figures.canvas import COLOUR, SOFT, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.spectrum import Key, curve, quantile_axis
 
 
 def change(old: Mapping[Key, Series], new: Mapping[Key, Series]) -> Picture | None:

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from reports.figures.canvas import COLOUR, INK, SOFT, Panel, Picture, drawing, gather, log_time_axis
-from reports.figures.spectrum import Key, quantile_axis
-from reports.histograms import Distribution, Floats, Series
+from reports.latency.distributions import Distribution, Floats, Series
+from reports.latency.figures.canvas import COLOUR, INK, SOFT, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.spectrum import Key, quantile_axis
 
 _FEWEST_BINS, _MOST_BINS = 16, 70
 _BAND_POINTS = 160

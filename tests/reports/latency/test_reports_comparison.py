@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from reports.comparison import compare, judge, ratio_interval, widened
-from reports.comparison_pages import comparison_html, comparison_markdown, table, verdict
 from reports.errors import ResultsIncompatibleError
+from reports.latency.comparison import compare, judge, ratio_interval, widened
+from reports.latency.comparison_page import comparison_html, comparison_markdown, table, verdict
 
 NAMES = ("old.json", "new.json")
 

@@ -8,15 +8,15 @@ import pytest
 from lxml import html
 
 from reports.errors import ResultInvalidError
-from reports.figures.load import load
-from reports.figures.shape import difference
-from reports.figures.spans import spans
-from reports.figures.timeline import stalls, timeline
-from reports.findings import headline, remarks, verdict
-from reports.histograms import all_series
-from reports.latency import latency_html, latency_markdown
+from reports.latency.distributions import all_series
+from reports.latency.figures.load import load
+from reports.latency.figures.shape import difference
+from reports.latency.figures.spans import spans
+from reports.latency.figures.timeline import stalls, timeline
+from reports.latency.findings import headline, remarks, verdict
+from reports.latency.page import latency_html, latency_markdown
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 FIGURES = ["ratios", "spectrum", "density", "difference", "spans", "timeline", "load"]
 
 

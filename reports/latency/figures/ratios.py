@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from reports.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Picture, drawing, gather
+from reports.latency.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Picture, drawing, gather
 
 
 @dataclass(frozen=True, slots=True)

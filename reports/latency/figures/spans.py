@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from reports.figures.canvas import INK, SPAN_COLOUR, SPAN_HATCH, Panel, Picture, drawing, gather, milliseconds
-from reports.figures.spectrum import Key
-from reports.histograms import Series
+from reports.latency.distributions import Series
+from reports.latency.figures.canvas import INK, SPAN_COLOUR, SPAN_HATCH, Panel, Picture, drawing, gather, milliseconds
+from reports.latency.figures.spectrum import Key
 
 SPANS = ("build", "wire", "server", "parse")
 

@@ -4,17 +4,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from reports.figures.canvas import COLOUR, INK, Picture
-from reports.figures.load import load
-from reports.figures.ratios import Ratio, ratios
-from reports.figures.shape import density, difference
-from reports.figures.spans import SPANS, means, spans
-from reports.figures.spectrum import spectrum
-from reports.figures.timeline import timeline
-from reports.findings import PAPER, remarks, verdict
-from reports.histograms import Series, all_series
-from reports.numbers import NONE, interval, ms, rate, ratio, share
-from reports.pages import html_page, markdown_page
+from reports.latency.distributions import Series, all_series
+from reports.latency.figures.canvas import COLOUR, INK, Picture
+from reports.latency.figures.load import load
+from reports.latency.figures.ratios import Ratio, ratios
+from reports.latency.figures.shape import density, difference
+from reports.latency.figures.spans import SPANS, means, spans
+from reports.latency.figures.spectrum import spectrum
+from reports.latency.figures.timeline import timeline
+from reports.latency.findings import PAPER, remarks, verdict
+from reports.latency.numbers import NONE, interval, ms, rate, ratio, share
+from reports.pages.page import html_page, markdown_page
 
 QUANTILES = ("mean", "p50", "p90", "p95", "p99", "p999", "max")
 QUANTILE_WORDS = {

@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.ticker import MaxNLocator
 
-from reports.figures.canvas import COLOUR, INK, MARK, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.canvas import COLOUR, INK, MARK, Panel, Picture, drawing, gather, log_time_axis
 
 _MOST_POINTS = 240
 _STALL_FACTOR = 20

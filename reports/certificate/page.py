@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from reports.pages import html_page, markdown_page
+from reports.pages.page import html_page, markdown_page
 
 SHOWN_FAILURES = 5
 """Findings shown for each requirement; the rest are counted. Result files hold them all."""

@@ -5,7 +5,7 @@ from typing import Any
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from reports.figures.canvas import COLOUR, MARK, SOFT, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.canvas import COLOUR, MARK, SOFT, Panel, Picture, drawing, gather, log_time_axis
 
 
 def load(result: Mapping[str, Any]) -> Picture | None:

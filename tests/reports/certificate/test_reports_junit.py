@@ -8,9 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from reports.junit import junit
+from reports.certificate.junit import junit
 
-SHAPE = etree.XMLSchema(etree.parse(Path(__file__).parent / "data" / "junit-shape.xsd"))
+SHAPE = etree.XMLSchema(etree.parse(Path(__file__).parents[1] / "data" / "junit-shape.xsd"))
 
 
 def parsed(result):

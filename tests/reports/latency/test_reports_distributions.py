@@ -5,7 +5,7 @@ import pytest
 from hdrh.histogram import HdrHistogram
 
 from reports.errors import ResultInvalidError
-from reports.histograms import all_series, distribution
+from reports.latency.distributions import all_series, distribution
 
 
 def encoded(values_us):

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from typing import Any
 
-from reports.comparison import Change, Comparison
-from reports.figures.canvas import COLOUR
-from reports.figures.change import change
-from reports.figures.ratios import Ratio, ratios
-from reports.findings import Verdict
-from reports.numbers import NONE, interval, ms, ratio, share
-from reports.pages import html_page, markdown_page
+from reports.latency.comparison import Change, Comparison
+from reports.latency.figures.canvas import COLOUR
+from reports.latency.figures.change import change
+from reports.latency.figures.ratios import Ratio, ratios
+from reports.latency.findings import Verdict
+from reports.latency.numbers import NONE, interval, ms, ratio, share
+from reports.pages.page import html_page, markdown_page
 
 QUANTILE_WORDS = {"p50": "50 %", "p99": "99 %"}
 _TONES = {"slower": "bad", "faster": "good", "same": "quiet", "unclear": "warning", "no figure": "quiet"}

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from reports.certificate import certificate_html
-from reports.comparison import compare
-from reports.comparison_pages import comparison_html
-from reports.latency import latency_html
+from reports.certificate.page import certificate_html
+from reports.latency.comparison import compare
+from reports.latency.comparison_page import comparison_html
+from reports.latency.page import latency_html
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 WIDTHS = (1280, 390)
 PAGES = ("certificate", "latency", "compare")
 MEASURE = """<!doctype html><meta charset="utf-8"><title>wrapper</title><body><pre id="out"></pre><script>

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from reports.figures.spans import means
-from reports.figures.timeline import Stall, stalls
-from reports.histograms import Series
-from reports.numbers import interval, ms, rate, ratio
+from reports.latency.distributions import Series
+from reports.latency.figures.spans import means
+from reports.latency.figures.timeline import Stall, stalls
+from reports.latency.numbers import interval, ms, rate, ratio
 
 PAPER = {"rest_ms": 1.5, "soap_ms": 2.5, "ratio": 1.67}
 """What the paper reports: mean response times on localhost, and their ratio. It gives no spread and no method."""

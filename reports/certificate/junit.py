@@ -22,7 +22,7 @@ from typing import Any
 
 from lxml import etree
 
-from reports.untrusted import beginning, excerpt, visible
+from reports.pages.untrusted import beginning, excerpt, visible
 
 _SHOWN_FAILURES = 10
 _SHOWN_BODY = 2000
