@@ -42,11 +42,6 @@ class Distribution:
         """How many values there are."""
         return int(self.counts.sum())
 
-    @property
-    def middle_ms(self) -> Floats:
-        """The value that stands for each bucket."""
-        return (self.low_ms + self.high_ms) / 2
-
     def quantiles(self, at: Floats) -> Floats:
         """Values below which the shares `at` (0 to 1) of all values lie; interpolated inside a bucket."""
         reached = np.cumsum(self.counts)
