@@ -25,7 +25,7 @@ def broken(body: str, status: int, media_type: str = XML, version: str = "HTTP/1
     judge = Judge(set(Contract.load().ledger))
     observer = SoapObserver(judge, {URL: {f"{{{SPACE}}}GetGoalResponse"}})
     response = Response(status, (("Content-Type", media_type),), body.encode(), 1.0, version)
-    observer(Exchange(Request("POST", URL), response))
+    observer.answered(Exchange(Request("POST", URL), response))
     return {id_.rpartition("/")[2] for id_ in PASSIVE if judge.evidence[id_].findings}
 
 
