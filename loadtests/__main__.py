@@ -10,7 +10,7 @@ import signal
 import sys
 import traceback
 
-from loadtests.exits import INCONCLUSIVE
+from conformance.contract.exit_codes import ExitCode
 
 
 def main() -> int:
@@ -24,7 +24,7 @@ def main() -> int:
         return carry_out(Settings.from_json(sys.stdin.read()))
     except Exception:  # noqa: BLE001 -- exit code 1 would say that the robot missed a threshold
         traceback.print_exc()
-        return INCONCLUSIVE
+        return ExitCode.INCONCLUSIVE
 
 
 def _raise_file_limit() -> None:

@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from loadtests import exits
+from conformance.contract.exit_codes import ExitCode
+from conformance.contract.statement import Statement, load_statement
+from conformance.contract.thresholds import Threshold, load_thresholds
+from conformance.contract.toml_file import TomlFileError
 from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
 from loadtests.settings import (
     DEFAULT_DURATION_S,
@@ -23,11 +26,7 @@ from loadtests.settings import (
     Wishes,
     settle,
 )
-from loadtests.statement import Statement, StatementError
-from loadtests.statement import read as read_statement
 from loadtests.statistics.steps import STEP_S
-from loadtests.statistics.thresholds import ThresholdsError
-from loadtests.statistics.thresholds import read_file as read_thresholds
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -64,7 +63,7 @@ def run_load(settings: Settings) -> int:
         for number, handler in earlier.items():
             signal.signal(number, handler)
     if code < 0:  # ended by a signal: before it could take Ctrl-C as a wish, or by force
-        code = exits.INTERRUPTED if -code in earlier else exits.INCONCLUSIVE
+        code = ExitCode.INTERRUPTED if -code in earlier else ExitCode.INCONCLUSIVE
     return code
 
 
@@ -122,18 +121,18 @@ def load(ctx: click.Context, /, statement: Path | None, **options: Any) -> None:
     Exit codes: 0 thresholds met, 1 missed, 2 usage, 3 robot not reachable, 4 measurement not valid, 130 interrupted.
     """
     try:
-        said = read_statement(statement) if statement is not None else Statement()
-        limits = read_thresholds(options.pop("thresholds")) if options["thresholds"] else []
+        said = load_statement(statement) if statement is not None else Statement()
+        limits = load_thresholds(options.pop("thresholds")) if options["thresholds"] else ()
         options.pop("thresholds", None)
         settings = settle(_wishes(options, limits), said)
         _check_folder(Path(settings.out))
-    except (StatementError, ThresholdsError, SettingsError) as error:
+    except (TomlFileError, SettingsError) as error:
         click.echo(f"roaas load: {error}", err=True)
-        ctx.exit(exits.USAGE)
+        ctx.exit(ExitCode.USAGE)
     ctx.exit(run_load(settings))
 
 
-def _wishes(options: dict[str, Any], limits: list[Any]) -> Wishes:
+def _wishes(options: dict[str, Any], limits: tuple[Threshold, ...]) -> Wishes:
     renamed = {
         "duration": "duration_s",
         "warmup": "warmup_s",

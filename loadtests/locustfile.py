@@ -13,6 +13,7 @@ import locust.stats
 from locust import User, constant_throughput, events, tag, task
 from locust.exception import StopTest
 
+from conformance.contract.statement import Statement
 from loadtests.clients.callers import Caller, Workload
 from loadtests.clients.endpoint import EndpointError
 from loadtests.clients.failures import CallError
@@ -22,7 +23,6 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import WsdlError, address_in, fetch
 from loadtests.settings import Settings, SettingsError, Wishes, settle
-from loadtests.statement import Statement
 
 OPERATIONS = tuple(CATALOGUE)
 _TEXTS = ("rest", "publishers-wsdl", "subscribers-wsdl", "publishers-endpoint", "subscribers-endpoint")

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
+from conformance.contract.thresholds import Threshold
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS
 from loadtests.statistics.steps import DEFAULT_RATES, STEP_S
-from loadtests.statistics.thresholds import Threshold
 
 if TYPE_CHECKING:
-    from loadtests.statement import Statement
+    from conformance.contract.statement import Statement
 
 DEFAULT_RATE = 200.0
 DEFAULT_DURATION_S = 20.0
 DEFAULT_WARMUP_S = 2.0
-DEFAULT_TIMEOUT_S = 10.0
 #: For anything that moves a robot, unless its statement's [load] says otherwise.
 MOTION_RATE = 500.0
 MOTION_DURATION_S = 120.0
@@ -77,7 +78,7 @@ class Settings:
 
     def to_json(self) -> str:
         """For the process that measures."""
-        return json.dumps(asdict(self))
+        return json.dumps(msgspec.to_builtins(self))
 
     @classmethod
     def from_json(cls, text: str) -> Settings:
@@ -85,7 +86,7 @@ class Settings:
         found = json.loads(text)
         for key in ("operations", "interfaces", "clients", "step_rates"):
             found[key] = tuple(found[key])
-        found["thresholds"] = tuple(Threshold(**entry) for entry in found["thresholds"])
+        found["thresholds"] = msgspec.convert(found["thresholds"], tuple[Threshold, ...])
         return cls(**found)
 
 
@@ -121,7 +122,7 @@ class Wishes:
     token_file: str | None = None
     ca_file: str | None = None
     allow_motion: bool = False
-    thresholds: list[Threshold] = field(default_factory=list)
+    thresholds: tuple[Threshold, ...] = ()
     out: str = ""
     command: str = ""
 
@@ -134,15 +135,15 @@ def settle(wishes: Wishes, statement: Statement) -> Settings:
     """
     endpoints = statement.endpoints
     addresses = {
-        "rest": wishes.rest or endpoints.get("rest"),
-        "publishers": wishes.publishers_endpoint or endpoints.get("publishers_endpoint"),
-        "subscribers": wishes.subscribers_endpoint or endpoints.get("subscribers_endpoint"),
+        "rest": wishes.rest or endpoints.rest,
+        "publishers": wishes.publishers_endpoint or endpoints.publishers_endpoint,
+        "subscribers": wishes.subscribers_endpoint or endpoints.subscribers_endpoint,
     }
     descriptions = {
-        "publishers_wsdl": wishes.publishers_wsdl or endpoints.get("publishers_wsdl"),
-        "subscribers_wsdl": wishes.subscribers_wsdl or endpoints.get("subscribers_wsdl"),
+        "publishers_wsdl": wishes.publishers_wsdl or endpoints.publishers_wsdl,
+        "subscribers_wsdl": wishes.subscribers_wsdl or endpoints.subscribers_wsdl,
     }
-    ca_file = wishes.ca_file or endpoints.get("ca_file")
+    ca_file = wishes.ca_file or endpoints.ca_file
     try:
         for address in (*addresses.values(), *descriptions.values()):
             if address and ("://" in address or address in addresses.values()):
@@ -167,8 +168,8 @@ def settle(wishes: Wishes, statement: Statement) -> Settings:
     return Settings(
         **(addresses | descriptions),
         ca_file=ca_file,
-        token=_token(wishes.token_file or endpoints.get("token_file")),
-        timeout_s=wishes.timeout_s or statement.timeout_s or DEFAULT_TIMEOUT_S,
+        token=_token(wishes.token_file or endpoints.token_file),
+        timeout_s=wishes.timeout_s or endpoints.timeout_s,
         operations=operations,
         interfaces=tuple(name for name in INTERFACES if name in interfaces),
         clients=tuple(name for name in CLIENTS if name in (wishes.clients or CLIENTS)),
@@ -189,7 +190,7 @@ def settle(wishes: Wishes, statement: Statement) -> Settings:
         metrics_port=wishes.metrics_port,
         step_rates=_step_rates(wishes, statement, operations),
         step_s=wishes.step_s,
-        thresholds=tuple(wishes.thresholds or statement.thresholds),
+        thresholds=wishes.thresholds or statement.load.thresholds,
         about=statement.robot,
         out=wishes.out,
         command=wishes.command,
@@ -233,10 +234,10 @@ def _check_numbers(wishes: Wishes) -> None:
 def _ceiling(statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, str]:
     """The highest rate allowed, and who says so."""
     found: list[tuple[float, str]] = []
-    if statement.request_rate is not None:
-        found.append((statement.request_rate, "the statement's [endpoints] request_rate"))
-    if statement.max_rate is not None:
-        found.append((statement.max_rate, "the statement's [load] max_rate"))
+    if statement.endpoints.request_rate is not None:
+        found.append((statement.endpoints.request_rate, "the statement's [endpoints] request_rate"))
+    if statement.load.max_rate is not None:
+        found.append((statement.load.max_rate, "the statement's [load] max_rate"))
     elif MOVES.intersection(operations):
         found.append(
             (MOTION_RATE, "the default limit for what moves a robot; the statement's [load] max_rate lifts it")
@@ -246,8 +247,8 @@ def _ceiling(statement: Statement, operations: tuple[str, ...]) -> tuple[float |
 
 def _longest(statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, str]:
     """The longest duration allowed, and who says so."""
-    if statement.max_duration_s is not None:
-        return statement.max_duration_s, "the statement's [load] max_duration_s"
+    if statement.load.max_duration_s is not None:
+        return statement.load.max_duration_s, "the statement's [load] max_duration_s"
     if MOVES.intersection(operations):
         why = "the default limit for what moves a robot; the statement's [load] max_duration_s lifts it"
         return MOTION_DURATION_S, why

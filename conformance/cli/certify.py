@@ -5,16 +5,16 @@ from __future__ import annotations
 import shlex
 import signal
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import msgspec
 
 from conformance.cli.summary import print_summary
-from conformance.contract.exit_codes import INTERRUPTED, UNREACHABLE
+from conformance.contract.classes import CLASSES, PROFILES
+from conformance.contract.exit_codes import ExitCode
 from conformance.contract.files import CONTRACT_DIR, Contract, ContractError
-from conformance.contract.ledger import CLASSES, PROFILES
 from conformance.contract.statement import Statement, StatementError, load_statement
 from conformance.verdict.effort import EFFORTS, Effort
 
@@ -44,9 +44,14 @@ _ENDPOINTS = (
 @click.option("--subscribers-wsdl", metavar="URL", help="WSDL of the subscribers service, URL or file.")
 @click.option("--publishers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say so.")
 @click.option("--subscribers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say so.")
-@click.option("--profile", type=click.Choice(list(PROFILES)), help="Claim the classes of a profile.")
+@click.option("--profile", type=click.Choice([str(name) for name in PROFILES]), help="Claim the classes of a profile.")
 @click.option(
-    "--class", "classes", multiple=True, type=click.Choice(CLASSES), metavar="NAME", help="Claim a class; repeatable."
+    "--class",
+    "classes",
+    multiple=True,
+    type=click.Choice([str(name) for name in CLASSES]),
+    metavar="NAME",
+    help="Claim a class; repeatable.",
 )
 @click.option(
     "--contract", type=click.Path(path_type=Path), default=CONTRACT_DIR, help="Judge by the contract in this folder."
@@ -116,7 +121,7 @@ def certify(statement: Path | None, **options: Any) -> None:
     except (StatementError, ContractError) as error:
         raise click.UsageError(str(error)) from error
     except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
+        sys.exit(ExitCode.INTERRUPTED)
     print_summary(outcome)
     sys.exit(outcome.exit_code)
 
@@ -126,7 +131,7 @@ def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
     given = {key: options[key] for key in _ENDPOINTS if options[key] is not None}
     if options["timeout"] is not None:
         given["timeout_s"] = options["timeout"]
-    where = replace(declared.endpoints, **given)
+    where = msgspec.structs.replace(declared.endpoints, **given)
     for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
         url = getattr(where, key)
         if url is not None and not url.startswith(("http://", "https://")):
@@ -138,8 +143,8 @@ def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
         claims = (*PROFILES.get(options["profile"] or "", ()), *options["classes"])
     ros = declared.ros
     if options["ros_domain_id"] is not None:
-        ros = replace(ros, domain_id=options["ros_domain_id"])
-    return replace(declared, endpoints=where, claims=claims, ros=ros)
+        ros = msgspec.structs.replace(ros, domain_id=options["ros_domain_id"])
+    return msgspec.structs.replace(declared, endpoints=where, claims=claims, ros=ros)
 
 
 def _init(path: Path | None, chosen: Statement, *, force: bool) -> None:
@@ -152,7 +157,7 @@ def _init(path: Path | None, chosen: Statement, *, force: bool) -> None:
     problem = write_first_statement(path, chosen)
     if problem:
         click.echo(f"the robot cannot be reached: {problem}", err=True)
-        sys.exit(UNREACHABLE)
+        sys.exit(ExitCode.UNREACHABLE)
     click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
 
 

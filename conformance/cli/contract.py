@@ -10,8 +10,10 @@ from pathlib import Path
 
 import click
 
+from conformance.contract.classes import CLASSES, Level
+from conformance.contract.exit_codes import ExitCode
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_FILES, CONTRACT_VERSION
-from conformance.contract.ledger import CLASSES, LEVELS, load_ledger
+from conformance.contract.ledger import load_ledger
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -20,8 +22,10 @@ def contract() -> None:
 
 
 @contract.command(name="list")
-@click.option("--class", "class_", type=click.Choice(CLASSES), help="Only those of one conformance class.")
-@click.option("--level", type=click.Choice(LEVELS), help="Only those of one level.")
+@click.option(
+    "--class", "class_", type=click.Choice([str(name) for name in CLASSES]), help="Only those of one conformance class."
+)
+@click.option("--level", type=click.Choice([str(level) for level in Level]), help="Only those of one level.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, for other programs.")
 def list_(class_: str | None, level: str | None, *, as_json: bool) -> None:
     """List the requirements: id, level, text and source."""
@@ -74,4 +78,4 @@ def coverage(out: Path | None) -> None:
     problems = disagreements()
     for problem in problems:
         click.echo(problem, err=True)
-    sys.exit(1 if problems else 0)
+    sys.exit(ExitCode.FAILED if problems else ExitCode.PASSED)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conformance.contract.exit_codes import EXIT_CODES, INTERRUPTED, UNREACHABLE
+from conformance.contract.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from conformance.selftest.comparison import SchemathesisResult
@@ -88,13 +88,13 @@ def selftest(**options: Any) -> None:
         report = _run(chosen, options)
     except RobotError as error:
         click.echo(str(error), err=True)
-        sys.exit(UNREACHABLE)
+        sys.exit(ExitCode.UNREACHABLE)
     except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
+        sys.exit(ExitCode.INTERRUPTED)
     path = report.write(options["out"])
     click.echo(report.summary())
     click.echo(f"result: {path}")
-    sys.exit(0 if report.holds else EXIT_CODES["not-conformant"])
+    sys.exit(ExitCode.PASSED if report.holds else ExitCode.FAILED)
 
 
 def _run(chosen: list[Mutant], options: dict[str, Any]) -> Report:

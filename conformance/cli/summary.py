@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conformance.contract.exit_codes import UNREACHABLE
+from conformance.contract.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from conformance.engine.certification import Certification
@@ -19,7 +19,7 @@ _SHOWN_CURL = 1000
 def print_summary(outcome: Certification) -> None:
     """Print a certification to stdout; that the robot was not reached, to stderr."""
     document = outcome.document
-    if outcome.exit_code == UNREACHABLE:
+    if outcome.exit_code == ExitCode.UNREACHABLE:
         click.echo(f"error: {document['requirements'][0]['reason']}", err=True)
         click.echo(f"result: {outcome.path}")
         return

@@ -1,6 +1,25 @@
-"""Exit codes of the suite's commands."""
+"""Exit codes of every command (docs/cli.md)."""
 
-EXIT_CODES = {"conformant": 0, "not-conformant": 1, "inconclusive": 4}
-USAGE = 2
-UNREACHABLE = 3
-INTERRUPTED = 130
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Final
+
+
+class ExitCode(IntEnum):
+    """What a command ends with."""
+
+    PASSED = 0  # conformant; thresholds met
+    FAILED = 1  # not conformant; a threshold missed
+    USAGE = 2  # wrong usage, or input that cannot be read
+    UNREACHABLE = 3  # the robot cannot be reached
+    INCONCLUSIVE = 4  # nothing was executed, a claimed class could not be judged, a measurement is not valid
+    INTERRUPTED = 130
+
+
+#: By a result's overall verdict.
+OF_VERDICT: Final = {
+    "conformant": ExitCode.PASSED,
+    "not-conformant": ExitCode.FAILED,
+    "inconclusive": ExitCode.INCONCLUSIVE,
+}

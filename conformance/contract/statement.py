@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from conformance.contract.ledger import CLASSES, PROFILES
+import msgspec
+
+from conformance.contract.classes import CLASSES, PROFILES, ConformanceClass, Profile
+from conformance.contract.thresholds import Threshold
+from conformance.contract.toml_file import Finite, NotNegative, Positive, Text, TomlFileError, read_toml
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -16,13 +18,14 @@ _UNDECLARED_LINEAR = 0.35
 _UNDECLARED_ANGULAR = 1.25
 _UNDECLARED_SETTLE = 2.0
 
+Component = Literal["linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z"]
 
-class StatementError(Exception):
+
+class StatementError(TomlFileError):
     """A statement that cannot be used; the message names the file, the key and the offending value."""
 
 
-@dataclass(frozen=True)
-class Endpoints:
+class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where a robot's interfaces are.
 
     Attributes:
@@ -35,15 +38,15 @@ class Endpoints:
         timeout_s: deadline of one request, s.
     """
 
-    rest: str | None = None
-    publishers_wsdl: str | None = None
-    subscribers_wsdl: str | None = None
-    publishers_endpoint: str | None = None
-    subscribers_endpoint: str | None = None
-    ca_file: str | None = None
-    token_file: str | None = None
-    request_rate: float | None = None
-    timeout_s: float = 10.0
+    rest: Text | None = None
+    publishers_wsdl: Text | None = None
+    subscribers_wsdl: Text | None = None
+    publishers_endpoint: Text | None = None
+    subscribers_endpoint: Text | None = None
+    ca_file: Text | None = None
+    token_file: Text | None = None
+    request_rate: Positive | None = None
+    timeout_s: Positive = 10.0
 
     @property
     def publishers(self) -> bool:
@@ -56,8 +59,7 @@ class Endpoints:
         return bool(self.subscribers_wsdl or self.subscribers_endpoint)
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What the robot can do, and how exactly.
 
     Attributes:
@@ -68,16 +70,15 @@ class Limits:
         tolerance: relative tolerance of a reached velocity; tolerance_abs: the absolute one, m/s or rad/s.
     """
 
-    linear_m_s: float = _UNDECLARED_LINEAR
-    angular_rad_s: float = _UNDECLARED_ANGULAR
-    settle_s: float = _UNDECLARED_SETTLE
-    hold_s: float | None = None
-    tolerance: float = 0.05
-    tolerance_abs: float = 0.02
+    linear_m_s: NotNegative = _UNDECLARED_LINEAR
+    angular_rad_s: NotNegative = _UNDECLARED_ANGULAR
+    settle_s: NotNegative = _UNDECLARED_SETTLE
+    hold_s: NotNegative | None = None
+    tolerance: NotNegative = 0.05
+    tolerance_abs: NotNegative = 0.02
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where a robot may be driven.
 
     Attributes:
@@ -89,25 +90,36 @@ class Motion:
         actuated: the velocity components that the robot can actuate.
     """
 
-    arena: tuple[float, float, float, float] | None = None
-    frame: str = "map"
-    radius_m: float = 1.0
-    goals: tuple[tuple[float, float, float], ...] = ()
-    odom_to_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    actuated: tuple[str, ...] = ("linear.x", "angular.z")
+    arena: tuple[Finite, Finite, Finite, Finite] | None = None
+    frame: Text = "map"
+    radius_m: NotNegative = 1.0
+    goals: tuple[tuple[Finite, Finite, Finite], ...] = ()
+    odom_to_map: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    actuated: tuple[Component, ...] = ("linear.x", "angular.z")
 
 
-@dataclass(frozen=True)
-class Ros:
+class Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The robot's ROS side, for the probe."""
 
-    domain_id: int | None = None
-    delivery_topic: str = "/DeliveryRequestMsg/from_json"
-    cmd_vel_topic: str = "/cmd_vel"
+    domain_id: Annotated[int, msgspec.Meta(ge=0, le=232)] | None = None  # DDS's range
+    delivery_topic: Text = "/DeliveryRequestMsg/from_json"
+    cmd_vel_topic: Text = "/cmd_vel"
 
 
-@dataclass(frozen=True)
-class Statement:
+class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a load test may ask of the robot, and what it is to keep to.
+
+    Attributes:
+        max_rate: most requests per second.
+        max_duration_s: longest measurement, s.
+    """
+
+    max_rate: Positive | None = None
+    max_duration_s: Positive | None = None
+    thresholds: tuple[Threshold, ...] = ()
+
+
+class Statement(msgspec.Struct, frozen=True):
     """What a vendor says of a robot.
 
     Attributes:
@@ -115,14 +127,15 @@ class Statement:
         claims: the conformance classes that the vendor claims; None: none were named.
     """
 
-    robot: dict[str, str] = field(default_factory=dict)
+    robot: dict[str, str] = {}
     endpoints: Endpoints = Endpoints()
-    claims: tuple[str, ...] | None = None
+    claims: tuple[ConformanceClass, ...] | None = None
     limits: Limits = Limits()
     motion: Motion = Motion()
     ros: Ros = Ros()
+    load: Load = Load()
 
-    def claimed(self) -> tuple[str, ...]:
+    def claimed(self) -> tuple[ConformanceClass, ...]:
         """The classes to judge: those that are claimed, else those whose interfaces have an address."""
         if self.claims is not None:
             return tuple(name for name in CLASSES if name in self.claims)
@@ -145,6 +158,35 @@ class Statement:
         return tuple(name for name in CLASSES if there[name])
 
 
+class _Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    name: str | int | float | None = None
+    vendor: str | int | float | None = None
+    version: str | int | float | None = None
+
+
+class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    profile: Profile | None = None
+    classes: tuple[ConformanceClass, ...] | None = None
+
+    def named(self) -> tuple[ConformanceClass, ...] | None:
+        """The classes claimed in either way; None: nothing was said."""
+        if self.profile is None and self.classes is None:
+            return None
+        return (*(PROFILES[self.profile] if self.profile else ()), *(self.classes or ()))
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The tables of a statement, as they are written."""
+
+    robot: _Robot = _Robot()
+    endpoints: Endpoints = Endpoints()
+    claims: _Claims = _Claims()
+    limits: Limits = Limits()
+    motion: Motion = Motion()
+    ros: Ros = Ros()
+    load: Load = Load()
+
+
 def load_statement(path: Path) -> Statement:
     """Read a statement.
 
@@ -153,109 +195,20 @@ def load_statement(path: Path) -> Statement:
     Raises:
         StatementError: it cannot be read, or has an unknown key or a value of the wrong kind.
     """
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise StatementError(f"{path} cannot be read: {error}") from error
-    known = {"robot", "endpoints", "claims", "limits", "motion", "ros", "load"}
-    _refuse_unknown(path, "", tables, known)
-    for name, table in tables.items():
-        if not isinstance(table, dict):
-            raise StatementError(f"{path}: {name} = {table!r} must be a table: [{name}]")
-    robot = tables.get("robot", {})
-    _refuse_unknown(path, "robot", robot, {"name", "vendor", "version"})
+    file = read_toml(path, _File, StatementError)
+    robot = msgspec.structs.asdict(file.robot)
     return Statement(
-        robot={key: str(value) for key, value in robot.items()},
-        endpoints=_endpoints(path, tables.get("endpoints", {})),
-        claims=_claims(path, tables.get("claims", {})),
-        limits=Limits(**_numbers(path, "limits", tables.get("limits", {}), Limits)),
-        motion=_motion(path, tables.get("motion", {})),
-        ros=_ros(path, tables.get("ros", {})),
+        robot={key: str(value) for key, value in robot.items() if value is not None},
+        endpoints=_beside(path.parent, file.endpoints),
+        claims=file.claims.named(),
+        limits=file.limits,
+        motion=file.motion,
+        ros=file.ros,
+        load=file.load,
     )
 
 
-def _refuse_unknown(path: Path, table: str, given: dict[str, Any], known: set[str]) -> None:
-    unknown = sorted(set(given) - known)
-    if unknown:
-        where = f"[{table}] " if table else ""
-        raise StatementError(f"{path}: unknown {where}{unknown[0]!r}; known are {', '.join(sorted(known))}")
-
-
-def _numbers(path: Path, table: str, given: dict[str, Any], kind: type) -> dict[str, float]:
-    _refuse_unknown(path, table, given, set(kind.__dataclass_fields__))  # type: ignore[attr-defined] # a dataclass
-    for key, value in given.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < float("inf"):
-            raise StatementError(f"{path}: [{table}] {key} = {value!r} must be a number, and not negative")
-    return {key: float(value) for key, value in given.items()}
-
-
-def _endpoints(path: Path, given: dict[str, Any]) -> Endpoints:
-    _refuse_unknown(path, "endpoints", given, set(Endpoints.__dataclass_fields__))
-    numbers = {"request_rate", "timeout_s"}
-    for key, value in given.items():
-        fits = (
-            isinstance(value, int | float) and not isinstance(value, bool) and value > 0
-            if key in numbers
-            else isinstance(value, str)
-        )
-        if not fits:
-            kind = "a positive number" if key in numbers else "a string"
-            raise StatementError(f"{path}: [endpoints] {key} = {value!r} must be {kind}")
-    files = {"ca_file", "token_file", "publishers_wsdl", "subscribers_wsdl"}
-    fields: dict[str, Any] = {
-        key: str(path.parent / value) if key in files and "://" not in str(value) else value
-        for key, value in given.items()
-    }
-    return Endpoints(**fields)
-
-
-def _claims(path: Path, given: dict[str, Any]) -> tuple[str, ...] | None:
-    _refuse_unknown(path, "claims", given, {"profile", "classes"})
-    if not given:
-        return None
-    claims: list[str] = []
-    if "profile" in given:
-        if given["profile"] not in PROFILES:
-            raise StatementError(f"{path}: [claims] profile = {given['profile']!r}; there are {', '.join(PROFILES)}")
-        claims += PROFILES[given["profile"]]
-    for name in given.get("classes", ()):
-        if name not in CLASSES:
-            raise StatementError(f"{path}: [claims] {name!r} is no conformance class; there are {', '.join(CLASSES)}")
-        claims.append(name)
-    return tuple(claims)
-
-
-def _motion(path: Path, given: dict[str, Any]) -> Motion:
-    _refuse_unknown(path, "motion", given, set(Motion.__dataclass_fields__))
-    lengths = {"arena": 4, "odom_to_map": 3}
-    fields: dict[str, Any] = dict(given)
-    for key, length in lengths.items():
-        if key in given:
-            fields[key] = _tuple(path, key, given[key], length)
-    if "goals" in given:
-        fields["goals"] = tuple(_tuple(path, "goals", goal, 3) for goal in given["goals"])
-    if "actuated" in given:
-        fields["actuated"] = tuple(given["actuated"])
-        components = [f"{part}.{axis}" for part in ("linear", "angular") for axis in "xyz"]
-        for name in fields["actuated"]:
-            if name not in components:
-                raise StatementError(f"{path}: [motion] actuated: {name!r} is none of {', '.join(components)}")
-    return Motion(**fields)
-
-
-def _tuple(path: Path, key: str, value: Any, length: int) -> tuple[float, ...]:
-    if (
-        not isinstance(value, list)
-        or len(value) != length
-        or not all(isinstance(item, int | float) and not isinstance(item, bool) for item in value)
-    ):
-        raise StatementError(f"{path}: [motion] {key} = {value!r} must be {length} numbers")
-    return tuple(float(item) for item in value)
-
-
-def _ros(path: Path, given: dict[str, Any]) -> Ros:
-    _refuse_unknown(path, "ros", given, set(Ros.__dataclass_fields__))
-    domain = given.get("domain_id")
-    if domain is not None and (not isinstance(domain, int) or not 0 <= domain <= 232):  # noqa: PLR2004 - DDS's range
-        raise StatementError(f"{path}: [ros] domain_id = {domain!r} must be a whole number from 0 to 232")
-    return Ros(**given)
+def _beside(folder: Path, where: Endpoints) -> Endpoints:
+    named = {key: getattr(where, key) for key in ("ca_file", "token_file", "publishers_wsdl", "subscribers_wsdl")}
+    files = {key: str(folder / name) for key, name in named.items() if name is not None and "://" not in name}
+    return msgspec.structs.replace(where, **files)

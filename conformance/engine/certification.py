@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
 
-from conformance.contract.exit_codes import EXIT_CODES, INTERRUPTED, UNREACHABLE
+from conformance.contract.exit_codes import OF_VERDICT, ExitCode
 from conformance.engine.plugin import PHASES
 from conformance.engine.result import result_document, write_result
 from conformance.verdict.baseline import Expectation, apply_baseline
@@ -139,8 +139,8 @@ def certify(
     )
     path = write_result(document, out)
     if interrupted:
-        return Certification(INTERRUPTED, document, path)
-    return Certification(EXIT_CODES[document["verdict"]] if reached else UNREACHABLE, document, path)
+        return Certification(ExitCode.INTERRUPTED, document, path)
+    return Certification(OF_VERDICT[document["verdict"]] if reached else ExitCode.UNREACHABLE, document, path)
 
 
 def draw_verdicts(session: Session, baseline: tuple[Expectation, ...]) -> list[Verdict]:

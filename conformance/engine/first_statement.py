@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.ledger import CLASSES
+from conformance.contract.classes import CLASSES
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.session import Session
 from conformance.transport.exchange import NoAnswerError
@@ -120,7 +120,7 @@ def _endpoints(session: Session) -> list[str]:
 
 def _claims(session: Session) -> tuple[list[str], dict[str, str]]:
     """All classes, and a doubt for each that the robot does not look as if it had."""
-    doubts = {
+    doubts: dict[str, str] = {
         name: "no address for an interface that it needs" for name in CLASSES if name not in session.statement.claimed()
     }
     if session.rest and "rest" not in session.unreachable and "rest-formats" not in doubts:

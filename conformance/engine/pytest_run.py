@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import pytest
 
-from conformance.contract.ledger import CLASSES
+from conformance.contract.classes import CLASSES, ConformanceClass
 from conformance.contract.statement import Statement, StatementError, load_statement
 from conformance.engine.session import Session
 from conformance.transport.client import Connection
@@ -29,13 +29,13 @@ def session_from_options(config: pytest.Config) -> Session:
         statement = load_statement(Path(given)) if given else Statement()
     except StatementError as error:
         raise pytest.UsageError(str(error)) from error
-    statement = replace(statement, endpoints=_endpoints(config, statement.endpoints))
+    statement = msgspec.structs.replace(statement, endpoints=_endpoints(config, statement.endpoints))
     classes = config.getoption("robot_class")
     if classes:
         unknown = sorted(set(classes) - set(CLASSES))
         if unknown:
             raise pytest.UsageError(f"--robot-class {unknown[0]}: there are {', '.join(CLASSES)}")
-        statement = replace(statement, claims=tuple(classes))
+        statement = msgspec.structs.replace(statement, claims=tuple(map(ConformanceClass, classes)))
     where = statement.endpoints
     if not (where.rest or where.publishers or where.subscribers):
         raise pytest.UsageError("name a robot: --robot-rest, --robot-publishers-wsdl or --robot-subscribers-wsdl")
@@ -63,7 +63,7 @@ def _endpoints(config: pytest.Config, declared: Endpoints) -> Endpoints:
         "subscribers_wsdl": config.getoption("robot_subscribers_wsdl"),
         "timeout_s": config.getoption("robot_timeout"),
     }
-    return replace(declared, **{key: value for key, value in options.items() if value is not None})
+    return msgspec.structs.replace(declared, **{key: value for key, value in options.items() if value is not None})
 
 
 def connection_of(where: Endpoints) -> Connection:

@@ -7,13 +7,14 @@ import json
 import os
 import platform
 import tempfile
-from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgspec.structs import asdict
+
+from conformance.contract.classes import CLASS_TITLES
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
-from conformance.contract.ledger import CLASS_TITLES
 from conformance.transport.exchange import Unanswered
 
 if TYPE_CHECKING:

@@ -8,9 +8,13 @@ import multiprocessing
 import os
 import tempfile
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from conformance.contract.classes import ConformanceClass
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection as Pipe
@@ -131,15 +135,16 @@ def session_of(job: Job, folder: Path) -> Any:
     if job.token:
         (folder / "token").write_text(job.token, encoding="utf-8")
         given["token_file"] = str(folder / "token")
-    where = replace(
+    where = msgspec.structs.replace(
         statement.endpoints,
         rest=job.rest,
         publishers_wsdl=job.publishers,
         subscribers_wsdl=job.subscribers,
         **given,
     )
-    claims = job.classes or statement.claims
-    statement = replace(statement, endpoints=where, claims=claims, ros=replace(statement.ros, domain_id=job.domain_id))
+    ros = msgspec.structs.replace(statement.ros, domain_id=job.domain_id)
+    claims = tuple(map(ConformanceClass, job.classes)) or statement.claims
+    statement = msgspec.structs.replace(statement, endpoints=where, claims=claims, ros=ros)
     contract = Contract.load()
     if job.requirements:
         # A ledger of these alone: checks that judge none of them are not run.

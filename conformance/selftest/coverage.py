@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import conformance.checks
+from conformance.contract.classes import CLASSES
 from conformance.contract.files import CONTRACT_DIR
-from conformance.contract.ledger import CLASSES, Requirement, load_ledger
+from conformance.contract.ledger import Requirement, load_ledger
 from conformance.selftest.mutants import MUTANTS
 
 if TYPE_CHECKING:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import datetime as dt
-import tomllib
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import msgspec
+
+from conformance.contract.toml_file import Text, TomlFileError, read_toml
 from conformance.verdict.verdicts import Verdict, broken_baseline, expected_failure
 
 if TYPE_CHECKING:
@@ -14,12 +15,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-class BaselineError(Exception):
+class BaselineError(TomlFileError):
     """A baseline that cannot be used; the message names the entry and the offending value."""
 
 
-@dataclass(frozen=True)
-class Expectation:
+class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One failure that is known and accepted for a while.
 
     Attributes:
@@ -28,9 +28,13 @@ class Expectation:
         expires: the last day on which it is.
     """
 
-    requirement: str
-    reason: str
+    requirement: Text
+    reason: Text
     expires: dt.date
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    expected: tuple[Expectation, ...] = ()
 
 
 def load_baseline(path: Path, known: Iterable[str]) -> tuple[Expectation, ...]:
@@ -39,30 +43,12 @@ def load_baseline(path: Path, known: Iterable[str]) -> tuple[Expectation, ...]:
     Raises:
         BaselineError: it cannot be read, or an entry names no known requirement or lacks a field.
     """
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise BaselineError(f"{path} cannot be read: {error}") from error
-    unknown = set(document) - {"expected"}
-    if unknown:
-        raise BaselineError(f"{path}: unknown {min(unknown)!r}; a baseline has [[expected]] tables")
-    entries = document.get("expected", [])
-    if not isinstance(entries, list):
-        raise BaselineError(f"{path}: write [[expected]], with two brackets, for each entry")
+    baseline = read_toml(path, _File, BaselineError).expected
     ids = set(known)
-    baseline = []
-    for entry in entries:
-        id_ = entry.get("requirement")
-        if id_ not in ids:
-            raise BaselineError(f"{path}: {id_!r} is no requirement; `roaas contract list` shows them")
-        if set(entry) - {"requirement", "reason", "expires"}:
-            raise BaselineError(f"{path}: the entry for {id_} may have requirement, reason and expires only")
-        if not isinstance(entry.get("reason"), str) or not entry["reason"].strip():
-            raise BaselineError(f"{path}: the entry for {id_} has no reason")
-        if type(entry.get("expires")) is not dt.date:
-            raise BaselineError(f"{path}: the entry for {id_} has no expires = YYYY-MM-DD (without quotes)")
-        baseline.append(Expectation(id_, entry["reason"], entry["expires"]))
-    return tuple(baseline)
+    for entry in baseline:
+        if entry.requirement not in ids:
+            raise BaselineError(f"{path}: {entry.requirement!r} is no requirement; `roaas contract list` shows them")
+    return baseline
 
 
 def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation], today: dt.date) -> list[Verdict]:

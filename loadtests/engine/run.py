@@ -16,10 +16,10 @@ from typing import Any
 
 import gevent
 
+from conformance.contract.exit_codes import ExitCode
 from loadtests.measuring.step_load import step_load
 from loadtests.measuring.executor import Executor, LocalExecutor, busiest
 from loadtests.result.document import RunAborted, Outcome, compose
-from loadtests.exits import INCONCLUSIVE, INTERRUPTED, UNREACHABLE, USAGE
 from loadtests.clients.failures import CallError
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.distributed_executor import DistributedExecutor
@@ -74,7 +74,7 @@ class Run:
     def interrupt(self) -> None:
         """Ctrl-C: end, keeping what there is."""
         if self.outcome.interrupted:
-            os._exit(INTERRUPTED)  # asked for twice: not even for the result
+            os._exit(ExitCode.INTERRUPTED)  # asked for twice: not even for the result
         self.outcome.interrupted = True
 
     # Before the measurement.
@@ -97,9 +97,9 @@ class Run:
             try:
                 found[service] = address_in(fetch(location, self.robot), location, element)
             except WsdlError as error:
-                raise RunAborted(USAGE, str(error)) from None
+                raise RunAborted(ExitCode.USAGE, str(error)) from None
             except CallError as error:
-                raise RunAborted(UNREACHABLE, f"the robot cannot be reached: {error}") from None
+                raise RunAborted(ExitCode.UNREACHABLE, f"the robot cannot be reached: {error}") from None
         self.robot = self.outcome.robot = replace(self.robot, **found)
 
     def check(self) -> None:
@@ -116,15 +116,17 @@ class Run:
             for number in plan.offered(interface, client)
         ]
         if not names:
-            raise RunAborted(USAGE, "no operation can be measured with these endpoints")
+            raise RunAborted(ExitCode.USAGE, "no operation can be measured with these endpoints")
         findings = self.outcome.findings = preflight(self.robot, names, self.settings.seed)
         self.outcome.notes += findings.notes
         if self.outcome.interrupted:
-            raise RunAborted(INTERRUPTED, "interrupted before the measurement began")
+            raise RunAborted(ExitCode.INTERRUPTED, "interrupted before the measurement began")
         if findings.unreachable:
-            raise RunAborted(UNREACHABLE, "the robot cannot be reached: " + "; ".join(findings.messages()))
+            raise RunAborted(ExitCode.UNREACHABLE, "the robot cannot be reached: " + "; ".join(findings.messages()))
         if findings.failures:
-            raise RunAborted(INCONCLUSIVE, "the robot does not answer as it should: " + "; ".join(findings.messages()))
+            raise RunAborted(
+                ExitCode.INCONCLUSIVE, "the robot does not answer as it should: " + "; ".join(findings.messages())
+            )
         self.outcome.invalid += [
             f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
         ]
@@ -198,7 +200,9 @@ class Run:
                     self.robot, settings.operations, settings.seed, zeep="zeep" in plan.clients, users=plan.connections
                 )
             except GeneratorError as error:
-                raise RunAborted(INTERRUPTED if self.outcome.interrupted else USAGE, str(error)) from None
+                raise RunAborted(
+                    ExitCode.INTERRUPTED if self.outcome.interrupted else ExitCode.USAGE, str(error)
+                ) from None
             self._tell_plan(plan, executor)
             self._carry_out(plan, executor)
             self.outcome.cpu_share = busiest(executor)
@@ -290,9 +294,9 @@ def carry_out(settings: Settings) -> int:
         tell(f"roaas load: {aborted}")
     except Exception as trouble:  # noqa: BLE001 -- our own fault: what was measured is kept, and called invalid
         traceback.print_exc()
-        aborted = RunAborted(INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
+        aborted = RunAborted(ExitCode.INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
     code, document = compose(run.outcome, run.outcome.plan or run.first_plan(), aborted)
-    if aborted is None or aborted.code != USAGE:
+    if aborted is None or aborted.code != ExitCode.USAGE:
         path = write(Path(settings.out), document)
         tell(f"written: {path}")
     if aborted is None:

@@ -35,7 +35,7 @@ def step_load(
         tell: says how things stand.
     """
     operation = step_operation(first.operations)
-    criterion = steps.Criterion.of(list(settings.thresholds), first.operations[operation])
+    criterion = steps.Criterion.of(settings.thresholds, first.operations[operation])
     standing = [name for name in first.interfaces if operation in first.offered(name, "wire")]
     used = first.first_segment + len(first.segments)
     found: list[dict[str, Any]] = []

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from loadtests import exits
+from conformance.contract.exit_codes import ExitCode
 from loadtests.clients.payloads import CATALOGUE
 from loadtests.measuring.environment import describe
 from loadtests.measuring.preflight import Findings
@@ -80,7 +80,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
     workers, losses = _workers(outcome, plan)
-    judged = [] if aborted else verdict.judge(measured, list(settings.thresholds))
+    judged = [] if aborted else verdict.judge(measured, settings.thresholds)
     code = _code(outcome, aborted, reasons, judged)
     document = {
         "format": FORMAT,
@@ -128,13 +128,13 @@ def _code(outcome: Outcome, aborted: RunAborted | None, reasons: list[str], judg
     if aborted is not None:
         return aborted.code
     if outcome.interrupted:
-        return exits.INTERRUPTED
+        return ExitCode.INTERRUPTED
     if reasons:
-        return exits.INCONCLUSIVE
+        return ExitCode.INCONCLUSIVE
     outcomes = {entry["outcome"] for entry in judged}
     if "missed" in outcomes:
-        return exits.MISSED
-    return exits.INCONCLUSIVE if "inconclusive" in outcomes else exits.MET
+        return ExitCode.FAILED
+    return ExitCode.INCONCLUSIVE if "inconclusive" in outcomes else ExitCode.PASSED
 
 
 def _early_errors(findings: Findings) -> list[dict[str, Any]]:
@@ -192,7 +192,7 @@ def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
     if not outcome.steps:
         return []
     operation = plan.operations[step_operation(plan.operations)]
-    criterion = steps.Criterion.of(list(outcome.settings.thresholds), operation)
+    criterion = steps.Criterion.of(outcome.settings.thresholds, operation)
     return steps.knee(outcome.steps, plan.interfaces, criterion)
 
 

@@ -14,9 +14,11 @@ from typing import Any
 
 import numpy as np
 
-INTERFACES = ("rest", "soap")
-CLIENTS = ("wire", "zeep")
-OPERATIONS = ("delivery", "coffee", "pose")
+from conformance.contract.thresholds import Client, Interface, Operation
+
+INTERFACES = tuple(map(str, Interface))
+CLIENTS = tuple(map(str, Client))
+OPERATIONS = tuple(map(str, Operation))
 MOVES = frozenset({"delivery", "coffee"})
 
 #: The library clients' rate for each worker: a call costs some 1.5 ms of the generator's time, and a generator

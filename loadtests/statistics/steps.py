@@ -11,8 +11,10 @@ from loadtests.statistics.intervals import SHARES
 from loadtests.statistics.recorder import Cell, Recorder
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from conformance.contract.thresholds import Threshold
     from loadtests.schedule.plan import Plan
-    from loadtests.statistics.thresholds import Threshold
 
 DEFAULT_RATES = (100.0, 200.0, 400.0, 800.0, 1600.0, 3200.0, 6400.0, 12800.0)
 STEP_S = 3.0
@@ -34,7 +36,7 @@ class Criterion:
     limits: dict[str, list[tuple[str, str, float]]]
 
     @classmethod
-    def of(cls, thresholds: list[Threshold], operation: str) -> Criterion:
+    def of(cls, thresholds: Iterable[Threshold], operation: str) -> Criterion:
         """The thresholds on an operation's wire series, or a default where there are none."""
         limits: dict[str, list[tuple[str, str, float]]] = {}
         for threshold in thresholds:

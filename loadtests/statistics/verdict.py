@@ -9,8 +9,10 @@ from loadtests.statistics.histogram import Histogram, edges_us
 from loadtests.statistics.intervals import SHARES, at_most, quantile_interval_ms
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from conformance.contract.thresholds import Threshold
     from loadtests.schedule.plan import Plan
-    from loadtests.statistics.thresholds import Threshold
 
 MOST_CPU = 0.95
 MOST_LAG_MEDIAN_MS = 1.0
@@ -104,7 +106,7 @@ def _surely_above(histogram: Histogram, threshold: Threshold) -> bool:
     return histogram.total > 0 and at_most(below, histogram.total, SHARES[threshold.quantile]) < _SMALL_CHANCE
 
 
-def judge(measured: Measured, thresholds: list[Threshold]) -> list[dict[str, Any]]:
+def judge(measured: Measured, thresholds: Iterable[Threshold]) -> list[dict[str, Any]]:
     """The `thresholds` of latency.json: each against the upper bound of its interval."""
     found = []
     for threshold in thresholds:

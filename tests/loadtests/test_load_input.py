@@ -1,12 +1,13 @@
 """Options, statement, thresholds and WSDL: what is refused, and in which words."""
 
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
 
-from loadtests import settings, statement
+from conformance.contract.statement import Endpoints, Load, Statement
+from conformance.contract.thresholds import ThresholdsError, load_thresholds
+from loadtests import settings
 from loadtests.clients import wsdl
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.payloads import CATALOGUE, differences, rest_request, soap_request, variants
@@ -14,22 +15,17 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Request
 from loadtests.clients.wsdl import WsdlError
 from loadtests.settings import Settings, SettingsError, Wishes, settle
-from loadtests.statement import Statement, StatementError
-from loadtests.statistics import thresholds
-from loadtests.statistics.thresholds import Threshold, ThresholdsError
 
 CONTRACT = Path(__file__).parents[2] / "conformance" / "contract"
 REST = {"rest": "http://robot:7003"}
 
 
-def said(text, path="statement.toml"):
-    return statement.parse(tomllib.loads(text), Path(path))
-
-
 def test_options_win_over_the_statement_and_defaults_fill_the_rest():
     found = settle(
         Wishes(rest="http://other:1", rate=50.0),
-        said('[endpoints]\nrest = "http://robot:7003"\npublishers_endpoint = "http://robot:5555/p"\ntimeout_s = 3'),
+        Statement(
+            endpoints=Endpoints(rest="http://robot:7003", publishers_endpoint="http://robot:5555/p", timeout_s=3.0)
+        ),
     )
     assert (found.rest, found.publishers, found.rate, found.timeout_s) == (
         "http://other:1",
@@ -72,14 +68,14 @@ def test_runs_that_must_not_be(wishes, message):
 
 
 def test_the_statements_limits_hold_and_lift():
-    limits = said("[endpoints]\nrequest_rate = 80\n[load]\nmax_duration_s = 5")
+    limits = Statement(endpoints=Endpoints(request_rate=80.0), load=Load(max_duration_s=5.0))
     assert settle(Wishes(**REST), limits).rate == 80
     assert settle(Wishes(**REST), limits).duration_s == 5
     with pytest.raises(
         SettingsError, match=re.escape("exceeds 80 requests/s (the statement's [endpoints] request_rate)")
     ):
         settle(Wishes(**REST, rate=81.0), limits)
-    lifted = said("[load]\nmax_rate = 2000\nmax_duration_s = 900")
+    lifted = Statement(load=Load(max_rate=2000.0, max_duration_s=900.0))
     found = settle(Wishes(**REST, rate=1500.0, duration_s=600.0, allow_motion=True), lifted)
     assert (found.rate, found.max_rate) == (1500.0, 2000.0)
     assert settle(Wishes(**REST, rate=9000.0, duration_s=600.0), Statement()).rate == 9000.0, "reads are not bounded"
@@ -87,49 +83,6 @@ def test_the_statements_limits_hold_and_lift():
         "of reads"
     )
     assert settle(Wishes(**REST, users=4, allow_motion=True), Statement()).max_rate == settings.MOTION_RATE
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("[load]\nmax_rates = 3", "[load]: unknown key 'max_rates'"),
-        ("[endpoints]\nsoap = 'x'", "[endpoints]: unknown key 'soap'"),
-        ("[load]\nmax_rate = 'fast'", "max_rate = 'fast'"),
-        ("[load]\nmax_rate = true", "max_rate = True"),
-        ("[endpoints]\ntimeout_s = -1", "timeout_s = -1"),
-        ("[endpoints]\nrest = 7", "rest = 7"),
-        ("load = 3", "[load] is no table"),
-        ("[[load.thresholds]]\noperation = 'pose'", "'interface', 'quantile', 'below_ms' is missing"),
-    ],
-)
-def test_statements_that_cannot_be_used(text, message):
-    with pytest.raises(StatementError, match=re.escape(message)):
-        said(text)
-
-
-def test_the_conformance_part_of_a_statement_is_passed_over(tmp_path):
-    text = """
-        [robot]
-        name = "R"
-        [classes]
-        claimed = ["http"]
-        [limits]
-        linear_m_s = 0.7
-        [endpoints]
-        publishers_wsdl = "robot.wsdl"
-        token_file = "token"
-        [[load.thresholds]]
-        operation = "pose"
-        interface = "rest"
-        quantile = "p99"
-        below_ms = 5
-    """
-    found = said(text, tmp_path / "statement.toml")
-    assert found.robot == {"name": "R"}
-    assert found.endpoints["publishers_wsdl"] == str(tmp_path / "robot.wsdl"), "files lie beside the statement"
-    assert found.thresholds == (Threshold("pose", "rest", "p99", 5.0),)
-    with pytest.raises(StatementError, match="No such file"):
-        statement.read(tmp_path / "none.toml")
 
 
 @pytest.mark.parametrize(
@@ -143,7 +96,7 @@ def test_the_conformance_part_of_a_statement_is_passed_over(tmp_path):
         ("[[threshold]]\noperation='pose'\ninterface='rest'\nquantile='p42'\nbelow_ms=1", "quantile = 'p42'"),
         ("[[threshold]]\noperation='pose'\ninterface='rest'\nquantile='p99'\nbelow_ms=0", "below_ms = 0"),
         ("[[threshold]]\noperation='pose'\ninterface='rest'\nquantile='p99'\nbelow_ms=nan", "below_ms = nan"),
-        ("threshold = 3", "array of tables"),
+        ("threshold = 3", "with two brackets"),
         ("", "holds no [[threshold]]"),
         ("not toml", "is no TOML"),
     ],
@@ -152,7 +105,7 @@ def test_thresholds_files_that_cannot_be_used(tmp_path, text, message):
     path = tmp_path / "limits.toml"
     path.write_text(text)
     with pytest.raises(ThresholdsError, match=re.escape(message)):
-        thresholds.read_file(path)
+        load_thresholds(path)
 
 
 @pytest.mark.parametrize("content", [b"", b"a b", "schl\u00fcssel".encode(), b"\xff\xfe"])

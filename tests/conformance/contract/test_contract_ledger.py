@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from conformance.contract.classes import CLASSES, PROFILES
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_FILES, GENERIC_CLASSES, Contract, ContractError
-from conformance.contract.ledger import CLASSES, PROFILES, LedgerError, load_ledger
+from conformance.contract.ledger import LedgerError, load_ledger
 
 LEDGER = Contract.load().ledger
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from conformance.contract.ledger import CLASSES
+from conformance.contract.classes import CLASSES
 from conformance.contract.statement import Endpoints, Statement, StatementError, load_statement
+from conformance.contract.thresholds import Interface, Operation, Quantile, Threshold
 
 
 def _load(tmp_path, text):
@@ -38,6 +39,11 @@ def test_a_full_statement(tmp_path):
         domain_id = 7
         [load]
         max_rate = 100
+        [[load.thresholds]]
+        operation = "pose"
+        interface = "rest"
+        quantile = "p99"
+        below_ms = 5
         """,
     )
     assert statement.robot == {"name": "R2"}
@@ -47,30 +53,50 @@ def test_a_full_statement(tmp_path):
     assert (statement.limits.linear_m_s, statement.limits.hold_s, statement.limits.settle_s) == (1.0, 0.5, 2.0)
     assert statement.motion.arena == (0.0, 0.0, 10.0, 5.0)
     assert statement.ros.domain_id == 7
+    assert statement.load.max_rate == 100
+    assert statement.load.thresholds == (Threshold(Operation.POSE, Interface.REST, Quantile.P99, 5.0),)
 
 
 @pytest.mark.parametrize(
-    ("text", "named"),
+    ("text", "message"),
     [
-        ("[robto]\nname = 'x'", "'robto'"),
-        ("[endpoints]\nrset = 'x'", "'rset'"),
-        ("[endpoints]\nrest = 7003", "7003"),
-        ("[endpoints]\ntimeout_s = -1", "-1"),
-        ("[claims]\nprofile = 'half'", "'half'"),
-        ("[claims]\nclasses = ['rest']", "'rest'"),
-        ("[limits]\nlinear_m_s = 'fast'", "'fast'"),
-        ("[limits]\nsettle_s = nan", "nan"),
-        ("[motion]\narena = [1, 2]", "[1, 2]"),
-        ("[motion]\nactuated = ['linear.w']", "'linear.w'"),
-        ("[ros]\ndomain_id = 500", "500"),
-        ("claims = 'full'", "'full'"),
-        ("[[", "robot.toml"),
+        ("[robto]\nname = 'x'", "unknown key 'robto'; known are claims, endpoints, limits, load, motion, robot, ros"),
+        ("[limts]\nhold_s = 1", "unknown key 'limts'"),
+        ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are ca_file, publishers_endpoint,"),
+        ("[endpoints]\nrest = 7003", "[endpoints] rest = 7003 must be a string"),
+        ("[endpoints]\ntimeout_s = -1", "[endpoints] timeout_s = -1 must be a positive number"),
+        ("[claims]\nprofile = 'half'", "[claims] profile = 'half' must be one of paper, full"),
+        ("[claims]\nclasses = ['rest']", "[claims] classes[0] = 'rest' must be one of rest-resources, rest-delivery,"),
+        ("[claims]\nclasses = 'http'", "[claims] classes = 'http' must be a list, each item one of rest-resources,"),
+        ("[limits]\nlinear_m_s = 'fast'", "[limits] linear_m_s = 'fast' must be a number, and not negative"),
+        ("[limits]\nlinear_m_s = true", "[limits] linear_m_s = True must be a number, and not negative"),
+        ("[limits]\nsettle_s = nan", "[limits] settle_s = nan must be a number, and not negative"),
+        ("[limits]\nsettle_s = inf", "[limits] settle_s = inf must be a number, and not negative"),
+        ("[motion]\narena = [1, 2]", "[motion] arena = [1, 2] must be 4 numbers"),
+        ("[motion]\ngoals = [[1, 2, 'x']]", "[motion] goals[0][2] = 'x' must be a finite number"),
+        ("[motion]\nactuated = ['linear.w']", "[motion] actuated[0] = 'linear.w' must be one of angular.x, angular.y,"),
+        ("[ros]\ndomain_id = 500", "[ros] domain_id = 500 must be a whole number from 0 to 232"),
+        ("[load]\nmax_rates = 3", "[load] unknown key 'max_rates'; known are max_duration_s, max_rate, thresholds"),
+        ("[load]\nmax_rate = 'fast'", "[load] max_rate = 'fast' must be a positive number"),
+        (
+            "[[load.thresholds]]\noperation = 'pose'",
+            "[[load.thresholds]] number 1: 'interface', 'quantile', 'below_ms' is missing",
+        ),
+        ("[load.thresholds]", "[load] thresholds = {} must be an array of tables: write [[load.thresholds]]"),
+        ("claims = 'full'", "claims = 'full' must be a table: [claims]"),
+        ("[[", "is no TOML"),
     ],
 )
-def test_a_wrong_statement_is_refused_by_name(tmp_path, text, named):
+def test_a_wrong_statement_is_refused_by_name(tmp_path, text, message):
     with pytest.raises(StatementError) as error:
         _load(tmp_path, text)
-    assert named in str(error.value)
+    assert f"{tmp_path / 'robot.toml'}" in str(error.value)
+    assert message in str(error.value)
+
+
+def test_a_statement_that_is_not_there(tmp_path):
+    with pytest.raises(StatementError, match=r"robot\.toml cannot be read: No such file"):
+        load_statement(tmp_path / "robot.toml")
 
 
 def test_without_claims_the_classes_follow_from_the_addresses():

@@ -44,7 +44,11 @@ def test_an_expired_entry_is_named():
     ("text", "named"),
     [
         ("[[expected]]\nrequirement = 'http/dat'\nreason = 'x'\nexpires = 2027-01-01", "'http/dat'"),
-        ("[[expected]]\nrequirement = 'http/date'\nexpires = 2027-01-01", "no reason"),
+        ("[[expected]]\nrequirement = 'http/date'\nexpires = 2027-01-01", "[[expected]] number 1: 'reason' is missing"),
+        (
+            "[[expected]]\nrequirement = 'http/date'\nreason = ' '\nexpires = 2027-01-01",
+            "reason = ' ' must be a string",
+        ),
         ("[[expected]]\nrequirement = 'http/date'\nreason = 'x'\nexpires = '2027-01-01'", "without quotes"),
         ("[[expect]]\nrequirement = 'http/date'", "'expect'"),
         ("[expected]\nrequirement = 'http/date'", "two brackets"),

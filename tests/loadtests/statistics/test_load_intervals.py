@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from conformance.contract.thresholds import Interface, Operation, Quantile, Threshold
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.figures import Measured, quantiles, series, time_series
@@ -15,7 +16,6 @@ from loadtests.statistics.intervals import (
     samples_for_point,
 )
 from loadtests.statistics.recorder import Recorder
-from loadtests.statistics.thresholds import Threshold
 from loadtests.statistics.verdict import judge
 
 
@@ -97,7 +97,7 @@ def test_a_threshold_is_judged_by_what_is_certain(values, below, outcome):
     for number, value in enumerate(values):
         recorder.record(blocks[number % len(blocks)], 0, 0, 0, 0, 0, int(value * 1e6), -1)
     recorder.flush()
-    (found,) = judge(Measured(STALL, recorder), [Threshold("pose", "rest", "p99", below)])
+    (found,) = judge(Measured(STALL, recorder), [Threshold(Operation.POSE, Interface.REST, Quantile.P99, below)])
     assert found["outcome"] == outcome, found
     assert found["reason"] if outcome != "met" else not found["reason"]
 

@@ -1,0 +1,158 @@
+"""The one reader of the TOML files that people write: typed, and each message says what to change.
+
+A file's shape is a frozen ``msgspec.Struct`` that forbids unknown fields; msgspec decides what fits. Its messages
+speak of JSON paths and types, so where something does not fit, the message is made here, from the shape and the value:
+file, table, key, offending value, and what is allowed.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+import sys
+import tomllib
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import msgspec
+from msgspec import Meta, inspect
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+_Shape = TypeVar("_Shape")
+
+#: The kinds of values that several files have. NaN and infinity, which TOML can write, are none of them.
+Positive = Annotated[float, Meta(gt=0, le=sys.float_info.max)]
+NotNegative = Annotated[float, Meta(ge=0, le=sys.float_info.max)]
+Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
+Text = Annotated[str, Meta(min_length=1, pattern=r"\S")]
+
+_DATES = (dt.date, dt.datetime, dt.time)  # TOML has them, so a date in quotes is no date
+_PLACE = re.compile(r" - at `\$(?P<path>[^`]*)`$")
+_STEP = re.compile(r"\.(?P<key>\w+)|\[(?P<index>\d+)\]")
+
+
+class TomlFileError(ValueError):
+    """A file that cannot be used; the message names the file, the table, the key and the offending value."""
+
+
+def read_toml(path: Path, shape: type[_Shape], error: type[TomlFileError] = TomlFileError) -> _Shape:
+    """Read a file into a shape.
+
+    Raises:
+        TomlFileError: as ``error``: it cannot be read, is no TOML, or does not fit.
+    """
+    return fit(read_tables(path, error), shape, str(path), error)
+
+
+def read_tables(path: Path, error: type[TomlFileError] = TomlFileError) -> dict[str, Any]:
+    """Read a file into tables as TOML has them.
+
+    Raises:
+        TomlFileError: as ``error``: it cannot be read, or is no TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as problem:
+        raise error(f"{path} cannot be read: {problem.strerror or problem}") from problem
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as problem:
+        raise error(f"{path} is no TOML: {problem}") from problem
+
+
+def fit(table: dict[str, Any], shape: type[_Shape], where: str, error: type[TomlFileError] = TomlFileError) -> _Shape:
+    """Turn a table into a shape; ``where`` is what messages begin with.
+
+    Raises:
+        TomlFileError: as ``error``: an unknown key, a missing one, or a value that does not fit.
+    """
+    try:
+        return msgspec.convert(table, shape, builtin_types=_DATES)
+    except msgspec.ValidationError as problem:
+        raise error(f"{where}: {_explained(table, shape, str(problem))}") from problem
+
+
+def _explained(table: dict[str, Any], shape: type, said: str) -> str:
+    """What does not fit, in the words of whoever wrote the file."""
+    place = _PLACE.search(said)
+    value: Any = table
+    kind = inspect.type_info(shape)
+    heading, dotted, keys = "", "", ""
+    for step in _STEP.finditer(place["path"] if place else ""):
+        if isinstance(value, dict):
+            value, kind = value[step["key"]], _field(kind, step["key"])
+            keys += f".{step['key']}" if keys else step["key"]
+        else:
+            value, kind = value[int(step["index"])], _item(kind, int(step["index"]))
+            keys += f"[{step['index']}]"
+        if isinstance(value, dict) and isinstance(kind, inspect.StructType):
+            name, _, index = keys.partition("[")
+            dotted = f"{dotted}.{name}" if dotted else name
+            heading = f"[[{dotted}]] number {int(index.rstrip(']')) + 1}: " if index else f"[{dotted}] "
+            keys = ""
+    if isinstance(value, dict) and isinstance(kind, inspect.StructType):
+        return _wrong_keys(heading, value, kind) or said
+    whole = f"{dotted}.{keys}" if dotted else keys
+    return f"{heading}{keys} = {value!r} must be {_wanted(kind, whole)}"
+
+
+def _wrong_keys(heading: str, value: dict[str, Any], kind: inspect.StructType) -> str:
+    known = {field.encode_name: field for field in kind.fields}
+    unknown = sorted(set(value) - set(known))
+    if unknown:
+        return f"{heading}unknown key {', '.join(map(repr, unknown))}; known are {', '.join(sorted(known))}"
+    missing = [name for name, field in known.items() if field.required and name not in value]
+    return f"{heading}{', '.join(map(repr, missing))} is missing" if missing else ""
+
+
+def _field(kind: Any, name: str) -> inspect.Type:
+    return _bare(next(field.type for field in kind.fields if field.encode_name == name))
+
+
+def _item(kind: Any, index: int) -> inspect.Type:
+    return _bare(kind.item_types[index] if isinstance(kind, inspect.TupleType) else kind.item_type)
+
+
+def _bare(kind: inspect.Type) -> inspect.Type:
+    """A type without the None of a key that may be left out."""
+    if isinstance(kind, inspect.UnionType):
+        kinds = tuple(one for one in kind.types if not isinstance(one, inspect.NoneType))
+        return kinds[0] if len(kinds) == 1 else inspect.UnionType(kinds)
+    return kind
+
+
+def _wanted(kind: inspect.Type, name: str) -> str:
+    """What a value of this type is, in words; ``name`` is its key."""
+    words = _WORDS.get(type(kind))
+    return words(kind, name) if words else f"of type {type(kind).__name__.removesuffix('Type').lower()}"
+
+
+def _list(kind: inspect.VarTupleType, name: str) -> str:
+    if isinstance(kind.item_type, inspect.StructType):
+        return f"an array of tables: write [[{name}]], with two brackets, for each"
+    return f"a list, each item {_wanted(kind.item_type, name)}"
+
+
+def _number(kind: inspect.IntType | inspect.FloatType, _: str) -> str:
+    noun = "number" if isinstance(kind, inspect.FloatType) else "whole number"
+    low, most = kind.ge, kind.le
+    if most not in {None, sys.float_info.max}:
+        return f"a {noun} from {low:g} to {most:g}"
+    if kind.gt == 0:
+        return f"a positive {noun}"
+    return f"a {noun}, and not negative" if low == 0 else f"a finite {noun}"
+
+
+_WORDS: dict[type[inspect.Type], Callable[[Any, str], str]] = {
+    inspect.BoolType: lambda _, __: "true or false",
+    inspect.IntType: _number,
+    inspect.FloatType: _number,
+    inspect.StrType: lambda kind, _: "a string that is not empty" if kind.min_length else "a string",
+    inspect.DateType: lambda _, __: "a date: YYYY-MM-DD, without quotes",
+    inspect.LiteralType: lambda kind, _: f"one of {', '.join(map(str, kind.values))}",
+    inspect.EnumType: lambda kind, _: f"one of {', '.join(str(one.value) for one in kind.cls)}",
+    inspect.StructType: lambda _, name: f"a table: [{name}]",
+    inspect.TupleType: lambda kind, _: f"{len(kind.item_types)} numbers",
+    inspect.VarTupleType: _list,
+    inspect.UnionType: lambda kind, name: " or ".join(_wanted(one, name) for one in kind.types),
+}
