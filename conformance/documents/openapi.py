@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace")
 SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE"})
-_PARAMETER = re.compile(r"\{([^{}]*)\}")
+# A parameter in a path.
+PARAMETER = re.compile(r"\{([^{}]*)\}")
 
 
 @dataclass(frozen=True)
@@ -218,7 +219,7 @@ class Resource:
     @cached_property
     def pattern(self) -> re.Pattern[str]:
         """Matches the paths that the template stands for."""
-        parts = _PARAMETER.split(self.template)
+        parts = PARAMETER.split(self.template)
         return re.compile("".join(re.escape(part) if i % 2 == 0 else "[^/]*" for i, part in enumerate(parts)))
 
     @property

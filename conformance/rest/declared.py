@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from conformance.documents.json_schema import Schema
     from conformance.documents.openapi import Operation
     from conformance.engine.session import Session
-    from conformance.rest.request_context import Sent
+    from conformance.rest.request_context import RequestContext
     from conformance.transport.exchange import Exchange, Response
 
 # RFC 9110 and RFC 6585 give these to any request: authentication, rate, and 5xx, which a requirement of its own judges.
@@ -23,46 +23,46 @@ _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
 _OK, _NO_CONTENT, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 404, 405, 406, 500
 
 
-def judge(session: Session, exchange: Exchange, answer: Response, sent: Sent) -> None:
+def judge(session: Session, exchange: Exchange, answer: Response, context: RequestContext) -> None:
     """Judge one answer to a request that is for an operation of the contract."""
-    operation = sent.operation
+    operation = context.operation
     if operation is None:
         return
     if answer.status < _SERVER_ERROR:
         session.judge.check(
             "http/declared-status",
-            _status_fits(operation, answer, sent),
+            _status_fits(operation, answer, context),
             exchange,
             f"a status that the contract declares for {operation.id}: {', '.join(operation.responses)}",
             found=f"status {answer.status}",
             cause=f"{operation.id} {answer.status}",
         )
-    if answer.ok and not sent.is_head:
-        _judge_body(session, exchange, answer, sent)
+    if answer.ok and not context.is_head:
+        _judge_body(session, exchange, answer, context)
     if answer.ok and operation.method == "GET":
-        _judge_negotiation(session, exchange, answer, sent)
+        _judge_negotiation(session, exchange, answer, context)
 
 
-def _status_fits(operation: Operation, answer: Response, sent: Sent) -> bool:
+def _status_fits(operation: Operation, answer: Response, context: RequestContext) -> bool:
     status = answer.status
     if status in _ANY_REQUEST or operation.declared(status) is not None:
         return True
     if status == _OK and operation.declared(_NO_CONTENT) is not None:
         return True  # a robot may say 200 for 204
     if status == _NOT_ACCEPTABLE:
-        return sent.accept not in {None, "*/*"}
-    if sent.plain and not operation.parameters:
+        return context.accept not in {None, "*/*"}
+    if context.plain and not operation.parameters:
         return False
     if status in _ODD_REQUEST:
         return True
     # Invalid input may be refused with any 4xx (contract, fine print); 404 only where a value is in the path.
-    has_input = bool(sent.request.body or operation.parameters or operation.bodies)
+    has_input = bool(context.request.body or operation.parameters or operation.bodies)
     elsewhere = status == _NO_METHOD or (status == _NOT_FOUND and not operation.parameter("path"))
     return has_input and 400 <= status < _SERVER_ERROR and not elsewhere  # noqa: PLR2004 - RFC 9110 15.5
 
 
-def _judge_body(session: Session, exchange: Exchange, answer: Response, sent: Sent) -> None:
-    operation = sent.operation
+def _judge_body(session: Session, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+    operation = context.operation
     content = operation.declared(answer.status) if operation else None
     if operation is None or not content:
         return
@@ -114,21 +114,21 @@ def _judge_shape(session: Session, exchange: Exchange, answer: Response, operati
     )
 
 
-def _judge_negotiation(session: Session, exchange: Exchange, answer: Response, sent: Sent) -> None:
-    operation = sent.operation
+def _judge_negotiation(session: Session, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+    operation = context.operation
     if operation is None or not operation.formats:
         return
     media_type = answer.media_type
-    if media_type and sent.usual:
+    if media_type and context.usual:
         session.judge.check(
             "http/not-acceptable",
-            quality(media_type, sent.accept) > 0,
+            quality(media_type, context.accept) > 0,
             exchange,
-            f"an acceptable format, or 406 (Accept: {sent.accept})",
+            f"an acceptable format, or 406 (Accept: {context.accept})",
             found=f"{answer.status} with {media_type}",
             cause="not acceptable",
         )
-    if len(operation.formats) > 1 and not sent.is_head:
+    if len(operation.formats) > 1 and not context.is_head:
         vary = (answer.header("vary") or "").lower()
         session.judge.check(
             "rest-formats/vary",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import flattened
 from conformance.rest.calls import JSON, Call, example_call
-from conformance.rest.snapshot import leaves
+from conformance.rest.snapshot import flatten
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -41,7 +41,7 @@ def settles_at(session: Session, call: Call) -> str | None:
     wanted = flattened(call.value)
     renew_at = time.monotonic() + 0.4 * (limits.hold_s or math.inf)
     while True:
-        shown = leaves(read.send(session, ("Accept", JSON)))
+        shown = flatten(read.send(session, ("Accept", JSON)))
         if shown["status"] == 404:  # noqa: PLR2004 - what was put has ended since: a goal that was reached
             return None
         other = [

@@ -25,12 +25,12 @@ class Disagreement:
 
     Attributes:
         place: which.
-        told: what each says.
+        description: what each says.
         exchange: the answer that disagrees with JSON.
     """
 
     place: str
-    told: str
+    description: str
     exchange: Exchange
 
 
@@ -50,14 +50,14 @@ def disagreements(session: Session, call: Call, media_types: list[str]) -> tuple
         first = call.send(session, ("Accept", JSON))
         others = [(name, call.send(session, ("Accept", name))) for name in media_types]
         exchange = call.send(session, ("Accept", JSON))
-        pictures = [_picture(item, JSON, schema) for item in (first, exchange)]
-        if any(picture is None for picture in pictures):
+        snapshots = [_snapshot(item, JSON, schema) for item in (first, exchange)]
+        if any(shown is None for shown in snapshots):
             return [], exchange  # what is wrong with that, others judge
-        known = steady(picture for picture in pictures if picture is not None)
+        known = steady(shown for shown in snapshots if shown is not None)
         found = {
             (name, item.place): item
             for name, other in others
-            for item in _compare(known, pictures, _picture(other, name, schema), name, other)
+            for item in _compare(known, snapshots, _snapshot(other, name, schema), name, other)
         }
         suspects = found if suspects is None else {key: item for key, item in found.items() if key in suspects}
         if not suspects:
@@ -67,7 +67,7 @@ def disagreements(session: Session, call: Call, media_types: list[str]) -> tuple
     return list((suspects or {}).values()), exchange
 
 
-def _picture(exchange: Exchange, media_type: str, schema: Schema) -> dict[str, Any] | None:
+def _snapshot(exchange: Exchange, media_type: str, schema: Schema) -> dict[str, Any] | None:
     answer = exchange.response
     if not answer.ok or answer.media_type != media_type:
         return None
@@ -79,7 +79,7 @@ def _picture(exchange: Exchange, media_type: str, schema: Schema) -> dict[str, A
 
 def _compare(
     known: dict[str, Any],
-    pictures: list[dict[str, Any] | None],
+    snapshots: list[dict[str, Any] | None],
     other: dict[str, Any] | None,
     name: str,
     exchange: Exchange,
@@ -91,7 +91,7 @@ def _compare(
         for place, value in known.items()
         if not _same(value, other.get(place, None if value is None else ...))
     ]
-    everywhere = set().union(*(picture or {} for picture in pictures))
+    everywhere = set().union(*(shown or {} for shown in snapshots))
     found += [
         Disagreement(place, f"{place} is {value!r} in {name} and nothing in JSON", exchange)
         for place, value in other.items()

@@ -33,7 +33,7 @@ _BASE = "http://robot.invalid"
 
 
 @dataclass(frozen=True)
-class Made:
+class GeneratedRequest:
     """One request that Schemathesis made.
 
     Attributes:
@@ -84,14 +84,14 @@ class Target:
         """Whether there is anything in its requests to vary."""
         return any(True for _ in self.operation.iter_parameters()) or bool(list(self.operation.body))
 
-    def examples(self) -> Iterator[Made]:
+    def examples(self) -> Iterator[GeneratedRequest]:
         """From the contract's examples."""
         maker = ExamplesGenerator(
             operation=self.operation, override=Override(), feedback=NO_FEEDBACK, fill_missing=False
         )
-        yield from _all_made(maker)
+        yield from _requests(maker)
 
-    def coverage(self) -> Iterator[Made]:
+    def coverage(self) -> Iterator[GeneratedRequest]:
         """Each constraint of the schemas, from its one side and from the other."""
         config = self.schema.config.generation_for(operation=self.operation, phase="coverage")
         maker = CoverageGenerator(
@@ -102,13 +102,13 @@ class Target:
             override=Override(),
             feedback=NO_FEEDBACK,
         )
-        yield from _all_made(maker)
+        yield from _requests(maker)
 
-    def fuzzing(self, *, negative: bool) -> SearchStrategy[Made | None]:
+    def fuzzing(self, *, negative: bool) -> SearchStrategy[GeneratedRequest | None]:
         """Anything that fits the schemas, or does not; None for what cannot be sent."""
         mode = GenerationMode.NEGATIVE if negative else GenerationMode.POSITIVE
         strategy: SearchStrategy[Any] = self.operation.as_strategy(generation_mode=mode)
-        return strategy.map(made)
+        return strategy.map(as_request)
 
 
 def targets(contract: Contract) -> tuple[Target, ...]:
@@ -138,16 +138,16 @@ def state_machine(document: dict[str, Any]) -> Any:
         return None
 
 
-def _all_made(cases: Any) -> Iterator[Made]:
+def _requests(cases: Any) -> Iterator[GeneratedRequest]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for case in cases:
-            one = made(case)
+            one = as_request(case)
             if one is not None:
                 yield one
 
 
-def made(case: Any) -> Made | None:
+def as_request(case: Any) -> GeneratedRequest | None:
     """A case as it goes over the wire; None where HTTP cannot carry it."""
     try:
         given = case.as_transport_kwargs(base_url=_BASE)
@@ -166,7 +166,7 @@ def made(case: Any) -> Made | None:
     method = str(request.method)
     if not (content_type.isprintable() and content_type.isascii() and target.isascii() and method.isascii()):
         return None
-    return Made(method, target, content_type, body.encode() if isinstance(body, str) else body)
+    return GeneratedRequest(method, target, content_type, body.encode() if isinstance(body, str) else body)
 
 
 def as_thesis(exchange: Exchange) -> ThesisResponse:

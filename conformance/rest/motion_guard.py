@@ -15,7 +15,7 @@ from conformance.rest.validity import INVALID, VALID, Validity, validity
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
     from conformance.engine.session import Session
-    from conformance.rest.generated import Made
+    from conformance.rest.generated import GeneratedRequest
 
 # How many valid requests of one moving operation are sent: each may start a mission.
 _ACCEPTED = 3
@@ -23,7 +23,7 @@ _ACCEPTED = 3
 _SLOW = 0.1
 
 
-class Harmless:
+class MotionGuard:
     """Looks at every random request before it is sent.
 
     Args:
@@ -34,7 +34,7 @@ class Harmless:
         self._session = session
         self._valid: Counter[str] = Counter()
 
-    def made(self, item: Made) -> Made | None:
+    def admit(self, item: GeneratedRequest) -> GeneratedRequest | None:
         """The request as it may be sent; None where it may not."""
         said = self._validity(item)
         operation = said.operation
@@ -51,20 +51,20 @@ class Harmless:
         # What may be taken with whatever values are in it is not sent to a robot; what must be refused is sent slow.
         return self._slow(item) if said.verdict == INVALID else None
 
-    def sent(self, item: Made, *, accepted: bool) -> None:
+    def count(self, item: GeneratedRequest, *, accepted: bool) -> None:
         """Count what was accepted."""
         operation = self._validity(item).operation
         if accepted and operation is not None and operation.motion:
             self._valid[operation.id] += 1
 
-    def _validity(self, item: Made) -> Validity:
+    def _validity(self, item: GeneratedRequest) -> Validity:
         return validity(self._session.contract, item.method, item.target, item.media_type, item.body)
 
-    def _may_reach(self, item: Made) -> bool:
+    def _may_reach(self, item: GeneratedRequest) -> bool:
         """Whether a request for no operation of the contract may be sent: a method that a resource has not."""
         return self._session.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
 
-    def _fitted(self, item: Made, operation: Operation) -> Made | None:
+    def _fitted(self, item: GeneratedRequest, operation: Operation) -> GeneratedRequest | None:
         """A valid request of a moving operation with the contract's values, fit for this robot; a few of them."""
         if self._valid[operation.id] >= _ACCEPTED:
             return None
@@ -73,7 +73,7 @@ class Harmless:
         call = example_call(self._session, operation, item.media_type or JSON)
         return replace(item, target=call.path, body=call.body if operation.bodies else item.body)
 
-    def _slow(self, item: Made) -> Made:
+    def _slow(self, item: GeneratedRequest) -> GeneratedRequest:
         text = read_json(item.body)
         if not item.body or text.problem or item.media_type != JSON:
             return item

@@ -12,7 +12,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.documents.traceback import inside_shown
 from conformance.rest import declared, problem
-from conformance.rest.request_context import Sent
+from conformance.rest.request_context import RequestContext
 from conformance.transport.exchange import Listener, NoAnswer
 
 if TYPE_CHECKING:
@@ -42,11 +42,11 @@ class Observer(Listener):
     def answered(self, exchange: Exchange) -> None:
         """Judge one exchange; what went to another interface is none of ours."""
         session, answer = self._session, exchange.response
-        sent = self._seen(exchange.request)
-        if sent is None:
+        context = self._seen(exchange.request)
+        if context is None:
             return
-        self._judge_fields(exchange, answer, sent)
-        if answer.body and not sent.is_head and is_json(answer.media_type):
+        self._judge_fields(exchange, answer, context)
+        if answer.body and not context.is_head and is_json(answer.media_type):
             self._judge_json(exchange, answer)
         if answer.status >= 400:  # noqa: PLR2004 - RFC 9110 15
             inside = inside_shown(answer.body)
@@ -58,31 +58,31 @@ class Observer(Listener):
                 found=f"the answer shows {inside!r}",
                 cause="traceback",
             )
-            problem.judge(session, exchange, answer, sent)
-        self._judge_server_error(exchange, answer, sent)
-        if sent.operation is not None:
-            declared.judge(session, exchange, answer, sent)
+            problem.judge(session, exchange, answer, context)
+        self._judge_server_error(exchange, answer, context)
+        if context.operation is not None:
+            declared.judge(session, exchange, answer, context)
 
     def unanswered(self, request: Unanswered) -> None:
         """Judge an answer that is no HTTP, where the request gave no reason for it."""
-        sent = self._seen(request.request)
-        if sent is not None and sent.usual and request.kind is NoAnswer.MALFORMED:
+        context = self._seen(request.request)
+        if context is not None and context.usual and request.kind is NoAnswer.MALFORMED:
             self._session.judge.check(
                 "http/framing", holds=False, exchange=request, expected="well-framed HTTP", found=request.problem
             )
 
-    def _seen(self, request: Request) -> Sent | None:
+    def _seen(self, request: Request) -> RequestContext | None:
         """The request, seen from the contract; None where it went to another interface."""
         session = self._session
         if session.rest is None or self._is_soap(request.url):
             return None
-        return Sent.of(session.contract, session.rest.base_url, request)
+        return RequestContext.of(session.contract, session.rest.base_url, request)
 
     def _is_soap(self, url: str) -> bool:
         services = (self._session.publishers, self._session.subscribers)
         return any(url.split("?", 1)[0] == service.endpoint.split("?", 1)[0] for service in services if service)
 
-    def _judge_fields(self, exchange: Exchange, answer: Response, sent: Sent) -> None:
+    def _judge_fields(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
         judge = self._session.judge
         judge.check("http/framing", holds=True, exchange=exchange, expected="well-framed HTTP")
         if answer.body:
@@ -94,7 +94,7 @@ class Observer(Listener):
                 "Content-Type with a media type",
                 found=f"Content-Type {answer.header('content-type')!r} on {len(answer.body)} octets",
             )
-        if answer.status < 500 and sent.request.raw is None:  # noqa: PLR2004 - RFC 9110 6.6.1 leaves 5xx free
+        if answer.status < 500 and context.request.raw is None:  # noqa: PLR2004 - RFC 9110 6.6.1 leaves 5xx free
             date = answer.header("date")
             judge.check(
                 "http/date", _is_date(date), exchange, "Date with the time of the answer", found=f"Date: {date}"
@@ -120,13 +120,13 @@ class Observer(Listener):
             found=f"the name {text.twice!r} twice in one object",
         )
 
-    def _judge_server_error(self, exchange: Exchange, answer: Response, sent: Sent) -> None:
+    def _judge_server_error(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
         status = answer.status
         fine = (
             status < 500  # noqa: PLR2004 - RFC 9110 15.6
-            or (status == 501 and sent.request.method not in KNOWN_METHODS)  # noqa: PLR2004
+            or (status == 501 and context.request.method not in KNOWN_METHODS)  # noqa: PLR2004
             or (status == 503 and answer.header("retry-after") is not None)  # noqa: PLR2004
-            or (status == 505 and sent.request.raw is not None)  # noqa: PLR2004 - HTTP version not supported
+            or (status == 505 and context.request.raw is not None)  # noqa: PLR2004 - HTTP version not supported
         )
         retry = " without Retry-After" if status == 503 else ""  # noqa: PLR2004
         self._session.judge.check(
@@ -134,8 +134,8 @@ class Observer(Listener):
             fine,
             exchange,
             "no 5xx",
-            found=f"status {status}{retry} for {sent.request.method}",
-            cause=f"{status} {sent.operation.id if sent.operation else sent.request.method}",
+            found=f"status {status}{retry} for {context.request.method}",
+            cause=f"{status} {context.operation.id if context.operation else context.request.method}",
         )
 
 

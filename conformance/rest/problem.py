@@ -10,7 +10,7 @@ from conformance.documents.representation import UnreadableError, local_name, pa
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
-    from conformance.rest.request_context import Sent
+    from conformance.rest.request_context import RequestContext
     from conformance.transport.exchange import Exchange, Response
 
 JSON = "application/problem+json"
@@ -23,27 +23,27 @@ _SERVER_ERROR = 500
 _UNAVAILABLE = 503
 
 
-def judge(session: Session, exchange: Exchange, answer: Response, sent: Sent) -> None:
+def judge(session: Session, exchange: Exchange, answer: Response, context: RequestContext) -> None:
     """Judge one answer of 400 and above."""
     status = answer.status
-    if status in _TRANSPORT or not sent.usual or (status >= _SERVER_ERROR and status != _UNAVAILABLE):
+    if status in _TRANSPORT or not context.usual or (status >= _SERVER_ERROR and status != _UNAVAILABLE):
         return
-    if status == _UNAVAILABLE and sent.operation is None:
+    if status == _UNAVAILABLE and context.operation is None:
         return
-    if sent.is_head and not answer.media_type:
+    if context.is_head and not answer.media_type:
         return
     media_type = answer.media_type
-    allowed = [JSON, *([XML] if sent.names_xml or status == _NOT_ACCEPTABLE else [])]
+    allowed = [JSON, *([XML] if context.names_xml or status == _NOT_ACCEPTABLE else [])]
     session.judge.check(
         "http/problem-type",
         media_type in allowed,
         exchange,
         f"an error as {' or '.join(allowed)}",
         found=f"status {status} as {media_type or 'no media type'}",
-        cause=f"{media_type} {sent.operation.id if sent.operation else 'elsewhere'}",
+        cause=f"{media_type} {context.operation.id if context.operation else 'elsewhere'}",
     )
-    if sent.likes_xml > sent.likes_json and status != _NOT_ACCEPTABLE:
-        fault = "" if sent.is_head or media_type != XML else _xml_fault(answer)
+    if context.likes_xml > context.likes_json and status != _NOT_ACCEPTABLE:
+        fault = "" if context.is_head or media_type != XML else _xml_fault(answer)
         session.judge.check(
             "rest-formats/problem-xml",
             media_type == XML and not fault,
@@ -52,7 +52,7 @@ def judge(session: Session, exchange: Exchange, answer: Response, sent: Sent) ->
             found=fault or f"status {status} as {media_type or 'no media type'}",
             cause=fault or media_type,
         )
-    if not sent.is_head and media_type in {JSON, XML}:
+    if not context.is_head and media_type in {JSON, XML}:
         _judge_status(session, exchange, answer)
 
 

@@ -28,7 +28,7 @@ _USUAL_OCTETS = 2000
 
 
 @dataclass(frozen=True)
-class Sent:
+class RequestContext:
     """One request, seen from the contract.
 
     Attributes:
@@ -42,7 +42,7 @@ class Sent:
     operation: Operation | None
 
     @classmethod
-    def of(cls, contract: Contract, base_url: str, request: Request) -> Sent | None:
+    def of(cls, contract: Contract, base_url: str, request: Request) -> RequestContext | None:
         """See a request; None where it went elsewhere."""
         if not request.url.startswith(base_url):
             return None

@@ -16,27 +16,27 @@ if TYPE_CHECKING:
     from conformance.rest.calls import Call
     from conformance.transport.exchange import Exchange
 
-Picture = dict[str, Any]
+Snapshot = dict[str, Any]
 _READINGS = 3
 _PAUSE_S = 0.04
 # As many times a suspect is given to come to rest.
 _WINDOWS = 12
 
 
-def leaves(exchange: Exchange) -> Picture:
+def flatten(exchange: Exchange) -> Snapshot:
     """Status and every single value of a JSON answer, by place."""
     answer = exchange.response
-    picture: Picture = {"status": answer.status}
+    shown: Snapshot = {"status": answer.status}
     if answer.ok and is_json(answer.media_type):
         text = read_json(answer.body)
         if not text.problem:
-            picture.update(flattened(text.value))
-    return picture
+            shown.update(flattened(text.value))
+    return shown
 
 
-def steady(pictures: Iterable[Picture]) -> Picture:
-    """What is the same in all pictures."""
-    first, *others = pictures
+def steady(snapshots: Iterable[Snapshot]) -> Snapshot:
+    """What is the same in all snapshots."""
+    first, *others = snapshots
     return {
         place: value
         for place, value in first.items()
@@ -44,7 +44,7 @@ def steady(pictures: Iterable[Picture]) -> Picture:
     }
 
 
-def snapshot(session: Session, calls: Iterable[Call]) -> dict[str, tuple[Picture, Exchange]]:
+def take_snapshots(session: Session, calls: Iterable[Call]) -> dict[str, tuple[Snapshot, Exchange]]:
     """What is steady over some readings of each operation, by its id, with the last reading.
 
     With a pause between the readings: a robot's sensors speak tens of times a second, and a client asks faster.
@@ -56,10 +56,10 @@ def snapshot(session: Session, calls: Iterable[Call]) -> dict[str, tuple[Picture
         for call in calls:
             exchange = call.send(session, ("Accept", "application/json"))
             taken.setdefault(call.operation.id, []).append(exchange)
-    return {id_: (steady(leaves(one) for one in exchanges), exchanges[-1]) for id_, exchanges in taken.items()}
+    return {id_: (steady(flatten(one) for one in exchanges), exchanges[-1]) for id_, exchanges in taken.items()}
 
 
-def changed(before: Picture, after: Picture) -> dict[str, tuple[Any, Any]]:
+def changed(before: Snapshot, after: Snapshot) -> dict[str, tuple[Any, Any]]:
     """What was steady before and is another after; places that are gone count only where the status is the same."""
     if before.get("status") != after.get("status"):
         return {"status": (before.get("status"), after.get("status"))} if "status" in before else {}
@@ -77,9 +77,9 @@ def changes_by_itself(session: Session, call: Call, place: str, seconds: float) 
 
 def _changes(session: Session, call: Call, place: str, seconds: float) -> bool:
     until = time.monotonic() + seconds
-    first = leaves(call.send(session, ("Accept", "application/json")))
+    first = flatten(call.send(session, ("Accept", "application/json")))
     while time.monotonic() < until:
         time.sleep(_PAUSE_S)
-        if leaves(call.send(session, ("Accept", "application/json"))).get(place) != first.get(place):
+        if flatten(call.send(session, ("Accept", "application/json"))).get(place) != first.get(place):
             return True
     return False

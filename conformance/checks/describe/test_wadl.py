@@ -8,7 +8,7 @@ import pytest
 
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import UnreadableError
-from conformance.documents.rest_description import Described, described_by_wadl, differences
+from conformance.rest.description import Described, described_by_wadl, differences
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session

@@ -10,7 +10,7 @@ import pytest
 from conformance.rest.applicable import applicable_operations, reads
 from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.effects import reader_of, settles_at
-from conformance.rest.snapshot import changed, changes_by_itself, leaves, snapshot
+from conformance.rest.snapshot import changed, changes_by_itself, flatten, take_snapshots
 from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def _judge_safe(session: Session, judge: Judge) -> None:
     calls = session.effort.subsample(reads(session), 3)
     suspects: dict[tuple[str, str], Exchange] = {}
     for turn in range(_TURNS):
-        before = snapshot(session, calls)
+        before = take_snapshots(session, calls)
         for call in calls:
             for method in ("HEAD", "OPTIONS", "GET"):
                 call.send(session, method=method)
@@ -116,7 +116,7 @@ def _judge_safe(session: Session, judge: Judge) -> None:
         for call in calls:
             id_ = call.operation.id
             exchange = call.send(session, ("Accept", JSON))
-            for place, (old, new) in changed(before[id_][0], leaves(exchange)).items():
+            for place, (old, new) in changed(before[id_][0], flatten(exchange)).items():
                 found[id_, place] = exchange
                 told[id_, place] = f"{place} of {id_} was {old!r} before, and is {new!r}"
         suspects = found if turn == 0 else {key: item for key, item in found.items() if key in suspects}

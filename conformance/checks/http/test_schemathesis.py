@@ -11,7 +11,7 @@ import pytest
 from hypothesis.errors import Unsatisfiable
 
 from conformance.rest.applicable import allowed
-from conformance.rest.motion_guard import Harmless
+from conformance.rest.motion_guard import MotionGuard
 from conformance.rest.refusals import judge_refusal
 from conformance.rest.validity import INVALID, VALID, validity
 from conformance.robot.stopping import stop_robot
@@ -19,7 +19,7 @@ from conformance.robot.stopping import stop_robot
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
     from conformance.engine.session import Session
-    from conformance.rest.generated import Made, Target
+    from conformance.rest.generated import GeneratedRequest, Target
     from conformance.transport.client import HttpClient
     from conformance.verdict.evidence import Judge
     from conformance.verdict.explorer import Explorer
@@ -75,30 +75,30 @@ def _operation(session: Session, target: Target) -> Operation | None:
 @pytest.mark.requirement(*_IDS, "strict-input/query-parameter", "strict-input/query-missing")
 def test_reading_operations(roaas: Session, judge: Judge, explore: Explorer) -> None:
     """What moves nothing."""
-    harmless = Harmless(roaas)
+    guard = MotionGuard(roaas)
     for target in _targets(roaas, moving=False):
-        _run(roaas, judge, explore, harmless, target)
+        _run(roaas, judge, explore, guard, target)
 
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement(*_IDS, *_STRICT)
 def test_moving_operations(roaas: Session, judge: Judge, explore: Explorer) -> None:
     """What may move the robot: invalid requests, and a few valid ones made fit for it."""
-    harmless = Harmless(roaas)
+    guard = MotionGuard(roaas)
     stop_robot(roaas)
     for target in _targets(roaas, moving=True):
-        _run(roaas, judge, explore, harmless, target)
+        _run(roaas, judge, explore, guard, target)
         stop_robot(roaas)
 
 
-def _run(session: Session, judge: Judge, explore: Explorer, harmless: Harmless, target: Target) -> None:
+def _run(session: Session, judge: Judge, explore: Explorer, guard: MotionGuard, target: Target) -> None:
     coverage = session.effort.draw(list(target.coverage()), _COVERAGE, f"{session.seed}/coverage {target.label}")
     for item in session.effort.subsample([*target.examples(), *coverage], 1):
-        _judge_made(session, judge, harmless, item)
+        _judge_generated(session, judge, guard, item)
 
-    def fuzz(item: Made | None) -> None:
+    def fuzz(item: GeneratedRequest | None) -> None:
         if item is not None:
-            _judge_made(session, judge, harmless, item)
+            _judge_generated(session, judge, guard, item)
 
     if session.effort.slow or not target.has_input:
         return
@@ -109,9 +109,9 @@ def _run(session: Session, judge: Judge, explore: Explorer, harmless: Harmless, 
             continue  # its schemas take everything, or nothing: there is no such case
 
 
-def _judge_made(session: Session, judge: Judge, harmless: Harmless, item: Made) -> None:
+def _judge_generated(session: Session, judge: Judge, guard: MotionGuard, item: GeneratedRequest) -> None:
     """Send one request where it is harmless, and judge its answer by what it is on the wire."""
-    fit = harmless.made(item)
+    fit = guard.admit(item)
     if fit is None:
         return
     said = validity(session.contract, fit.method, fit.target, fit.media_type, fit.body)
@@ -121,7 +121,7 @@ def _judge_made(session: Session, judge: Judge, harmless: Harmless, item: Made) 
         return
     exchange = fit.send(session)
     answer = exchange.response
-    harmless.sent(fit, accepted=answer.ok)
+    guard.count(fit, accepted=answer.ok)
     if said.verdict == VALID and said.operation is not None:
         judge.check(
             "http/declared-status",
@@ -140,23 +140,23 @@ def test_walk_along_the_links(roaas: Session, rest: HttpClient, judge: Judge, ex
     judge.check("http/no-server-error", True, None, "no 5xx on the way")
     if roaas.effort.name == "quick":
         return
-    from conformance.rest.generated import as_thesis, made, state_machine  # noqa: PLC0415 - as above
+    from conformance.rest.generated import as_request, as_thesis, state_machine  # noqa: PLC0415 - as above
 
     machine: Any = state_machine(roaas.contract.openapi)
     if machine is None:
         judge.note("http/no-server-error", "the contract has no links to walk along")
         return
-    harmless = Harmless(roaas)
+    guard = MotionGuard(roaas)
 
     class Walk(machine):  # type: ignore[misc] # made at run time
         def call(self, case: Any, **_: Any) -> Any:
-            one = made(case)
-            fit = harmless.made(one) if one is not None else None
+            one = as_request(case)
+            fit = guard.admit(one) if one is not None else None
             if fit is None:
                 exchange = rest.send("GET", roaas.rest_path())
             else:
                 exchange = fit.send(roaas)
-                harmless.sent(fit, accepted=exchange.response.ok)
+                guard.count(fit, accepted=exchange.response.ok)
             return as_thesis(exchange)
 
         def validate_response(self, *_: Any, **__: Any) -> None:

@@ -48,7 +48,7 @@ def test_formats_of_what_was_put(roaas: Session, judge: Judge) -> None:
             first is None,
             first.exchange if first else exchange,
             f"the same values in all formats of {reader.operation.template}",
-            found=first.told if first else "",
+            found=first.description if first else "",
             cause=reader.operation.id,
         )
         form = _sent_form(roaas, call)

@@ -93,7 +93,7 @@ def test_formats_carry_the_same_values(roaas: Session, judge: Judge) -> None:
             first is None,
             first.exchange if first else exchange,
             f"the same values in all formats of {call.operation.template}",
-            found=first.told if first else "",
+            found=first.description if first else "",
             cause=call.operation.id,
         )
     if not compared and not any(set(_IDS) & set(item.formats) for item in operations_of(roaas.contract)):

@@ -6,8 +6,9 @@ import pytest
 
 from conformance.contract.files import Contract
 from conformance.documents.openapi import operations_of
+from conformance.documents.openapi_validity import openapi_fault
 from conformance.documents.representation import UnreadableError
-from conformance.documents.rest_description import described_by_openapi, described_by_wadl, differences, openapi_fault
+from conformance.rest.description import described_by_openapi, described_by_wadl, differences
 
 CONTRACT = Contract.load()
 BASE = "http://robot:7003"
@@ -88,8 +89,12 @@ def test_wadl_of_the_contract_and_a_nested_one():
       <resource path="app/{code: [0-9]+}"><param name="code" style="template"/><method name="PUT"/></resource>
       </resource></resources><method id="get" name="GET"/></application>"""
     found = described_by_wadl(nested, f"{BASE}/api")
-    assert [(item.method, item.path) for item in found] == [("GET", "/robot/pose/"), ("PUT", "/robot/app/{code}")]
-    assert found[1].parameters == {("path", "code", True)}
+    assert [(item.operation.method, item.path) for item in found] == [
+        ("GET", "/robot/pose/"),
+        ("PUT", "/robot/app/{code}"),
+    ]
+    (code,) = found[1].operation.parameters
+    assert (code.where, code.name, code.required) == ("path", "code", True)
 
 
 @pytest.mark.parametrize("body", [b"", b"<a/>", b"no"])

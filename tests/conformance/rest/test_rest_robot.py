@@ -15,10 +15,10 @@ from conformance.rest.applicable import answered, applicable_operations, readabl
 from conformance.rest.calls import example_call
 from conformance.rest.effects import reader_of, settles_at
 from conformance.rest.formats import disagreements
-from conformance.rest.generated import Made, targets
-from conformance.rest.motion_guard import Harmless
+from conformance.rest.generated import GeneratedRequest, targets
+from conformance.rest.motion_guard import MotionGuard
 from conformance.rest.refusals import refuses
-from conformance.rest.snapshot import changed, changes_by_itself, leaves, snapshot, steady
+from conformance.rest.snapshot import changed, changes_by_itself, flatten, steady, take_snapshots
 from conformance.verdict.effort import Effort
 
 
@@ -71,15 +71,18 @@ def test_formats_disagree_only_where_they_do(session, library):
     assert disagreements(session, call, ["application/xml", "text/plain"])[0] == []
     library.fault = "xml-rounds"
     (found,) = disagreements(session, call, ["application/xml", "text/plain"])[0]
-    assert (found.place, found.told) == ("price", "price is 0.0 in application/xml and 0.30000000000000004 in JSON")
+    assert (found.place, found.description) == (
+        "price",
+        "price is 0.0 in application/xml and 0.30000000000000004 in JSON",
+    )
 
 
 def test_what_changes_is_told_from_what_is_steady(session, library):
     call = readable(session, _operation(session, "getBook"))
-    before = snapshot(session, [call])["getBook"][0]
+    before = take_snapshots(session, [call])["getBook"][0]
     assert before["price"] == 7.25
     library.books[9780141439600] = dict(library.books[9780141439600], price=8.0)
-    assert changed(before, leaves(call.send(session))) == {"price": (7.25, 8.0)}
+    assert changed(before, flatten(call.send(session))) == {"price": (7.25, 8.0)}
     assert not changes_by_itself(session, call, "price", 0.05)
     assert steady([{"a": 1, "b": 2}, {"a": 1, "b": 3}]) == {"a": 1}
 
@@ -98,9 +101,9 @@ def test_what_moves_needs_permission(session):
     assert "allow-motion" in session.judge.evidence["http/delete-idempotent"].skips[0]
     assert applicable_operations(session, ["http/safe"], lambda item: item.method == "PATCH", "patches") == []
     assert "no operation that patches" in session.judge.evidence["http/safe"].unclaimed
-    wanted = Made("DELETE", "/books/5", "", b"")
-    assert Harmless(session).made(wanted) is None
-    assert Harmless(replace(session, allow_motion=True)).made(wanted) == wanted
+    wanted = GeneratedRequest("DELETE", "/books/5", "", b"")
+    assert MotionGuard(session).admit(wanted) is None
+    assert MotionGuard(replace(session, allow_motion=True)).admit(wanted) == wanted
 
 
 def test_schemathesis_makes_the_same_requests_again(session):
@@ -118,10 +121,12 @@ def test_refusals(status, expected):
 
 
 def test_what_a_robot_might_take_of_random_requests_is_slow_or_not_sent():
-    harmless = Harmless(Session(allow_motion=True))
-    wild = Made("PUT", "/robot/velocity/", "application/json", b'{"linear": {"x": 900.5, "y": -7, "z": true}}')
-    assert harmless.made(wild).body == b'{"linear": {"x": 0.1, "y": 1, "z": true}}'
+    guard = MotionGuard(Session(allow_motion=True))
+    wild = GeneratedRequest(
+        "PUT", "/robot/velocity/", "application/json", b'{"linear": {"x": 900.5, "y": -7, "z": true}}'
+    )
+    assert guard.admit(wild).body == b'{"linear": {"x": 0.1, "y": 1, "z": true}}'
     vector = b"<Vector3><x>0.6</x><y>0</y><z>0</z></Vector3>"
-    assert harmless.made(Made("PUT", "/robot/velocity/linear/", "application/xml", vector)) is None
-    assert harmless.made(Made("PUT", "/robot/velocity/", "text/plain", wild.body)) is None
-    assert harmless.made(Made("GET", "/robot/pose/", "", b"")) is not None
+    assert guard.admit(GeneratedRequest("PUT", "/robot/velocity/linear/", "application/xml", vector)) is None
+    assert guard.admit(GeneratedRequest("PUT", "/robot/velocity/", "text/plain", wild.body)) is None
+    assert guard.admit(GeneratedRequest("GET", "/robot/pose/", "", b"")) is not None

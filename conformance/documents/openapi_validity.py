@@ -1,0 +1,52 @@
+"""Whether a document is a valid OpenAPI description: by the schema of its version, its references and its paths."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from typing import Any
+
+from conformance.documents.json_schema import UnresolvedError
+from conformance.documents.openapi import PARAMETER, read_operations
+
+
+def openapi_fault(document: Any) -> str:
+    """Why a document is no valid OpenAPI 3 description; empty where it is one.
+
+    Schemathesis carries the schemas that the OpenAPI Initiative publishes, and is there anyway.
+    """
+    if not isinstance(document, dict):
+        return "it is no object"
+    version = document.get("openapi")
+    if not isinstance(version, str) or not re.fullmatch(r"3\.[0-2]\.\d+", version):
+        return f"its version is {version!r}"
+    error = next(iter(_validator(version[:3]).iter_errors(document)), None)
+    if error is not None:
+        where = ".".join(str(part) for part in error.instance_path)
+        return f"at {where or 'its root'}: {error.message[:200]}"
+    try:
+        read_operations(document)
+    except UnresolvedError as unresolved:
+        return str(unresolved)
+    except (AttributeError, TypeError, KeyError, RecursionError) as broken:
+        return f"it is not built as one: {broken!r}"
+    return _path_fault(document)
+
+
+@lru_cache(maxsize=4)
+def _validator(version: str) -> Any:
+    import jsonschema_rs  # noqa: PLC0415 - with the import below, only where a description is judged
+    from schemathesis.specs.openapi import definitions  # noqa: PLC0415 - costs a fifth of a second
+
+    schema = definitions.OPENAPI_30 if version == "3.0" else definitions.OPENAPI_31
+    return jsonschema_rs.validator_for(schema)
+
+
+def _path_fault(document: dict[str, Any]) -> str:
+    """A path parameter that is used and not described, or described and not used (OpenAPI 3.1, 4.8.8.2)."""
+    for operation in read_operations(document):
+        used = set(PARAMETER.findall(operation.template))
+        described = {item.name for item in operation.parameter("path")}
+        if used != described:
+            return f"{operation.label} uses the path parameters {sorted(used)} and describes {sorted(described)}"
+    return ""

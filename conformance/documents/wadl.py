@@ -1,0 +1,73 @@
+"""A WADL (W3C member submission of 2009) as the operations that it describes."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+from conformance.documents.openapi import Operation, Parameter
+from conformance.documents.representation import UnreadableError, local_name, parse_xml
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+WADL = "http://wadl.dev.java.net/2009/02"
+# A parameter may come with a regular expression: {code: [0-9]{1,3}}.
+_TEMPLATE = re.compile(r"\{\s*([^{}:\s]+)\s*(?::[^{}]*(?:\{[^{}]*\}[^{}]*)*)?\}")
+_KINDS = {"template": "path", "query": "query", "matrix": "matrix", "header": "header", "plain": "plain"}
+
+
+def read_wadl(body: bytes) -> list[Operation]:
+    """The operations of a WADL, their paths below the server's root.
+
+    Raises:
+        UnreadableError: it is no XML, or its root is no WADL application.
+    """
+    root = parse_xml(body)
+    if root.tag != f"{{{WADL}}}application":
+        raise UnreadableError(f"its root element is {root.tag}")
+    found: list[Operation] = []
+    for resources in root.findall(f"{{{WADL}}}resources"):
+        prefix = urlsplit(resources.get("base", "")).path.rstrip("/")
+        for resource in resources.findall(f"{{{WADL}}}resource"):
+            found += _of_resource(resource, prefix, {}, root)
+    return found
+
+
+def _of_resource(
+    element: etree._Element, prefix: str, inherited: dict[tuple[str, str], bool], root: etree._Element
+) -> list[Operation]:
+    path = f"{prefix}/{element.get('path', '').lstrip('/')}" if element.get("path") else prefix
+    parameters = inherited | _parameters(element)
+    found: list[Operation] = []
+    for child in element:
+        if not isinstance(child.tag, str):
+            continue
+        if local_name(child) == "resource":
+            found += _of_resource(child, path.rstrip("/"), parameters, root)
+        elif local_name(child) == "method":
+            method = _referred(child, root)
+            own = parameters
+            for request in method.findall(f"{{{WADL}}}request"):
+                own |= _parameters(request)
+            parameters_of_all = tuple(
+                Parameter(name, where, required or where == "path", {}) for (where, name), required in own.items()
+            )
+            name, template = method.get("name", "").upper(), _TEMPLATE.sub(r"{\1}", path)
+            found.append(Operation(f"{name} {template}", name, template, parameters_of_all))
+    return found
+
+
+def _referred(method: etree._Element, root: etree._Element) -> etree._Element:
+    """A method, or the one that it refers to by ``href="#id"``."""
+    name = method.get("href", "").lstrip("#")
+    return next((item for item in root.iter(f"{{{WADL}}}method") if name and item.get("id") == name), method)
+
+
+def _parameters(element: etree._Element) -> dict[tuple[str, str], bool]:
+    return {
+        (_KINDS.get(item.get("style", ""), item.get("style", "")), item.get("name", "")): item.get("required", "false")
+        in {"true", "1"}
+        for item in element.findall(f"{{{WADL}}}param")
+    }

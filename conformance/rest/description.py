@@ -1,0 +1,91 @@
+"""What of the contract a robot's own descriptions of its REST interface lack."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+from conformance.documents.json_schema import UnresolvedError
+from conformance.documents.openapi import PARAMETER, Operation, read_operations
+from conformance.documents.wadl import read_wadl
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+@dataclass(frozen=True)
+class Described:
+    """One operation of a description.
+
+    Attributes:
+        operation: as it is described.
+        path: below the base URL that the run knows; the operation's own path may have a prefix more or less.
+    """
+
+    operation: Operation
+    path: str
+
+    @property
+    def address(self) -> tuple[str, str]:
+        """Its method, and its path without the names of its parameters."""
+        return self.operation.method, PARAMETER.sub("{}", self.path)
+
+
+def described_by_openapi(document: Any, base_url: str) -> list[Described]:
+    """The operations of a robot's OpenAPI description; what is not built as one has none."""
+    if not isinstance(document, dict):
+        return []
+    try:
+        found = read_operations(document)
+    except (UnresolvedError, AttributeError, TypeError, KeyError, ValueError, RecursionError):
+        return []
+    servers = document.get("servers")
+    first = servers[0] if isinstance(servers, list) and servers else None
+    url = first.get("url") if isinstance(first, dict) else None
+    prefix = urlsplit(url).path.rstrip("/") if isinstance(url, str) else ""
+    return [Described(item, _below(prefix + item.template, base_url)) for item in found]
+
+
+def described_by_wadl(body: bytes, base_url: str) -> list[Described]:
+    """The operations of a robot's WADL.
+
+    Raises:
+        UnreadableError: it is no XML, or its root is no WADL application.
+    """
+    return [Described(item, _below(item.template, base_url)) for item in read_wadl(body)]
+
+
+def _below(path: str, base_url: str) -> str:
+    """A path of the server as a path below the base URL."""
+    base = urlsplit(base_url).path.rstrip("/")
+    return path[len(base) :] if base and path.startswith(f"{base}/") else path
+
+
+def differences(wanted: Iterable[Operation], found: Iterable[Described]) -> list[str]:
+    """What of the contract a description lacks, in words."""
+    by_address: dict[tuple[str, str], list[Operation]] = {}
+    for item in found:
+        by_address.setdefault(item.address, []).append(item.operation)
+    missing = []
+    for ours in wanted:
+        theirs = by_address.get(Described(ours, ours.template).address, [])
+        if theirs:
+            missing += _differences_of_parameters(ours, theirs)
+        elif not ours.optional:
+            missing.append(f"{ours.label} is missing")
+    return missing
+
+
+def _differences_of_parameters(ours: Operation, theirs: list[Operation]) -> list[str]:
+    described = {(one.where, one.name): one.required for operation in theirs for one in operation.parameters}
+    wanted = sorted((one.where, one.name, one.required) for one in ours.parameters)
+    missing = []
+    for where, name, required in wanted:
+        if (where, name) not in described:
+            missing.append(f"{ours.label} lacks the {where} parameter {name}")
+        elif where == "query" and described[where, name] != required:
+            missing.append(f"{ours.label} says that {name} is {'optional' if required else 'required'}")
+    known = {name for where, name, _ in wanted if where == "query"}
+    extra = {name for (where, name), required in described.items() if required and where == "query"} - known
+    return [*missing, *(f"{ours.label} requires {name}, which the contract does not know" for name in sorted(extra))]
