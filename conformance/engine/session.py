@@ -89,7 +89,7 @@ class Session:
             OSError: the CA file cannot be used.
         """
         # Imported late: zeep, lxml and xmlschema cost a third of a second that --help need not pay.
-        from conformance.soap.service import open_service  # noqa: PLC0415
+        from conformance.soap.discovery import open_service  # noqa: PLC0415
 
         where = self.statement.endpoints
         if where.rest:

@@ -44,8 +44,9 @@ class _Transport(Transport):
 
     def load(self, url: str) -> bytes:
         """A document of the description."""
-        if self._service.wsdl is not None and url == self._service.wsdl_source:
-            return self._service.wsdl
+        published = self._service.published
+        if published.document is not None and url == published.source:
+            return published.document
         return self._service.fetch(url)
 
     def post(self, _address: str, message: bytes, headers: dict[str, str]) -> _Reply:
@@ -72,7 +73,7 @@ class ZeepCaller:
 
     def __init__(self, service: SoapService) -> None:
         self._transport = _Transport(service)
-        own = service.wsdl_source if service.wsdl is not None else None
+        own = service.published.source if service.published.document is not None else None
         self.source = own or str(service.contract_wsdl_path)
         client = Client(self.source, transport=self._transport, settings=Settings(strict=True))
         described = service.own if own and service.own is not None else service.contract

@@ -12,7 +12,9 @@ import pytest
 from conformance.documents.wsdl import Description, DescriptionError, describe, faults, name
 from conformance.documents.xml_names import WSDL_SOAP, clark
 from conformance.soap import comparison
+from conformance.soap.address import is_http, split
 from conformance.soap.callable_services import rounds
+from conformance.soap.published_wsdl import get
 from conformance.soap.wsdl_rules import RULES
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
@@ -65,10 +67,8 @@ def _services(roaas: Session, *ids: str) -> list[SoapService]:
 
 def _served(service: SoapService) -> _Served:
     """Ask for the description, where the statement says it is, else at ?wsdl of the endpoint."""
-    source = service.wsdl_source if service.wsdl_source and "://" in service.wsdl_source else f"{service.endpoint}?wsdl"
-    parts = urlsplit(source)
-    with closing(HttpClient(f"{parts.scheme}://{parts.netloc}", service.client.connection)) as client:
-        exchange = client.send("GET", f"{parts.path or '/'}?{parts.query}" if parts.query else parts.path or "/")
+    source = service.published.url or f"{service.endpoint}?wsdl"
+    exchange = get(source, service.client.connection)
     answer = exchange.response
     if answer.status != 200:
         return _Served(exchange, None, exchange.came)
@@ -78,7 +78,7 @@ def _served(service: SoapService) -> _Served:
         description = describe(answer.body, source, service.fetch)
     except DescriptionError as error:
         return _Served(exchange, None, str(error))
-    missing = [(place, why) for place, why in description.missing if urlsplit(place).netloc == parts.netloc]
+    missing = [(place, why) for place, why in description.missing if urlsplit(place).netloc == urlsplit(source).netloc]
     # What lies with somebody else (a public schema) matters only where something that is used comes from it.
     problem = next((f"it refers to {place}: {why}" for place, why in missing), "") or next(faults(description), "")
     return _Served(exchange, description, problem)
@@ -144,23 +144,18 @@ def test_address(roaas: Session, judge: Judge) -> None:
 
 def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
     """Ask at an address with an empty Body, which does nothing; what is wrong there."""
-    try:
-        parts = urlsplit(location)
-        usable = parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
-    except ValueError:
-        usable = False
-    if not usable:
+    if not is_http(location):
         return None, "no http URL"
-    # The token is for the robot that the statement names.
-    ours = parts.hostname == service.client.host
+    base, path = split(location)
     try:
-        with closing(HttpClient(f"{parts.scheme}://{parts.netloc}", service.client.connection)) as client:
+        with closing(HttpClient(base, service.client.connection)) as client:
             exchange = client.send(
                 "POST",
-                parts.path or "/",
+                path,
                 headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
                 body=_EMPTY,
-                authorized=ours,
+                # The token is for the robot that the statement names.
+                authorized=client.host == service.client.host,
             )
     except NoAnswerError as none:
         return none.unanswered, str(none)

@@ -58,7 +58,7 @@ def _client(judge: Judge, id_: str, service: SoapService | None) -> ZeepCaller |
         judge.check(
             id_,
             False,
-            service.wsdl_exchange,
+            service.published.attempt,
             "a description from which zeep makes a client",
             found=f"{type(error).__name__}: {error}"[:300],
         )

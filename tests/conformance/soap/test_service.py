@@ -8,7 +8,7 @@ import pytest
 
 from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.statement import StatementError
-from conformance.soap.service import open_service
+from conformance.soap.discovery import open_service
 from conformance.transport.client import Connection
 
 WSDL = (CONTRACT_DIR / "publishers.wsdl").read_bytes()
@@ -63,7 +63,7 @@ def test_a_robot_that_hangs_costs_its_deadline(listening):
 def test_a_closed_port_is_no_error():
     service = opened("http://127.0.0.1:9/robot_ws?wsdl")
     assert service.endpoint == "http://127.0.0.1:9/robot_ws"
-    assert service.wsdl is None
+    assert service.published.document is None
 
 
 def test_the_address_in_the_wsdl_is_taken_where_it_answers(listening):
