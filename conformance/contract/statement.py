@@ -7,16 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 
 from conformance.contract.classes import CLASSES, PROFILES, ConformanceClass, Profile
+from conformance.contract.limits import DeclaredLimits, Limits
 from conformance.contract.thresholds import Threshold
 from conformance.contract.toml_file import Finite, NotNegative, Positive, Text, TomlFileError, read_toml
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-# A robot that declares nothing is judged with the reference robot's limits halved (contract, fine print).
-_UNDECLARED_LINEAR = 0.35
-_UNDECLARED_ANGULAR = 1.25
-_UNDECLARED_SETTLE = 2.0
 
 Component = Literal["linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z"]
 
@@ -57,25 +53,6 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def subscribers(self) -> bool:
         """Whether there is a word on where the subscribers service is."""
         return bool(self.subscribers_wsdl or self.subscribers_endpoint)
-
-
-class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the robot can do, and how exactly.
-
-    Attributes:
-        linear_m_s: greatest speed, m/s.
-        angular_rad_s: greatest turning rate, rad/s.
-        settle_s: time within which a commanded velocity is reached, s.
-        hold_s: time for which a velocity holds unless renewed, s; None: not declared, not checked.
-        tolerance: relative tolerance of a reached velocity; tolerance_abs: the absolute one, m/s or rad/s.
-    """
-
-    linear_m_s: NotNegative = _UNDECLARED_LINEAR
-    angular_rad_s: NotNegative = _UNDECLARED_ANGULAR
-    settle_s: NotNegative = _UNDECLARED_SETTLE
-    hold_s: NotNegative | None = None
-    tolerance: NotNegative = 0.05
-    tolerance_abs: NotNegative = 0.02
 
 
 class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -125,15 +102,21 @@ class Statement(msgspec.Struct, frozen=True):
     Attributes:
         robot: name, vendor, version.
         claims: the conformance classes that the vendor claims; None: none were named.
+        declared: the limits that it names.
     """
 
     robot: dict[str, str] = {}
     endpoints: Endpoints = Endpoints()
     claims: tuple[ConformanceClass, ...] | None = None
-    limits: Limits = Limits()
+    declared: DeclaredLimits = DeclaredLimits()
     motion: Motion = Motion()
     ros: Ros = Ros()
     load: Load = Load()
+
+    @property
+    def limits(self) -> Limits:
+        """What the robot is judged by, declared or not."""
+        return self.declared.resolved()
 
     def claimed(self) -> tuple[ConformanceClass, ...]:
         """The classes to judge: those that are claimed, else those whose interfaces have an address."""
@@ -181,7 +164,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     robot: _Robot = _Robot()
     endpoints: Endpoints = Endpoints()
     claims: _Claims = _Claims()
-    limits: Limits = Limits()
+    limits: DeclaredLimits = DeclaredLimits()
     motion: Motion = Motion()
     ros: Ros = Ros()
     load: Load = Load()
@@ -201,7 +184,7 @@ def load_statement(path: Path) -> Statement:
         robot={key: str(value) for key, value in robot.items() if value is not None},
         endpoints=_beside(path.parent, file.endpoints),
         claims=file.claims.named(),
-        limits=file.limits,
+        declared=file.limits,
         motion=file.motion,
         ros=file.ros,
         load=file.load,

@@ -47,8 +47,6 @@ def result_document(
 ) -> dict[str, Any]:
     """Put a run together as result.json has it."""
     statement = session.statement
-    limits = asdict(statement.limits)
-    tolerances = {key: limits.pop(key) for key in ("tolerance", "tolerance_abs")}
     return {
         "format": RESULT_FORMAT,
         "verdict": overall,
@@ -59,8 +57,8 @@ def result_document(
             "robot": statement.robot,
             "endpoints": {key: value for key, value in asdict(statement.endpoints).items() if value is not None},
             "claims": list(session.claims),
-            "limits": {key: value for key, value in limits.items() if value is not None},
-            "tolerances": tolerances,
+            "limits": statement.limits.figures,
+            "tolerances": statement.limits.tolerances,
             "motion_allowed": session.allow_motion,
         },
         "seed": session.seed,

@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any, Final
 
-from conformance.contract.statement import Limits
 from conformance.robot.geometry import length_of
 from conformance.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
 from conformance.transport.exchange import Listener
@@ -117,18 +116,18 @@ class Observer(Listener):
 
     def _limits(self, twist: Any, exchange: Exchange) -> None:
         """The measured speed is within the declared limits at any time, also on the robot's own missions."""
-        limits, undeclared = self._session.statement.limits, Limits()
-        for part, declared, default in (
-            ("linear", limits.linear_m_s, undeclared.linear_m_s),
-            ("angular", limits.angular_rad_s, undeclared.angular_rad_s),
+        limits = self._session.statement.limits
+        for part, limit, declared in (
+            ("linear", limits.linear_m_s, limits.linear_declared),
+            ("angular", limits.angular_rad_s, limits.angular_declared),
         ):
-            if part not in twist or declared == default:
+            if part not in twist or not declared:
                 continue
             fastest = max(abs(float(twist[part][axis])) for axis in "xyz")
             self._session.judge.check(
                 "safety/limits-hold",
-                fastest <= declared * (1 + limits.tolerance) + limits.tolerance_abs,
+                fastest <= limit * (1 + limits.tolerance) + limits.tolerance_abs,
                 exchange,
-                f"a measured {part} speed within the limit of {declared:g}",
+                f"a measured {part} speed within the limit of {limit:g}",
                 found=f"{fastest:.4g}",
             )

@@ -6,7 +6,6 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from conformance.contract.statement import Limits
 from conformance.documents.representation import projected
 from conformance.robot.geometry import Pose, pose_of
 from conformance.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
@@ -106,8 +105,7 @@ class Robot:
     @property
     def limits_declared(self) -> bool:
         """Whether the statement says how fast the robot can be, so that beyond it is known."""
-        undeclared = Limits()
-        return (self.limits.linear_m_s, self.limits.angular_rad_s) != (undeclared.linear_m_s, undeclared.angular_rad_s)
+        return self.limits.linear_declared and self.limits.angular_declared
 
     @property
     def settle_s(self) -> float:
@@ -196,8 +194,12 @@ class Robot:
         )
 
     def limit_of(self, component: int) -> float:
-        """The declared limit of a component by its place in Velocity, m/s or rad/s."""
+        """The limit of a component by its place in Velocity, declared or not, m/s or rad/s."""
         return self.limits.linear_m_s if component < len("xyz") else self.limits.angular_rad_s
+
+    def limit_declared(self, component: int) -> bool:
+        """Whether the statement names the limit of a component."""
+        return self.limits.linear_declared if component < len("xyz") else self.limits.angular_declared
 
     def actuated(self, component: int) -> bool:
         """Whether the statement says that the robot can actuate a component."""

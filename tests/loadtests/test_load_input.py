@@ -4,10 +4,13 @@ import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from conformance.contract.exit_codes import ExitCode
 from conformance.contract.statement import Endpoints, Load, Statement
 from conformance.contract.thresholds import ThresholdsError, load_thresholds
 from loadtests import settings
+from loadtests.cli import load
 from loadtests.clients import wsdl
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.payloads import CATALOGUE, differences, rest_request, soap_request, variants
@@ -83,6 +86,14 @@ def test_the_statements_limits_hold_and_lift():
         "of reads"
     )
     assert settle(Wishes(**REST, users=4, allow_motion=True), Statement()).max_rate == settings.MOTION_RATE
+
+
+def test_a_slip_in_any_table_of_the_statement_is_refused(tmp_path):
+    path = tmp_path / "statement.toml"
+    path.write_text('[endpoints]\nrest = "http://127.0.0.1:1"\n[limts]\nlinear_m_s = 0.5\n')
+    ended = CliRunner().invoke(load, [str(path), "--out", str(tmp_path / "out")])
+    assert ended.exit_code == ExitCode.USAGE
+    assert "unknown key 'limts'" in ended.output
 
 
 @pytest.mark.parametrize(

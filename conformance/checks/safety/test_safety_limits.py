@@ -46,7 +46,7 @@ def _beyond(robot: Robot) -> Iterator[Velocity]:
         if not robot.actuated(component):
             continue
         limit = robot.limit_of(component)
-        sizes = [1.01 * limit + 1e-3, 1.5 * limit, _BEYOND_ANY] if robot.limits_declared else [_BEYOND_ANY]
+        sizes = [1.01 * limit + 1e-3, 1.5 * limit, _BEYOND_ANY] if robot.limit_declared(component) else [_BEYOND_ANY]
         for size in (*sizes, *_FARTHER):
             yield from (_only(component, size), _only(component, -size))
 

@@ -99,6 +99,15 @@ def test_a_statement_that_is_not_there(tmp_path):
         load_statement(tmp_path / "robot.toml")
 
 
+def test_a_figure_is_declared_when_the_statement_names_it_whatever_its_value(tmp_path):
+    silent = Statement().limits
+    assert (silent.linear_declared, silent.angular_declared) == (False, False)
+    assert silent.hold_s is None
+    same = _load(tmp_path, f"[limits]\nlinear_m_s = {silent.linear_m_s}").limits
+    assert same.linear_m_s == silent.linear_m_s
+    assert (same.linear_declared, same.angular_declared) == (True, False)
+
+
 def test_without_claims_the_classes_follow_from_the_addresses():
     only_rest = Statement(endpoints=Endpoints(rest="http://r2"))
     assert "soap-delivery" not in only_rest.claimed()

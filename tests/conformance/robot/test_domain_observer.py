@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from conformance.contract.statement import Limits, Statement
+from conformance.contract.limits import DeclaredLimits
+from conformance.contract.statement import Statement
 from conformance.engine.session import Session
 from conformance.robot.observer import observe
 from conformance.transport.client import HttpClient
@@ -29,7 +30,7 @@ def odometry(second: int = 1, **orientation: float) -> dict:
 
 @pytest.fixture
 def session() -> Session:
-    made = Session(statement=Statement(limits=Limits(linear_m_s=0.5, angular_rad_s=2.0)))
+    made = Session(statement=Statement(declared=DeclaredLimits(linear_m_s=0.5, angular_rad_s=2.0)))
     made.rest = HttpClient(_BASE + "/", made.connection)
     observe(made)
     observe(made)
@@ -119,3 +120,12 @@ def test_undeclared_limits_are_not_known():
     observe(session)
     see(session, "/robot/velocity/", {"linear": _ZERO | {"x": 3.0}, "angular": _ZERO})
     assert not found(session)
+
+
+def test_a_limit_declared_as_high_as_one_that_nobody_declared_is_judged(session):
+    undeclared = Statement().limits
+    declared = DeclaredLimits(linear_m_s=undeclared.linear_m_s)
+    session.statement = Statement(declared=declared)
+    fast = _ZERO | {"x": 2 * undeclared.linear_m_s}
+    see(session, "/robot/velocity/", {"linear": fast, "angular": _ZERO | {"z": 9.0}})
+    assert found(session) == {"safety/limits-hold"}

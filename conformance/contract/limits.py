@@ -1,0 +1,80 @@
+"""What a robot can do, and how exactly: what its statement declares, and what it is judged by.
+
+A figure is declared when the statement names it, whatever its value. What is not declared has a figure to drive the
+robot by all the same (contract.md, the statement): the reference robot's limits halved, so that a slower one can
+follow.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from conformance.contract.toml_file import NotNegative
+
+_UNDECLARED_LINEAR_M_S = 0.35
+_UNDECLARED_ANGULAR_RAD_S = 1.25
+_UNDECLARED_SETTLE_S = 2.0
+_UNDECLARED_TOLERANCE = 0.05
+_UNDECLARED_TOLERANCE_ABS = 0.02
+
+
+class Limits(msgspec.Struct, frozen=True, kw_only=True):
+    """What judging uses.
+
+    Attributes:
+        linear_m_s: greatest speed, m/s.
+        angular_rad_s: greatest turning rate, rad/s.
+        settle_s: time within which a commanded velocity is reached, s.
+        hold_s: time for which a velocity holds unless renewed, s; None: not declared, not judged.
+        tolerance: relative tolerance of a reached velocity; tolerance_abs: the absolute one, m/s or rad/s.
+        linear_declared: whether ``linear_m_s`` is the robot's, so that what lies beyond it can be judged;
+            likewise angular_declared.
+    """
+
+    linear_m_s: float
+    angular_rad_s: float
+    settle_s: float
+    hold_s: float | None
+    tolerance: float
+    tolerance_abs: float
+    linear_declared: bool
+    angular_declared: bool
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """The limits by name, as a result shows them."""
+        figures = {"linear_m_s": self.linear_m_s, "angular_rad_s": self.angular_rad_s, "settle_s": self.settle_s}
+        return figures if self.hold_s is None else figures | {"hold_s": self.hold_s}
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """The tolerances by name, as a result shows them."""
+        return {"tolerance": self.tolerance, "tolerance_abs": self.tolerance_abs}
+
+
+class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The table ``[limits]`` of a statement: fields as in Limits; None: not declared."""
+
+    linear_m_s: NotNegative | None = None
+    angular_rad_s: NotNegative | None = None
+    settle_s: NotNegative | None = None
+    hold_s: NotNegative | None = None
+    tolerance: NotNegative | None = None
+    tolerance_abs: NotNegative | None = None
+
+    def resolved(self) -> Limits:
+        """What the robot is judged by."""
+
+        def given(value: float | None, otherwise: float) -> float:
+            return otherwise if value is None else value
+
+        return Limits(
+            linear_m_s=given(self.linear_m_s, _UNDECLARED_LINEAR_M_S),
+            angular_rad_s=given(self.angular_rad_s, _UNDECLARED_ANGULAR_RAD_S),
+            settle_s=given(self.settle_s, _UNDECLARED_SETTLE_S),
+            hold_s=self.hold_s,
+            tolerance=given(self.tolerance, _UNDECLARED_TOLERANCE),
+            tolerance_abs=given(self.tolerance_abs, _UNDECLARED_TOLERANCE_ABS),
+            linear_declared=self.linear_m_s is not None,
+            angular_declared=self.angular_rad_s is not None,
+        )
