@@ -99,7 +99,7 @@ def ratio(name: str, call: Call, bare: Call, most: float, seconds: float) -> boo
     )
     return report(
         f"{name}: median {robot_ms:.3f} ms, bare {bare_ms:.3f} ms, ratio {found:.2f} (at most {most}), {errors} errors",
-        found <= most and not errors,
+        met=found <= most and not errors,
     )
 
 
@@ -107,7 +107,7 @@ def many_connections(robot: Robot, seconds: float) -> list[bool]:
     """Measure the rate of PUT deliveries on many connections."""
     measured = load(replace(robot.rest, method="PUT", target=DELIVERY), MANY_CONNECTIONS, seconds)
     text = f"{MANY_CONNECTIONS} connections: {measured.rate:,.0f} PUT deliveries a second, {measured.errors} errors"
-    return [report(f"{text} (at least {LEAST_RATE:,})", measured.rate >= LEAST_RATE and not measured.errors)]
+    return [report(f"{text} (at least {LEAST_RATE:,})", met=measured.rate >= LEAST_RATE and not measured.errors)]
 
 
 def idle(robot: Robot) -> list[bool]:
@@ -117,8 +117,8 @@ def idle(robot: Robot) -> list[bool]:
     core = (cpu_seconds(robot) - used) / (time.monotonic() - started)
     memory = megabytes(robot)
     return [
-        report(f"idle: {core:.1%} of a core (less than {MOST_IDLE_CORE:.0%})", core < MOST_IDLE_CORE),
-        report(f"idle: {memory:.0f} MB (less than {MOST_MEGABYTES})", memory < MOST_MEGABYTES),
+        report(f"idle: {core:.1%} of a core (less than {MOST_IDLE_CORE:.0%})", met=core < MOST_IDLE_CORE),
+        report(f"idle: {memory:.0f} MB (less than {MOST_MEGABYTES})", met=memory < MOST_MEGABYTES),
     ]
 
 
@@ -130,11 +130,11 @@ def growth(robot: Robot, before: float) -> bool:
     grown = megabytes(robot) / before - 1
     return report(
         f"memory after {REQUESTS_FOR_GROWTH:,} requests: {grown:+.1%} (less than {MOST_GROWTH:.0%})",
-        grown < MOST_GROWTH,
+        met=grown < MOST_GROWTH,
     )
 
 
-def report(text: str, met: bool) -> bool:  # noqa: FBT001 - a line and its verdict
+def report(text: str, *, met: bool) -> bool:
     """Print one line of the result."""
     print(f"{'ok    ' if met else 'MISSED'} {text}", flush=True)
     return met

@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from reference_robot.names import RosNames
 from reference_robot.simulation.kinematics import Limits, Motion, advance
 from reference_robot.simulation.messages import quaternion_of
-from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE, Office
+from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE
 
 HOLD_S: Final = 1.0  # a setpoint is good for this long, by the wall clock whatever the time scale
 _PERIOD_S: Final = 0.02  # 50 Hz of simulated time
@@ -34,9 +34,6 @@ class Base:
         node: The node to work through.
         names: Topics and frames; ``velocity.message`` says which type cmd_vel has.
         time_scale: How many times faster than real time the body moves; at most 25 times.
-        limits: Velocity and acceleration limits.
-        office: What the body cannot pass.
-        start: Where it stands at first.
 
     Attributes:
         motion: The body's pose and velocity now.
@@ -47,17 +44,13 @@ class Base:
         node: Node,
         names: RosNames,
         time_scale: float = 1.0,
-        *,
-        limits: Limits = Limits(),  # noqa: B008 - a frozen value
-        office: Office = OFFICE,
-        start: Motion = Motion(*DEPOT, 0.0),  # noqa: B008 - a frozen value
     ) -> None:
-        self.motion = start
+        self.motion = Motion(*DEPOT, 0.0)
         self._node = node
         self._clock = node.get_clock()
         self._time_scale = time_scale
-        self._limits = limits
-        self._solid = office.grown(BODY_RADIUS)
+        self._limits = Limits()
+        self._solid = OFFICE.grown(BODY_RADIUS)
         self._setpoint = (0.0, 0.0)
         self._commanded_at = -math.inf
         self._moved_at = time.monotonic()

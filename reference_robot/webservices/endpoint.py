@@ -49,7 +49,7 @@ def bound(host: str, port: int) -> socket.socket:
     except OSError as error:
         listener.close()
         raise PortInUseError(f"cannot listen on {host} port {port}: {error}") from error
-    listener.setblocking(False)  # noqa: FBT003 - socket's own signature
+    listener.settimeout(0)  # never blocks: the event loop is who waits
     return listener
 
 

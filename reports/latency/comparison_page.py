@@ -87,9 +87,16 @@ def _values(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:
 
 def _row(one: Change) -> tuple[str, ...]:
     return (
-        one.series, one.time, QUANTILE_WORDS[one.quantile], ms(one.old_ms), ms(one.new_ms), ratio(one.ratio),
-        interval(one.interval, of_ratio=True), share(one.threshold), one.verdict,
-    )  # fmt: skip
+        one.series,
+        one.time,
+        QUANTILE_WORDS[one.quantile],
+        ms(one.old_ms),
+        ms(one.new_ms),
+        ratio(one.ratio),
+        interval(one.interval, of_ratio=True),
+        share(one.threshold),
+        one.verdict,
+    )
 
 
 def _ratios(changes: Sequence[Change]) -> Any:

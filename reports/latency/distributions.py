@@ -16,6 +16,7 @@ from hdrh.histogram import HdrHistogram
 from numpy.typing import NDArray
 
 from reports.errors import ResultInvalidError
+from reports.pages.untrusted import excerpt
 
 Floats = NDArray[np.float64]
 _US_PER_MS = 1000.0
@@ -89,8 +90,9 @@ def distribution(encoded: str, where: str) -> Distribution | None:
         held = np.flatnonzero(np.asarray(histogram.counts))
         values = [histogram.get_value_from_index(int(index)) for index in held]
     except (HdrCookieException, HdrLengthException, zlib.error, TypeError, ValueError, IndexError) as error:
-        shown = encoded if len(encoded) <= 40 else f"{encoded[:40]}…"  # noqa: PLR2004 - enough to find it by
-        raise ResultInvalidError(f"{where}: no HDR histogram (V2, base64): {error} (value: {shown!r})") from error
+        raise ResultInvalidError(
+            f"{where}: no HDR histogram (V2, base64): {error} (value: {excerpt(encoded, 40)!r})"
+        ) from error
     if not values:
         return None
     lows = [histogram.get_lowest_equivalent_value(value) for value in values]

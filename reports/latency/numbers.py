@@ -4,13 +4,19 @@ from collections.abc import Sequence
 
 NONE = "\N{EN DASH}"
 
+# From these figures on, further digits say nothing.
+_TENTHS_MS = 10
+_WHOLE_MS = 1000
+_WHOLE_RATE = 100
+_WHOLE_PERCENT = 10
+
 
 def ms(value: float | None) -> str:
     """Milliseconds with microsecond resolution below 10, fewer digits above: 0.074, 12.3, 1,810."""
     if value is None:
         return NONE
     size = abs(value)
-    digits = 3 if size < 10 else 1 if size < 1000 else 0  # noqa: PLR2004 - where further digits say nothing
+    digits = 3 if size < _TENTHS_MS else 1 if size < _WHOLE_MS else 0
     return f"{value:,.{digits}f}"
 
 
@@ -23,7 +29,7 @@ def rate(value: float | None) -> str:
     """Requests a second: 4,000, or 12.5."""
     if value is None:
         return NONE
-    return f"{value:,.0f}" if value >= 100 or value == int(value) else f"{value:.1f}"  # noqa: PLR2004 - as above
+    return f"{value:,.0f}" if value >= _WHOLE_RATE or value == int(value) else f"{value:.1f}"
 
 
 def share(value: float | None) -> str:
@@ -31,7 +37,7 @@ def share(value: float | None) -> str:
     if value is None:
         return NONE
     percent = value * 100
-    return f"{percent:,.0f} %" if percent >= 10 else f"{percent:.2g} %"  # noqa: PLR2004 - two significant digits
+    return f"{percent:,.0f} %" if percent >= _WHOLE_PERCENT else f"{percent:.2g} %"
 
 
 def interval(bounds: Sequence[float] | None, *, of_ratio: bool = False) -> str:

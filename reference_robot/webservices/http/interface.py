@@ -41,7 +41,7 @@ class Interface(ABC):
     def answer(self, request: Request) -> Response | Awaitable[Response]:
         """Return the answer, at once or awaited; a Problem that it raises becomes the answer."""
 
-    def never_waits(self, scope: Message) -> bool:  # noqa: ARG002 - for subclasses that know
+    def never_waits(self, _scope: Message) -> bool:
         """Tell whether this request is answered without waiting for anything: its content, ROS, another task."""
         return False
 

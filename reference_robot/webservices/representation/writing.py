@@ -70,7 +70,7 @@ def text_of(plain: Any) -> str:
 class _Dumper(yaml.SafeDumper):
     """Writes equal lists in full where PyYAML would refer to the first one with an alias."""
 
-    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - PyYAML's signature
+    def ignore_aliases(self, _data: Any) -> bool:
         return True
 
 

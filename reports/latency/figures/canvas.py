@@ -27,6 +27,11 @@ MARK = {"rest": "o", "soap": "^"}
 SPAN_COLOUR = {"build": "#E69F00", "wire": "#56B4E9", "server": "#009E73", "parse": "#CC79A7"}
 SPAN_HATCH = {"build": "", "wire": "//", "server": "", "parse": "\\\\"}
 PAPER_COLOUR = "#7a4d8f"
+_WHOLE_MS = 10
+"""Milliseconds from which a tick is a whole number."""
+_DECADES_WITH_STEPS = 2
+"""Decades up to which ticks stand at 1, 2 and 5; on a longer axis their labels would touch."""
+
 _WIDTH, _HEIGHT, _DPI = 4.8, 3.4, 100
 _STYLE: Any = {
     "svg.fonttype": "none",  # text stays text: it can be searched, copied and read aloud
@@ -135,7 +140,7 @@ def _inline(document: bytes, name: str, alt: str) -> str:
 
 def milliseconds(value: float) -> str:
     """A tick's label: 0.05, 1, 20, 1,000."""
-    return f"{value:,.0f}" if value >= 10 else f"{value:g}"  # noqa: PLR2004 - from two digits on, whole numbers
+    return f"{value:,.0f}" if value >= _WHOLE_MS else f"{value:g}"
 
 
 def log_time_axis(axes: Axes, which: str, label: str) -> None:
@@ -144,7 +149,7 @@ def log_time_axis(axes: Axes, which: str, label: str) -> None:
     (axes.set_xscale if which == "x" else axes.set_yscale)("log")
     low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
     decades = _decades(low, high)
-    steps = (1.0, 2.0, 5.0) if decades <= 2 else (1.0,)  # noqa: PLR2004 - more labels than that would touch
+    steps = (1.0, 2.0, 5.0) if decades <= _DECADES_WITH_STEPS else (1.0,)
     axis.set_major_locator(mpl.ticker.LogLocator(subs=steps, numticks=12))
     axis.set_major_formatter(FuncFormatter(lambda value, _: milliseconds(value)))
     axis.set_minor_formatter(NullFormatter())

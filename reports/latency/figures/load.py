@@ -31,9 +31,13 @@ def _latency(steps: Sequence[Mapping[str, Any]], knees: Sequence[Mapping[str, An
             shown = [step for step in own if step[key] is not None]
             rates = [step["offered_rate"] for step in shown]
             panel.axes.plot(
-                rates, [step[key] for step in shown], style, color=COLOUR[interface], linewidth=1.6,
+                rates,
+                [step[key] for step in shown],
+                style,
+                color=COLOUR[interface],
+                linewidth=1.6,
                 label=f"{interface.upper()} {label}",
-            )  # fmt: skip
+            )
             for step in shown:
                 _mark(panel, step, step[key], interface)
     log_time_axis(panel.axes, "y", "response time, ms")
@@ -47,9 +51,12 @@ def _throughput(steps: Sequence[Mapping[str, Any]], knees: Sequence[Mapping[str,
     panel.axes.plot(rates, rates, color=SOFT, linewidth=0.9, linestyle=":", label="all offered")
     for interface, own in _by_interface(steps).items():
         panel.axes.plot(
-            [step["offered_rate"] for step in own], [step["achieved_rate"] for step in own],
-            color=COLOUR[interface], linewidth=1.6, label=interface.upper(),
-        )  # fmt: skip
+            [step["offered_rate"] for step in own],
+            [step["achieved_rate"] for step in own],
+            color=COLOUR[interface],
+            linewidth=1.6,
+            label=interface.upper(),
+        )
         for step in own:
             _mark(panel, step, step["achieved_rate"], interface)
     panel.axes.set_yscale("log")
@@ -81,9 +88,13 @@ def _plain(axis: Any) -> None:
 
 def _mark(panel: Panel, step: Mapping[str, Any], value: float, interface: str) -> None:
     panel.axes.plot(
-        [step["offered_rate"]], [value], MARK[interface], color=COLOUR[interface], markersize=5,
+        [step["offered_rate"]],
+        [value],
+        MARK[interface],
+        color=COLOUR[interface],
+        markersize=5,
         markerfacecolor=COLOUR[interface] if step["meets"] else "white",
-    )  # fmt: skip
+    )
 
 
 def _by_interface(steps: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:

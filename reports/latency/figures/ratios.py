@@ -53,9 +53,14 @@ def ratios(
                 )
             axes.plot([row.ratio], [place], "o", color=row.colour, markersize=5)
             axes.annotate(
-                f"{row.ratio:.2f}", (1.0, place), (6, 0), xycoords=("axes fraction", "data"),
-                textcoords="offset points", va="center", color=SOFT,
-            )  # fmt: skip
+                f"{row.ratio:.2f}",
+                (1.0, place),
+                (6, 0),
+                xycoords=("axes fraction", "data"),
+                textcoords="offset points",
+                va="center",
+                color=SOFT,
+            )
         axes.set_yticks(range(len(rows)), [row.label for row in rows])
         axes.set_ylim(len(rows) - 0.4, -0.6)
         axes.set_xscale("log")

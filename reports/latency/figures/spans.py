@@ -46,9 +46,16 @@ def _panel(client: str, bars: Mapping[str, Mapping[str, float]]) -> Panel:
         width = [parts.get(span, 0.0) for parts in bars.values()]
         if any(width):
             panel.axes.barh(
-                list(bars), width, left=left, height=0.62, color=SPAN_COLOUR[span], hatch=SPAN_HATCH[span],
-                edgecolor="white", linewidth=0.8, label=span,
-            )  # fmt: skip
+                list(bars),
+                width,
+                left=left,
+                height=0.62,
+                color=SPAN_COLOUR[span],
+                hatch=SPAN_HATCH[span],
+                edgecolor="white",
+                linewidth=0.8,
+                label=span,
+            )
     for row, parts in enumerate(bars.values()):
         total = sum(parts.values())
         panel.axes.text(total + longest * 0.02, row, milliseconds(round(total, 3)), va="center", color=INK)

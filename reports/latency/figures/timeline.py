@@ -84,9 +84,12 @@ def timeline(result: Mapping[str, Any]) -> Picture | None:
                 if stall.longest_ms is not None:
                     panel.axes.annotate(
                         f"{stall.longest_ms:,.0f} ms",
-                        (stall.end_s, stall.longest_ms), (4, 0), textcoords="offset points", va="center",
+                        (stall.end_s, stall.longest_ms),
+                        (4, 0),
+                        textcoords="offset points",
+                        va="center",
                         color=INK,
-                    )  # fmt: skip
+                    )
             panel.legend()
             panels.append(panel)
         return gather(
@@ -105,19 +108,35 @@ def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
     # Unlike dashes keep the two apart where colours are one grey.
     dash = "-" if interface == "rest" else (0, (5, 1.5))
     panel.axes.plot(
-        times, [point["p50_ms"] for point in points], color=colour, linewidth=1.5, linestyle=dash,
+        times,
+        [point["p50_ms"] for point in points],
+        color=colour,
+        linewidth=1.5,
+        linestyle=dash,
         label=f"{interface.upper()} median",
-    )  # fmt: skip
+    )
     panel.axes.plot(
-        times, [point["max_ms"] for point in points], MARK[interface],
-        color=colour, markersize=3, fillstyle="none", markeredgewidth=0.9, label=f"{interface.upper()} longest",
-    )  # fmt: skip
+        times,
+        [point["max_ms"] for point in points],
+        MARK[interface],
+        color=colour,
+        markersize=3,
+        fillstyle="none",
+        markeredgewidth=0.9,
+        label=f"{interface.upper()} longest",
+    )
     failed = [point["t_s"] for point in series["points"] if point["errors"]]
     if failed:
         panel.axes.plot(
-            failed, [0.97] * len(failed), "x", color=colour, markersize=6, markeredgewidth=1.6,
-            transform=panel.axes.get_xaxis_transform(), label=f"{interface.upper()} errors",
-        )  # fmt: skip
+            failed,
+            [0.97] * len(failed),
+            "x",
+            color=colour,
+            markersize=6,
+            markeredgewidth=1.6,
+            transform=panel.axes.get_xaxis_transform(),
+            label=f"{interface.upper()} errors",
+        )
 
 
 def _thinned(points: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

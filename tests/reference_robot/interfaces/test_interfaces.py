@@ -5,10 +5,10 @@ import struct
 import subprocess
 import sys
 import time
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from lxml import etree
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import ComputePathToPose, NavigateToPose
 
@@ -122,8 +122,8 @@ def test_the_actions_are_nav2s():
 @pytest.mark.parametrize("name", ["mybot_delivery_app", "nav2_msgs"])
 def test_a_package_is_what_colcon_expects(name):
     folder = INTERFACES / name
-    manifest = ET.parse(folder / "package.xml").getroot()  # noqa: S314 - our own file
-    assert manifest.get("format") == "3"
+    manifest = etree.parse(folder / "package.xml")
+    assert manifest.getroot().get("format") == "3"
     assert manifest.findtext("name") == name
     assert manifest.findtext("export/build_type") == "ament_cmake"
     assert manifest.findtext("member_of_group") == "rosidl_interface_packages"

@@ -19,10 +19,20 @@ def text(element):
 def test_everything_is_in_it(result):
     shown = text(page(result))
     for wanted in (
-        "Courier 7", "Example Robotics, version 2.4.1", "✗ Not conformant", "2 of 7 claimed classes failed",
-        "RoAAS 0.1.0", "2026-11-20, 22:13 UTC", "3,184 requests", result["suite"]["digest"], result["command"],
-        "3.11.7", "linear_m_s", "0.7", "Without --allow-motion nothing was sent",
-    ):  # fmt: skip
+        "Courier 7",
+        "Example Robotics, version 2.4.1",
+        "✗ Not conformant",
+        "2 of 7 claimed classes failed",
+        "RoAAS 0.1.0",
+        "2026-11-20, 22:13 UTC",
+        "3,184 requests",
+        result["suite"]["digest"],
+        result["command"],
+        "3.11.7",
+        "linear_m_s",
+        "0.7",
+        "Without --allow-motion nothing was sent",
+    ):
         assert wanted in shown, wanted
     for requirement in result["requirements"]:
         assert requirement["text"] in shown

@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
+from hdrh.histogram import HdrHistogram
 from lxml import html
 
 from reports.errors import ResultInvalidError
@@ -107,10 +108,16 @@ def emptied(latency):
     nothing = dict.fromkeys(("mean", "p50", "p90", "p95", "p99", "p999", "max"))
     for series in latency["series"]:
         series.update(
-            count=0, service_ms=nothing, response_ms=nothing, ci95_ms={"p50": None, "p99": None}, histogram="",
-            response_histogram="", spans_ms=dict.fromkeys(("build", "wire", "server", "parse")),
-            response_ci95_ms={"p50": None, "p99": None}, reasons={"p50": "0 samples"},
-        )  # fmt: skip
+            count=0,
+            service_ms=nothing,
+            response_ms=nothing,
+            ci95_ms={"p50": None, "p99": None},
+            histogram="",
+            response_histogram="",
+            spans_ms=dict.fromkeys(("build", "wire", "server", "parse")),
+            response_ci95_ms={"p50": None, "p99": None},
+            reasons={"p50": "0 samples"},
+        )
     for comparison in latency["comparisons"]:
         comparison.update(soap_minus_rest_ms=None, ratio=None, ci95=None, ci95_difference_ms=None, reason="0 samples")
     latency.update(time_series={"width_s": 1.0, "series": []}, steps=[], knee=[], thresholds=[], noise_floor=[])
@@ -174,8 +181,6 @@ def test_negative_and_zero_figures(latency):
 
 
 def test_one_request_in_each_series(latency):
-    from hdrh.histogram import HdrHistogram  # noqa: PLC0415 - this test alone makes one
-
     histogram = HdrHistogram(1, 3_600_000_000, 3)
     histogram.record_value(70)
     latency.update(series=latency["series"][:2], steps=[])

@@ -73,14 +73,28 @@ def seen(tmp_path_factory):
     wrapper.write_text(MEASURE.replace("FRAMES", json.dumps(frames)), encoding="utf-8")
     done = subprocess.run(
         [
-            browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-            "--disable-background-networking", "--disable-component-update", "--disable-sync",
+            browser,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
             # Pages of one folder may look into each other: that is how the wrapper measures.
-            "--allow-file-access-from-files", f"--user-data-dir={folder / 'profile'}", "--window-size=1400,1000",
-            "--virtual-time-budget=20000", "--dump-dom", wrapper.as_uri(),
+            "--allow-file-access-from-files",
+            f"--user-data-dir={folder / 'profile'}",
+            "--window-size=1400,1000",
+            "--virtual-time-budget=20000",
+            "--dump-dom",
+            wrapper.as_uri(),
         ],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
     out = re.search(r'<pre id="out">(\{.*?\})</pre>', done.stdout, re.DOTALL)
     assert out, f"the pages did not load: {done.stderr[-2000:]}"
     return json.loads(out.group(1).replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">"))
