@@ -21,7 +21,7 @@ from loadtests.clients.library import read_document
 from loadtests.clients.payloads import CATALOGUE, VARIANTS
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
-from loadtests.clients.wsdl import WsdlError, address_in, fetch
+from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.settings import Settings, SettingsError, Wishes, settle
 
 OPERATIONS = tuple(CATALOGUE)
@@ -119,25 +119,9 @@ def workload_of(options: Any) -> Workload:
             settings.token,
             settings.timeout_s,
         )
-        addresses = {}
-        documents = {}
-        for name, operation in CATALOGUE.items():
-            location = found.wsdl(name)
-            if location is None:
-                continue
-            known = found.address("soap", name)
-            addresses[operation.service] = known or address_in(fetch(location, found), location, operation.element)
-            documents[name] = read_document(location, found)
-        robot = Robot(
-            found.rest,
-            addresses.get("publishers", found.publishers),
-            addresses.get("subscribers", found.subscribers),
-            found.publishers_wsdl,
-            found.subscribers_wsdl,
-            found.ca_file,
-            found.token,
-            found.timeout_s,
-        )
+        robot = with_addresses(found)
+        locations = {name: robot.wsdl(name) for name in CATALOGUE}
+        documents = {name: read_document(location, robot) for name, location in locations.items() if location}
     except (SettingsError, WsdlError, CallError, EndpointError) as error:
         raise StopTest(f"cannot begin: {error}") from None
     return Workload(robot, OPERATIONS, 1, documents)

@@ -6,12 +6,10 @@ variants, so that no cache on the way answers for the robot.
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from lxml import etree
 
 from loadtests.clients.wire import Request
 
@@ -139,24 +137,3 @@ BUILDERS: dict[str, Callable[[Endpoint, str, Values, str | None], Request]] = {
     "rest": rest_request,
     "soap": soap_request,
 }
-
-
-def differences(operation: str, rest: Request, soap: Request) -> str | None:
-    """Whether two requests, read back from their octets, ask for the same: None, or what differs.
-
-    Doubles are compared bit for bit, after each has been through its own text form.
-    """
-    if CATALOGUE[operation].code is None:
-        return None
-    parts = rest.octets.split(b" ", 2)[1].decode().rsplit("/robot/app/delivery/", 1)[1].split("/")
-    over_rest = {field: float(parts[2 * index + 2]) for index, (_, field) in enumerate(PATH)}
-    over_rest["message_code"] = int(parts[0])
-    body = soap.octets.split(b"\r\n\r\n", 1)[1]
-    argument = etree.fromstring(body, etree.XMLParser(resolve_entities=False, no_network=True)).find(".//arg0")
-    if argument is None:
-        return "the SOAP request carries no arg0"
-    over_soap = {child.tag: float(child.text or "nan") for child in argument}
-    for field in FIELDS:
-        if struct.pack("<d", over_rest[field]) != struct.pack("<d", over_soap.get(field, float("nan"))):
-            return f"{field} is {over_rest[field]!r} over REST and {over_soap.get(field)!r} over SOAP"
-    return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,6 +37,10 @@ class Robot:
     def from_message(cls, message: dict[str, Any]) -> Robot:
         """Read what `dataclasses.asdict` wrote."""
         return cls(**message)
+
+    def at(self, *, publishers: str | None = None, subscribers: str | None = None) -> Robot:
+        """The same robot with the SOAP services' addresses, as far as they are given."""
+        return replace(self, publishers=publishers or self.publishers, subscribers=subscribers or self.subscribers)
 
     @cached_property
     def tls(self) -> Any:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit, urlunsplit
 
 import requests
-from lxml import etree
 
 from loadtests.clients.endpoint import Endpoint, EndpointError
 from loadtests.clients.library import new_session, request_error
-from loadtests.clients.payloads import NAMESPACE
+from loadtests.clients.payloads import CATALOGUE, NAMESPACE
+from loadtests.clients.xml_reader import XmlError, parse_xml
 
 if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
@@ -61,11 +61,10 @@ def address_in(content: bytes, location: str, element: str) -> str:
     """
     if len(content) > _MOST:
         raise WsdlError(f"WSDL {location!r} is longer than {_MOST} octets")
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
-        root = etree.fromstring(content, parser)
-    except etree.XMLSyntaxError as error:
-        raise WsdlError(f"WSDL {location!r} is no XML: {error}") from None
+        root = parse_xml(content)
+    except XmlError as error:
+        raise WsdlError(f"WSDL {location!r} {error}") from None
     if root.tag != f"{{{_WSDL}}}definitions":
         raise WsdlError(f"{location!r} is no WSDL 1.1: its root element is {root.tag!r}")
     offered = {found.get("name") for found in root.iter(f"{{{_WSDL}}}operation")}
@@ -86,6 +85,22 @@ def address_in(content: bytes, location: str, element: str) -> str:
             raise WsdlError(f"WSDL {location!r}: its soap:address cannot be used: {error}") from None
         return _reachable(url, location)
     raise WsdlError(f"WSDL {location!r} holds no soap:address: say where the service is with --…-endpoint URL")
+
+
+def with_addresses(robot: Robot) -> Robot:
+    """The robot with the addresses that only its WSDLs know.
+
+    Raises:
+        WsdlError: a WSDL cannot be used.
+        CallError: nobody answers at a WSDL's URL.
+    """
+    found = {}
+    for name, operation in CATALOGUE.items():
+        location = robot.wsdl(name)
+        if location is None or robot.address("soap", name) is not None or operation.service in found:
+            continue
+        found[operation.service] = address_in(fetch(location, robot), location, operation.element)
+    return robot.at(**found)
 
 
 def _reachable(url: str, location: str) -> str:

@@ -1,7 +1,6 @@
 """Carries a run out, from looking at the robot to the written result."""
 
-# Locust patches the standard library on import, which has to come before anything that uses it.
-import locust  # noqa: F401, I001
+from __future__ import annotations
 
 import logging
 import os
@@ -9,35 +8,34 @@ import signal
 import sys
 import traceback
 from contextlib import ExitStack
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import gevent
+import locust  # patches the standard library, which has to come before our modules that use it
 
 from conformance.contract.exit_codes import ExitCode
-from loadtests.measuring.step_load import step_load
-from loadtests.measuring.executor import Executor, LocalExecutor, busiest
-from loadtests.result.document import RunAborted, Outcome, compose
 from loadtests.clients.failures import CallError
-from loadtests.measuring.errors import GeneratorError
-from loadtests.measuring.distributed_executor import DistributedExecutor
-from loadtests.measuring.metrics import Collector, serve
-from loadtests.schedule.plan import Plan
-from loadtests.measuring.preflight import preflight
-from loadtests.statistics.recorder import Recorder
-from loadtests.result.files import write
 from loadtests.clients.robot import Robot
-from loadtests.settings import Settings
+from loadtests.clients.wsdl import WsdlError, with_addresses
+from loadtests.engine.liveness import Liveness
+from loadtests.engine.planning import duel_plan
+from loadtests.measuring.distributed_executor import DistributedExecutor
+from loadtests.measuring.errors import GeneratorError
+from loadtests.measuring.executor import REPORT_S, Executor, LocalExecutor, busiest
+from loadtests.measuring.metrics import Collector, serve
+from loadtests.measuring.preflight import preflight
+from loadtests.measuring.step_load import step_load
+from loadtests.result.document import compose
+from loadtests.result.files import write
+from loadtests.result.outcome import Outcome, RunAborted
 from loadtests.result.terminal import summary
-from loadtests.clients.wsdl import WsdlError, address_in, fetch
 
-_DEAD_S = 3.0
-_DEAD_REQUESTS = 10
-_LOOK_S = 0.5
-_LEAST_USERS, _MOST_USERS = 32, 512
-_STALL_S = 3.0  # the stall that the users of an open model outlast before arrivals queue for one
+if TYPE_CHECKING:
+    from loadtests.schedule.plan import Plan
+    from loadtests.settings import Settings
+    from loadtests.statistics.recorder import Recorder
 
 
 def tell(message: str) -> None:
@@ -66,9 +64,10 @@ class Run:
             settings.timeout_s,
         )
         self.outcome = Outcome(settings, self.robot, datetime.now(UTC))
+        self.plan, _ = duel_plan(settings, self.robot)  # as far as can be said before the WSDLs are read
         self.collector: Collector | None = None
-        self._alive_at = (0.0, 0)
-        self._told = self._looked = 0.0
+        self._liveness = Liveness(REPORT_S if settings.expect else 0.0)
+        self._told = 0.0
         self._parent = os.getppid()
 
     def interrupt(self) -> None:
@@ -80,27 +79,19 @@ class Run:
     # Before the measurement.
 
     def resolve(self) -> None:
-        """Read the addresses that only a WSDL knows.
+        """Read the addresses that only a WSDL knows, and make the plan.
 
         Raises:
             RunAborted: a WSDL is wrong, or nobody answers.
         """
-        services = {
-            "publishers": ("ExecuteDeliveryRequest", "publishers_wsdl"),
-            "subscribers": ("GetPose", "subscribers_wsdl"),
-        }
-        found: dict[str, Any] = {}
-        for service, (element, description) in services.items():
-            location = getattr(self.robot, description)
-            if getattr(self.robot, service) is not None or location is None:
-                continue
-            try:
-                found[service] = address_in(fetch(location, self.robot), location, element)
-            except WsdlError as error:
-                raise RunAborted(ExitCode.USAGE, str(error)) from None
-            except CallError as error:
-                raise RunAborted(ExitCode.UNREACHABLE, f"the robot cannot be reached: {error}") from None
-        self.robot = self.outcome.robot = replace(self.robot, **found)
+        try:
+            self.robot = self.outcome.robot = with_addresses(self.robot)
+        except WsdlError as error:
+            raise RunAborted(ExitCode.USAGE, str(error)) from None
+        except CallError as error:
+            raise RunAborted(ExitCode.UNREACHABLE, f"the robot cannot be reached: {error}") from None
+        self.plan, notes = duel_plan(self.settings, self.robot)
+        self.outcome.notes += notes
 
     def check(self) -> None:
         """Call everything once.
@@ -108,13 +99,7 @@ class Run:
         Raises:
             RunAborted: the robot does not answer as it should; what it did answer is kept for the result.
         """
-        plan = self.first_plan()
-        names = [
-            (plan.operations[number], interface, client)
-            for client in plan.clients
-            for interface in plan.interfaces
-            for number in plan.offered(interface, client)
-        ]
+        names = self.plan.series_names()
         if not names:
             raise RunAborted(ExitCode.USAGE, "no operation can be measured with these endpoints")
         findings = self.outcome.findings = preflight(self.robot, names, self.settings.seed)
@@ -131,53 +116,6 @@ class Run:
             f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
         ]
 
-    def first_plan(self) -> Plan:
-        """The duel's plan."""
-        settings, robot = self.settings, self.robot
-        interfaces, offers, missing = [], {}, set()
-        for interface in settings.interfaces:
-            for client in settings.clients:
-                numbers = [
-                    number for number, name in enumerate(settings.operations) if robot.offers(interface, client, name)
-                ]
-                missing |= {
-                    f"{name} is not measured over {interface} ({client}): no endpoint or WSDL for it"
-                    for number, name in enumerate(settings.operations)
-                    if number not in numbers
-                }
-                offers[f"{interface}/{client}"] = numbers
-            if any(offers[f"{interface}/{client}"] for client in settings.clients):
-                interfaces.append(interface)
-        clients = tuple(
-            client for client in settings.clients if all(offers[f"{interface}/{client}"] for interface in interfaces)
-        )
-        self.outcome.notes += [note for note in sorted(missing) if note not in self.outcome.notes]
-        workers = max(1, settings.expect)
-        return Plan(
-            operations=settings.operations,
-            interfaces=tuple(interfaces),
-            clients=clients,
-            rate=settings.rate,
-            users=settings.users,
-            duration_s=settings.duration_s,
-            warmup_s=settings.warmup_s,
-            arrivals=settings.arrivals,
-            seed=settings.seed,
-            timeout_s=settings.timeout_s,
-            workers=workers,
-            connections=self.users(workers),
-            offers=offers,
-        )
-
-    def users(self, workers: int) -> int:
-        """How many users come up in all."""
-        settings = self.settings
-        if settings.users is not None and not settings.step_rates:
-            return settings.users
-        rate = max(settings.rate or 0.0, *settings.step_rates, 0.0)
-        each = min(_MOST_USERS, max(_LEAST_USERS, int(rate / workers * _STALL_S)))
-        return each * workers
-
     # The measurement.
 
     def measure(self) -> None:
@@ -186,7 +124,7 @@ class Run:
         Raises:
             RunAborted: the generator cannot work.
         """
-        plan, settings = self.first_plan(), self.settings
+        plan, settings = self.plan, self.settings
         with ExitStack() as stack:
             try:
                 executor = self.outcome.executor = self._executor()
@@ -206,7 +144,6 @@ class Run:
             self._tell_plan(plan, executor)
             self._carry_out(plan, executor)
             self.outcome.cpu_share = busiest(executor)
-            self.outcome.plan = plan
             if settings.step_rates and not self.outcome.interrupted and self.outcome.dead_at is None:
                 self.outcome.steps += step_load(
                     plan, executor, settings, lambda: self.outcome.interrupted, self._number, tell
@@ -237,26 +174,20 @@ class Run:
     def _carry_out(self, plan: Plan, executor: Executor) -> None:
         """Run a plan, watching for its end, Ctrl-C and the robot's death."""
         self._number(plan)
-        self.outcome.plan = plan
-        self._alive_at = (0.0, 0)
         ceiling = self.settings.max_rate if not plan.open_model else None
         executor.run(plan, ceiling, lambda elapsed: self._watch(plan, executor.recorder, elapsed))
 
     def _watch(self, plan: Plan, recorder: Recorder, elapsed: float) -> bool:
         """Whether to end now."""
         self.outcome.elapsed_s = max(0.0, min(elapsed, plan.length_s))
-        if os.getppid() != self._parent:  # whoever started us is aborted
+        if os.getppid() != self._parent:  # whoever started us is gone
             self.outcome.interrupted = True
-        if elapsed - self._looked >= _LOOK_S and self.outcome.dead_at is None:
-            self._looked = elapsed
+        if self.outcome.dead_at is None and self._liveness.is_due(elapsed):
             succeeded = sum(cell.service.total for cell in recorder.cells.values())
             failed = sum(failure.count for failure in recorder.failures.values())
-            since, before = self._alive_at
-            if succeeded > before or failed < _DEAD_REQUESTS:
-                self._alive_at = (elapsed, succeeded)
-            elif elapsed - since > _DEAD_S + (1.0 if self.settings.expect else 0.0):
-                self.outcome.dead_at = since
-                tell(f"no request has succeeded since {since:.1f} s: ending the run")
+            self.outcome.dead_at = self._liveness.dead_since(elapsed, succeeded, failed)
+            if self.outcome.dead_at is not None:
+                tell(f"no request has succeeded since {self.outcome.dead_at:.1f} s: ending the run")
         if elapsed - self._told >= 1.0:
             self._told = elapsed
             done = sum(cell.service.total for cell in recorder.cells.values())
@@ -280,7 +211,7 @@ class Run:
 
 def carry_out(settings: Settings) -> int:
     """Do a run and write its result; returns the exit code."""
-    logging.getLogger("locust").setLevel(logging.ERROR)  # it warns of spawning fast, which is what we want
+    logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of spawning fast, which is what we want
     run = Run(settings)
     for number in (signal.SIGINT, signal.SIGTERM):
         gevent.signal_handler(number, run.interrupt)
@@ -295,7 +226,7 @@ def carry_out(settings: Settings) -> int:
     except Exception as trouble:  # noqa: BLE001 -- our own fault: what was measured is kept, and called invalid
         traceback.print_exc()
         aborted = RunAborted(ExitCode.INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
-    code, document = compose(run.outcome, run.outcome.plan or run.first_plan(), aborted)
+    code, document = compose(run.outcome, run.plan, aborted)
     if aborted is None or aborted.code != ExitCode.USAGE:
         path = write(Path(settings.out), document)
         tell(f"written: {path}")

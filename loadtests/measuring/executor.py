@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 _NS = 1_000_000_000
 LEAD_S = 0.3  # from the message to the plan's beginning
+REPORT_S = 1.0  # how often workers report
 now_ns = time.monotonic_ns
 
 

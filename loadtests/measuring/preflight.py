@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import json
-import struct
-from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import requests
-from lxml import etree
 
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import UNREACHABLE, CallError, answer_error
 from loadtests.clients.library import LibraryRest, LibrarySoap, new_session, read_document
-from loadtests.clients.payloads import FIELDS, NAMESPACE, VARIANTS, differences, variants
+from loadtests.clients.payloads import CATALOGUE, variants
 from loadtests.clients.wire import Answer, Connection
+from loadtests.measuring.equivalence import deliveries_missing, pose_difference, requests_difference
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from loadtests.clients.robot import Robot
     from loadtests.schedule.plan import SeriesName
-
-_PARSER = etree.XMLParser(resolve_entities=False, no_network=True)
-#: Leaves of nav_msgs/Odometry that have to be in both interfaces' answers, in the same number.
-_ODOMETRY = ("frame_id", "child_frame_id", "x", "y", "z", "w", "covariance", "sec")
 
 
 @dataclass
@@ -72,14 +63,30 @@ def preflight(robot: Robot, names: list[SeriesName], seed: int) -> Findings:
             findings.failures[name] = error
             if error.kind in UNREACHABLE or error.kind == "timeout":
                 break  # each further call would wait for the same deadline
-    for operation in dict.fromkeys(name[0] for name in names):
-        _compare_requests(robot, operation, seed, findings)
-    if ("pose", "rest") in answers and ("pose", "soap") in answers:
-        _compare_poses(answers["pose", "rest"], answers["pose", "soap"], findings)
-    for operation in ("delivery", "coffee"):
-        if (operation, "rest") in answers and (operation, "soap") in answers:
-            _compare_received(robot, operation, seed, findings)
+    _compare(robot, answers, list(dict.fromkeys(name[0] for name in names)), seed, findings)
     return findings
+
+
+def _compare(
+    robot: Robot, answers: dict[tuple[str, str], Answer], operations: list[str], seed: int, findings: Findings
+) -> None:
+    """Note how what the interfaces send and get differs."""
+    differences = [
+        requests_difference(name, robot.requests("rest", name, seed), robot.requests("soap", name, seed))
+        for name in operations
+    ]
+    answered = [name for name in operations if (name, "rest") in answers and (name, "soap") in answers]
+    if "pose" in answered:
+        differences.append(pose_difference(answers["pose", "rest"].body, answers["pose", "soap"].body))
+    findings.unequal += [difference for difference in differences if difference]
+    for operation in answered:
+        if CATALOGUE[operation].code is None:
+            continue
+        listed = _listed_deliveries(robot)
+        if listed is None:
+            findings.notes.append("the robot does not list the requests it accepted, so what arrived was not compared")
+        else:
+            findings.unequal += deliveries_missing(listed, operation, variants(operation, seed)[0])
 
 
 def _wire_call(robot: Robot, name: SeriesName, seed: int, findings: Findings) -> Answer:
@@ -120,88 +127,16 @@ def _library_call(robot: Robot, operation: str, interface: str, seed: int) -> No
     client.call(operation, values)
 
 
-def _compare_requests(robot: Robot, operation: str, seed: int, findings: Findings) -> None:
-    """Every variant, read back from the octets that will be sent."""
-    rest, soap = (robot.requests(interface, operation, seed) for interface in ("rest", "soap"))
-    if not rest or not soap:
-        return
-    for number in range(VARIANTS):
-        difference = differences(operation, rest[number], soap[number])
-        if difference:
-            findings.unequal.append(f"{operation}, variant {number}: {difference}")
-            return
-
-
-def _json_leaves(value: Any, name: str = "") -> Iterator[str]:
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            yield from _json_leaves(inner, key)
-    elif isinstance(value, list):
-        for inner in value:
-            yield from _json_leaves(inner, name)
-    else:
-        yield name
-
-
-def _xml_leaves(element: Any) -> Iterator[str]:
-    name = etree.QName(element).localname
-    children = [child for child in element if isinstance(child.tag, str)]
-    if not children:
-        words = (element.text or "").split() if name == "covariance" else [""]
-        yield from [name] * max(1, len(words))
-    for child in children:
-        # An array may be a repeated element, or items inside one: either way its items bear its name.
-        inner = list(_xml_leaves(child))
-        yield from [name if name == "covariance" else leaf for leaf in inner]
-
-
-def _compare_poses(rest: Answer, soap: Answer, findings: Findings) -> None:
-    """Both answers have to carry a whole Odometry: a shorter answer would win the duel by leaving out."""
-    try:
-        over_rest = Counter(_json_leaves(json.loads(rest.body)))
-        found = etree.fromstring(soap.body, _PARSER).find(f".//{{{NAMESPACE}}}GetPoseResponse")
-    except (ValueError, etree.XMLSyntaxError) as error:
-        findings.unequal.append(f"pose: an answer cannot be read: {error}")
-        return
-    over_soap = Counter(_xml_leaves(found)) if found is not None else Counter()
-    for leaf in _ODOMETRY:
-        if over_rest[leaf] != over_soap[leaf]:
-            findings.unequal.append(
-                f"pose: {over_rest[leaf]} values of {leaf!r} over REST and {over_soap[leaf]} over SOAP"
-            )
-            return
-
-
-def _compare_received(robot: Robot, operation: str, seed: int, findings: Findings) -> None:
-    """What the robot says it got over each interface, where it tells (GET /robot/app/delivery/, an extension)."""
-    if robot.rest is None:
-        return
+def _listed_deliveries(robot: Robot) -> list[Any] | None:
+    """What the robot says that it accepted, where it tells (GET /robot/app/delivery/, an extension)."""
     try:
         with new_session(robot) as session:
             answer = session.get(
-                robot.rest.rstrip("/") + "/robot/app/delivery/",
+                (robot.rest or "").rstrip("/") + "/robot/app/delivery/",
                 timeout=robot.timeout_s,
                 headers={"Accept": "application/json"},
             )
         listed = answer.json() if answer.ok else None
     except (requests.RequestException, ValueError):
-        listed = None
-    if not isinstance(listed, list):
-        findings.notes.append("the robot does not list the requests it accepted, so what arrived was not compared")
-        return
-    sent = variants(operation, seed)[0]
-    for interface in ("rest", "soap"):
-        matching = [
-            entry
-            for entry in listed
-            if isinstance(entry, dict) and entry.get("interface") == interface and _same(entry.get("request"), sent)
-        ]
-        if not matching:
-            findings.unequal.append(f"{operation}: the robot does not list the request that was sent over {interface}")
-
-
-def _same(request: Any, sent: dict[str, float]) -> bool:
-    try:
-        return all(struct.pack("<d", float(request[field])) == struct.pack("<d", sent[field]) for field in FIELDS)
-    except (KeyError, TypeError, ValueError):
-        return False
+        return None
+    return listed if isinstance(listed, list) else None

@@ -18,11 +18,10 @@ import gevent
 import locust.runners
 
 from loadtests.clients.robot import Robot
-from loadtests.measuring.executor import boot_id, new_environment, now_ns
+from loadtests.measuring.executor import REPORT_S, boot_id, new_environment, now_ns
 from loadtests.measuring.user_session import Session
 from loadtests.schedule.plan import Plan
 
-REPORT_S = 1.0
 _NS = 1_000_000_000
 
 

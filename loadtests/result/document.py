@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from conformance.contract.exit_codes import ExitCode
 from loadtests.clients.payloads import CATALOGUE
 from loadtests.measuring.environment import describe
-from loadtests.measuring.preflight import Findings
 from loadtests.result.files import FORMAT
 from loadtests.schedule.arrivals import Schedule, arrivals_due
-from loadtests.schedule.plan import GAP_S, Plan, step_operation
+from loadtests.schedule.plan import GAP_S, step_operation
 from loadtests.statistics import figures, steps, verdict
 from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.measuring.executor import Executor
+    from loadtests.measuring.preflight import Findings
+    from loadtests.result.outcome import Outcome, RunAborted
+    from loadtests.schedule.plan import Plan
     from loadtests.settings import Settings
 
 CLIENT_WORDS = {
@@ -26,42 +25,6 @@ CLIENT_WORDS = {
     "each sent once",
     "zeep": "as an ordinary user's program calls: zeep over SOAP, the requests library over REST",
 }
-
-
-class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
-    """A run that ends before it measures."""
-
-    def __init__(self, code: int, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-
-
-@dataclass
-class Outcome:
-    """What became of a run so far.
-
-    Attributes:
-        findings: of the calls before the run.
-        notes: worth knowing; invalid: makes the run worthless.
-        interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
-        plan: the duel's plan, once there is one; elapsed_s: how much of it was carried out.
-        cpu_share: the busiest worker's share of a core in the duel.
-        steps: results of the stepped load.
-    """
-
-    settings: Settings
-    robot: Robot
-    started: datetime
-    findings: Findings = field(default_factory=Findings)
-    notes: list[str] = field(default_factory=list)
-    invalid: list[str] = field(default_factory=list)
-    interrupted: bool = False
-    dead_at: float | None = None
-    executor: Executor | None = None
-    plan: Plan | None = None
-    elapsed_s: float = 0.0
-    cpu_share: float | None = None
-    steps: list[dict[str, Any]] = field(default_factory=list)
 
 
 def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[int, dict[str, Any]]:

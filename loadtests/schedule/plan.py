@@ -101,6 +101,15 @@ class Plan:
         found = self.offers.get(f"{interface}/{client}")
         return tuple(range(len(self.operations))) if found is None else tuple(found)
 
+    def series_names(self) -> list[SeriesName]:
+        """Everything that is measured."""
+        return [
+            (self.operations[number], interface, client)
+            for client in self.clients
+            for interface in self.interfaces
+            for number in self.offered(interface, client)
+        ]
+
     @property
     def open_model(self) -> bool:
         """Requests start at their times, whether or not earlier ones have come back."""

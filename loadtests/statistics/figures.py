@@ -95,20 +95,11 @@ class Measured:
         key = (SERIES.index((phase, interface, client)), self.plan.operations.index(operation))
         return self.recorder.spans.get(key, Spans())
 
-    def names(self) -> list[SeriesName]:
-        """All series of the plan."""
-        return [
-            (self.plan.operations[number], interface, client)
-            for client in self.plan.clients
-            for interface in self.plan.interfaces
-            for number in self.plan.offered(interface, client)
-        ]
-
 
 def series(measured: Measured, sizes: dict[SeriesName, tuple[int, int]]) -> list[dict[str, Any]]:
     """The `series` of latency.json; `sizes` are octets of request and response, as seen before the run."""
     found = []
-    for name in measured.names():
+    for name in measured.plan.series_names():
         whole = measured.total("duel", name)
         spans = measured.spans("duel", name)
         service, reasons = quantiles(whole.service)
@@ -155,7 +146,7 @@ def _interval_of(blocks: list[Cell], time: str, quantile: str, seed: int) -> tup
 def comparisons(measured: Measured) -> list[dict[str, Any]]:
     """SOAP against REST, by operation, client and quantile, over the service time."""
     found: list[dict[str, Any]] = []
-    names = set(measured.names())
+    names = set(measured.plan.series_names())
     for operation in measured.plan.operations:
         for client in measured.plan.clients:
             sides = [(operation, interface, client) for interface in ("rest", "soap")]
@@ -215,7 +206,7 @@ def time_series(measured: Measured) -> dict[str, Any]:
     """Each series second by second (or block by block, where blocks are longer), by intended start."""
     width = max(WIDTH_S, measured.plan.block_s)
     found = []
-    for operation, interface, client in measured.names():
+    for operation, interface, client in measured.plan.series_names():
         number = measured.plan.operations.index(operation)
         seconds: dict[int, Cell] = defaultdict(Cell)
         for index, segment in enumerate(measured.plan.segments):

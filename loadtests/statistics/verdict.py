@@ -36,7 +36,7 @@ def generator_figures(measured: Measured, asked: int, elapsed_s: float, cpu_shar
     plan, recorder = measured.plan, measured.recorder
     lag, wire = Histogram(), "wire" in plan.clients
     completed = errors = late = dropped = 0
-    for name in measured.names():
+    for name in measured.plan.series_names():
         for phase in ("duel", "aa"):
             cell = measured.total(phase, name)
             completed += cell.service.total
@@ -117,7 +117,7 @@ def judge(measured: Measured, thresholds: Iterable[Threshold]) -> list[dict[str,
             "reason": None,
         }
         name = (threshold.operation, threshold.interface, threshold.client)
-        if name not in measured.names():
+        if name not in measured.plan.series_names():
             entry["reason"] = "not measured in this run"
             found.append(entry)
             continue

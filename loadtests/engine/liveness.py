@@ -1,0 +1,33 @@
+"""When a robot counts as dead: nothing has succeeded for seconds, though much was tried."""
+
+from __future__ import annotations
+
+_DEAD_S = 3.0
+_DEAD_REQUESTS = 10
+_LOOK_S = 0.5
+
+
+class Liveness:
+    """Judges by what a run has counted so far.
+
+    Args:
+        report_s: how late the counts may be, in seconds: workers report once a second.
+    """
+
+    def __init__(self, report_s: float) -> None:
+        self._silence_s = _DEAD_S + report_s
+        self._looked_s = 0.0
+        self._alive = (0.0, 0)  # when something had last succeeded, and how much in all
+
+    def is_due(self, elapsed_s: float) -> bool:
+        """Whether it is time to look; counting costs the generator something."""
+        return elapsed_s - self._looked_s >= _LOOK_S
+
+    def dead_since(self, elapsed_s: float, succeeded: int, failed: int) -> float | None:
+        """Since when the robot is silent, in seconds from the start; None while it is not, or not for long enough."""
+        self._looked_s = elapsed_s
+        since, before = self._alive
+        if succeeded > before or failed < _DEAD_REQUESTS:
+            self._alive = (elapsed_s, succeeded)
+            return None
+        return since if elapsed_s - since > self._silence_s else None

@@ -1,0 +1,114 @@
+"""Do both interfaces carry the same? Judgements on octets sent and answers received; nothing here talks to a robot."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from lxml import etree
+
+from loadtests.clients.payloads import CATALOGUE, FIELDS, NAMESPACE, PATH, Values
+from loadtests.clients.xml_reader import XmlError, parse_xml
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from loadtests.clients.wire import Request
+
+#: Leaves of nav_msgs/Odometry that have to be in both interfaces' answers, in the same number.
+_ODOMETRY = ("frame_id", "child_frame_id", "x", "y", "z", "w", "covariance", "sec")
+
+
+def request_difference(operation: str, rest: Request, soap: Request) -> str | None:
+    """Whether two requests, read back from their octets, ask for the same: None, or what differs.
+
+    Doubles are compared bit for bit, after each has been through its own text form.
+    """
+    if CATALOGUE[operation].code is None:
+        return None
+    parts = rest.octets.split(b" ", 2)[1].decode().rsplit("/robot/app/delivery/", 1)[1].split("/")
+    over_rest = {field: float(parts[2 * index + 2]) for index, (_, field) in enumerate(PATH)}
+    over_rest["message_code"] = int(parts[0])
+    argument = parse_xml(soap.octets.split(b"\r\n\r\n", 1)[1]).find(".//arg0")
+    if argument is None:
+        return "the SOAP request carries no arg0"
+    over_soap = {child.tag: float(child.text or "nan") for child in argument}
+    for field in FIELDS:
+        if not _same_double(over_rest[field], over_soap.get(field, float("nan"))):
+            return f"{field} is {over_rest[field]!r} over REST and {over_soap.get(field)!r} over SOAP"
+    return None
+
+
+def requests_difference(operation: str, rest: Sequence[Request], soap: Sequence[Request]) -> str | None:
+    """The first variant in which the interfaces' requests differ; None too where an interface has none."""
+    if not rest or not soap:
+        return None
+    for number, (over_rest, over_soap) in enumerate(zip(rest, soap, strict=True)):
+        difference = request_difference(operation, over_rest, over_soap)
+        if difference:
+            return f"{operation}, variant {number}: {difference}"
+    return None
+
+
+def pose_difference(rest: bytes, soap: bytes) -> str | None:
+    """Both answers have to carry a whole Odometry: a shorter one would win the duel by leaving out."""
+    try:
+        over_rest = Counter(_json_leaves(json.loads(rest)))
+        found = parse_xml(soap).find(f".//{{{NAMESPACE}}}GetPoseResponse")
+    except XmlError as error:
+        return f"pose: an answer cannot be read: it {error}"
+    except ValueError as error:
+        return f"pose: an answer cannot be read: {error}"
+    over_soap = Counter(_xml_leaves(found)) if found is not None else Counter()
+    for leaf in _ODOMETRY:
+        if over_rest[leaf] != over_soap[leaf]:
+            return f"pose: {over_rest[leaf]} values of {leaf!r} over REST and {over_soap[leaf]} over SOAP"
+    return None
+
+
+def deliveries_missing(listed: list[Any], operation: str, sent: Values) -> list[str]:
+    """What was sent and is not in the robot's own list of the requests that it accepted."""
+    return [
+        f"{operation}: the robot does not list the request that was sent over {interface}"
+        for interface in ("rest", "soap")
+        if not any(
+            isinstance(entry, dict) and entry.get("interface") == interface and _is_request(entry.get("request"), sent)
+            for entry in listed
+        )
+    ]
+
+
+def _json_leaves(value: Any, name: str = "") -> Iterator[str]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _json_leaves(inner, key)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _json_leaves(inner, name)
+    else:
+        yield name
+
+
+def _xml_leaves(element: Any) -> Iterator[str]:
+    name = etree.QName(element).localname
+    children = [child for child in element if isinstance(child.tag, str)]
+    if not children:
+        words = (element.text or "").split() if name == "covariance" else [""]
+        yield from [name] * max(1, len(words))
+    for child in children:
+        # An array may be a repeated element, or items inside one: either way its items bear its name.
+        inner = list(_xml_leaves(child))
+        yield from [name if name == "covariance" else leaf for leaf in inner]
+
+
+def _is_request(listed: Any, sent: Values) -> bool:
+    try:
+        return all(_same_double(float(listed[field]), sent[field]) for field in FIELDS)
+    except (KeyError, TypeError, ValueError):
+        return False
+
+
+def _same_double(one: float, other: float) -> bool:
+    return struct.pack("<d", one) == struct.pack("<d", other)

@@ -1,0 +1,50 @@
+"""What became of a run, as it goes along: the document is made of it in the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from loadtests.measuring.preflight import Findings
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from loadtests.clients.robot import Robot
+    from loadtests.measuring.executor import Executor
+    from loadtests.settings import Settings
+
+
+class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
+    """A run that ends before it measures."""
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+@dataclass
+class Outcome:
+    """What became of a run so far.
+
+    Attributes:
+        findings: of the calls before the run.
+        notes: worth knowing; invalid: makes the run worthless.
+        interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
+        elapsed_s: how much of the plan was carried out.
+        cpu_share: the busiest worker's share of a core in the duel.
+        steps: results of the stepped load.
+    """
+
+    settings: Settings
+    robot: Robot
+    started: datetime
+    findings: Findings = field(default_factory=Findings)
+    notes: list[str] = field(default_factory=list)
+    invalid: list[str] = field(default_factory=list)
+    interrupted: bool = False
+    dead_at: float | None = None
+    executor: Executor | None = None
+    elapsed_s: float = 0.0
+    cpu_share: float | None = None
+    steps: list[dict[str, Any]] = field(default_factory=list)
