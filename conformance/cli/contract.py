@@ -46,7 +46,7 @@ def list_(class_: str | None, level: str | None, *, as_json: bool) -> None:
 @click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
 @click.option("--force", is_flag=True, help="Overwrite files that are there.")
 def export(directory: Path, *, force: bool) -> None:
-    """Write the contract's files to DIR: OpenAPI, WSDLs and XSDs, WADL and the ledger."""
+    """Write the contract's files to DIR: its text, OpenAPI, WSDLs and XSDs, WADL and the ledger."""
     there = [name for name in CONTRACT_FILES if (directory / name).exists()]
     if there and not force:
         raise click.UsageError(f"{directory / there[0]} exists already; --force overwrites it")

@@ -11,11 +11,13 @@ from typing import Any
 import yaml
 
 from conformance.contract.ledger import LedgerError, Requirement, load_ledger
+from conformance.contract.sections import TEXT_NAME
 
 CONTRACT_DIR = Path(__file__).parent
-CONTRACT_VERSION = "1.0"
+CONTRACT_VERSION = "1.1"
 # Everything that makes up the contract, and so goes into `roaas contract export` and the suite's digest.
 CONTRACT_FILES = (
+    TEXT_NAME,
     "openapi.yaml",
     "publishers.wsdl",
     "publishers.xsd",

@@ -27,7 +27,8 @@ class Requirement:
         class_: the conformance class that it is in.
         level: how binding it is.
         text: one sentence.
-        source: paper section, contract page, RFC clause or WS-I id.
+        source: section of contract.md (``contract.md#goals``), file of the contract, paper section, RFC clause or
+            WS-I id; several are separated by "; ".
         needs: what a run must have to judge it beside the interface.
         own: whether it speaks of RoAAS's own resources.
         untestable: why no check can judge it, or None.

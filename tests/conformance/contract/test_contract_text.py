@@ -1,0 +1,58 @@
+"""Requirements cite sections of the contract's text that exist, and no section of it is left out."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from conformance.contract.classes import CLASSES
+from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION, Contract
+from conformance.contract.limits import DeclaredLimits
+from conformance.contract.sections import anchor_of, cited_in, sections_of
+
+TEXT = (CONTRACT_DIR / "contract.md").read_text(encoding="utf-8")
+SECTIONS = sections_of(TEXT)
+LEDGER = Contract.load().ledger
+# What binds no robot by itself: what a vendor says, and how is judged.
+_ABOUT_JUDGING = {"classes", "levels-and-origins", "statement", "judging-by-windows", "what-changed"}
+# New in 1.1; the ledger has no requirement yet.
+_NOT_YET_JUDGED = {"several-clients"}
+
+
+@pytest.mark.parametrize(
+    ("title", "anchor"),
+    [("Goals", "goals"), ("ROS side", "ros-side"), ("What? `a/b`, and_c", "what-ab-and_c")],
+)
+def test_an_anchor_is_githubs(title, anchor):
+    assert anchor_of(title) == anchor
+
+
+def test_no_two_sections_have_one_anchor():
+    assert len(SECTIONS) == len(re.findall(r"^#+ ", TEXT, re.MULTILINE))
+
+
+def test_every_section_that_is_cited_exists():
+    for item in LEDGER.values():
+        missing = cited_in([item.source]) - set(SECTIONS)
+        assert not missing, (item.id, missing)
+        named = re.findall(r"[\w-]+\.(?:yaml|xsd|wsdl|wadl|md)", item.source)
+        assert all((CONTRACT_DIR / name).is_file() for name in named), item.id
+        assert "contract," not in item.source, (item.id, "cites no section")
+        assert item.source.count("contract.md") == len(cited_in([item.source])), item.id
+    inside = set(re.findall(r"\]\(#([\w-]+)\)", TEXT))
+    assert inside <= set(SECTIONS)
+
+
+def test_every_section_is_cited():
+    filled = {anchor for anchor, section in SECTIONS.items() if section.text} - {next(iter(SECTIONS))}
+    assert filled - cited_in(item.source for item in LEDGER.values()) == _ABOUT_JUDGING | _NOT_YET_JUDGED
+
+
+def test_the_text_agrees_with_what_judges():
+    assert f"Version {CONTRACT_VERSION}." in TEXT
+    assert Contract.load().openapi["info"]["version"] == CONTRACT_VERSION
+    assert all(f"| `{name}` |" in SECTIONS["classes"].text for name in CLASSES)
+    silent = DeclaredLimits().resolved()
+    assert "limits of 0.7 m/s and 2.5 rad/s" in SECTIONS["statement"].text.replace("\n", " ")
+    assert (silent.linear_m_s, silent.angular_rad_s, silent.settle_s) == (0.7 / 2, 2.5 / 2, 2.0)
