@@ -10,9 +10,9 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from reference_robot.names import NamesError
+from conformance.contract.toml_file import TomlFileError
 from reference_robot.simulated import SimulatedRobot, SimulationError
-from reference_robot.webservices.configuration import ConfigurationError, load_configuration
+from reference_robot.webservices.configuration import load_configuration
 from reference_robot.webservices.endpoint import PortInUseError
 from reference_robot.webservices.http.authorization import Authorization, TokenFileError, read_token
 from reference_robot.webservices.runner import (
@@ -75,7 +75,7 @@ def run(options: Options) -> None:
         runner = RobotWebServiceNodesRunner(configuration, listening, options.domain_id)
         with contextlib.suppress(_Stopped), _stopped_by_signals(), _simulation(options):
             runner.run(ready, wait_for_robot=not options.attach)
-    except (NamesError, ConfigurationError, TokenFileError, PortInUseError) as error:
+    except (TomlFileError, TokenFileError, PortInUseError) as error:
         raise UnusableError(error) from error
     except (SimulationError, RobotNotFoundError) as error:
         raise RobotLostError(error) from error

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import click
 
-from reference_robot.names import NamesError, load_names
+from conformance.contract.toml_file import TomlFileError
+from reference_robot.names import load_names
 from reference_robot.ros import RosRuntime
 from reference_robot.simulation.runner import Simulation
 
@@ -29,7 +30,7 @@ def main(domain_id: int | None, time_scale: float, names_file: Path | None) -> N
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     try:
         names = load_names(names_file)
-    except NamesError as error:
+    except TomlFileError as error:
         raise click.UsageError(str(error)) from error
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

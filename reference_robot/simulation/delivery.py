@@ -21,7 +21,11 @@ from std_msgs.msg import Header, String
 
 from reference_robot.names import RosNames
 from reference_robot.simulation.messages import LATCHED, stamped_pose
-from reference_robot.simulation.missions import COFFEE, COURIER, DeliveryRequest, Missions, MissionState
+from reference_robot.simulation.missions import DeliveryRequest, Missions, MissionState
+
+_CODES: Final = frozenset(
+    {DeliveryRequestMsg.COURIER_DELIVERY_MESSAGE_CODE, DeliveryRequestMsg.COFFEE_DELIVERY_MESSAGE_CODE}
+)
 
 _REPORT_PERIOD_S: Final = 0.05  # at least this between two reports, however fast requests come
 _RETRY_PERIOD_S: Final = 0.2  # while navigation's action server is not there
@@ -61,7 +65,7 @@ class Delivery:
         node.create_subscription(DeliveryRequestMsg, names.topics.delivery, self._take, _REQUESTS)
 
     def _take(self, message: DeliveryRequestMsg) -> None:
-        if message.message_code not in {COURIER, COFFEE}:
+        if message.message_code not in _CODES:
             self._node.get_logger().info(
                 f"ignored a request with the unknown message code {message.message_code}",
                 throttle_duration_sec=1.0,

@@ -9,9 +9,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
 
-COURIER: Final = 3  # COURIER_DELIVERY_MESSAGE_CODE
-COFFEE: Final = 4  # COFFEE_DELIVERY_MESSAGE_CODE
-
 _REMEMBERED: Final = 100
 
 

@@ -72,7 +72,7 @@ def interfaces(
         authorization: Who may call.
     """
     publishers, subscribers, calls = ros.publishers, ros.subscribers, ros.calls
-    frames = configuration.names.frames
+    frames = configuration.frames
     goals = Goals(publishers, subscribers, calls, frames)
     odometry = LatestOdometry(subscribers)
     velocity = Velocity(publishers, odometry, configuration.web, goals.is_active)

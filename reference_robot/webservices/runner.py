@@ -71,27 +71,25 @@ class RobotWebServiceNodesRunner:
             PortInUseError: A port cannot be had.
             RobotNotFoundError: ``wait_for_robot``, and none came in time.
         """
+        configuration = self._configuration
         _raise_descriptor_limit()
         # Fast DDS then sends from a thread of its own, which saves a delivery PUT a quarter of its time; nothing is
         # lost, because the publisher keeps all that has not been acknowledged. Other middleware ignores it.
         os.environ.setdefault("RMW_FASTRTPS_PUBLICATION_MODE", "ASYNCHRONOUS")
         with self._sockets() as (rest, soap), RosRuntime(self._domain_id) as ros:
             endpoints = Endpoints(self._listening.host, rest.getsockname()[1], soap.getsockname()[1])
-            names = self._configuration.names
-            publishers, subscribers = RobotPublishersNode(ros, names), RobotSubscribersNode(ros, names)
+            publishers, subscribers = RobotPublishersNode(ros, configuration), RobotSubscribersNode(ros, configuration)
             ros.start()
             if wait_for_robot:
                 _await_robot(publishers, subscribers)
-            calls = RosCalls(publishers.node.executor, self._configuration.web.deadline)
+            calls = RosCalls(publishers.node.executor, configuration.web.deadline)
             pair = interfaces(
                 RosSide(publishers, subscribers, calls),
-                self._configuration,
+                configuration,
                 endpoints,
                 self._listening.authorization,
             )
-            publisher = EndpointPublisher(
-                list(zip(pair, (rest, soap), strict=True)), self._configuration.web.read_deadline
-            )
+            publisher = EndpointPublisher(list(zip(pair, (rest, soap), strict=True)), configuration.web.read_deadline)
             uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
 
     @contextlib.contextmanager

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from reference_robot.names import RosNames
     from reference_robot.ros import RosRuntime
 
-COURIER_DELIVERY_MESSAGE_CODE: Final = 3
-COFFEE_DELIVERY_MESSAGE_CODE: Final = 4
-
 # Each accepted request is exactly one message (contract, ROS side): nothing gives way before it is acknowledged.
 _DELIVERY_QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 _VELOCITY_QOS: Final = QoSProfile(depth=100)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from mybot_delivery_app.msg import DeliveryRequestMsg
 
-from reference_robot.webservices.nodes.publishers import COFFEE_DELIVERY_MESSAGE_CODE, COURIER_DELIVERY_MESSAGE_CODE
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
@@ -18,7 +17,8 @@ if TYPE_CHECKING:
     from reference_robot.webservices.nodes.publishers import RobotPublishersNode
     from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
-_CODES: Final = frozenset({COURIER_DELIVERY_MESSAGE_CODE, COFFEE_DELIVERY_MESSAGE_CODE})
+COFFEE: Final[int] = DeliveryRequestMsg.COFFEE_DELIVERY_MESSAGE_CODE
+_CODES: Final = frozenset({DeliveryRequestMsg.COURIER_DELIVERY_MESSAGE_CODE, COFFEE})
 _REMEMBERED: Final = 100  # the contract asks for the last 50
 _STATES: Final = frozenset({"queued", "active", "done", "failed", "dropped"})
 _NANOSECONDS: Final = 10**9

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from reference_robot.webservices.nodes.publishers import COFFEE_DELIVERY_MESSAGE_CODE
-from reference_robot.webservices.robot.deliveries import Deliveries, DeliveryRequest, UnusableFieldError
+from reference_robot.webservices.robot.deliveries import COFFEE, Deliveries, DeliveryRequest, UnusableFieldError
 from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.faults import SOAP, client_fault
 from reference_robot.webservices.soap.service import SoapService
@@ -44,7 +43,7 @@ class PublishersWebService(SoapService):
         return self._done["ExecuteDeliveryRequest"]
 
     def _execute_coffee(self, wrapper: etree._Element) -> bytes:
-        self._accept(wrapper, COFFEE_DELIVERY_MESSAGE_CODE)
+        self._accept(wrapper, COFFEE)
         return self._done["ExecuteCoffeeRequest"]
 
     def _accept(self, wrapper: etree._Element, code: int | None = None) -> None:

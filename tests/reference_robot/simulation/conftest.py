@@ -1,9 +1,8 @@
 """A simulated robot on a domain of its own, and an observer on the same graph."""
 
-from dataclasses import replace
-
 import pytest
 from action_msgs.msg import GoalStatus
+from msgspec.structs import replace
 from observer import Observer, until
 
 from reference_robot.names import RosNames, Velocity
