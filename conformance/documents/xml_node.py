@@ -36,6 +36,14 @@ class Node:
         """Local name."""
         return local(self.tag)
 
+    def path_to(self, name: str) -> tuple[int, ...]:
+        """The path of the first descendant of a local name.
+
+        Raises:
+            StopIteration: there is none.
+        """
+        return next(path for path in self.paths() if self.at(path).name == name)
+
     def at(self, path: tuple[int, ...]) -> Node:
         """The descendant at a path of child positions."""
         return self.children[path[0]].at(path[1:]) if path else self

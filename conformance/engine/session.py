@@ -89,6 +89,7 @@ class Session:
             OSError: the CA file cannot be used.
         """
         # Imported late: zeep, lxml and xmlschema cost a third of a second that --help need not pay.
+        from conformance.robot.soap_services import known_messages  # noqa: PLC0415
         from conformance.soap.discovery import open_service  # noqa: PLC0415
 
         where = self.statement.endpoints
@@ -100,7 +101,7 @@ class Session:
             ("subscribers", where.subscribers_wsdl, where.subscribers_endpoint, self.contract.subscribers_path),
         ):
             if wsdl or endpoint:
-                service = open_service(name, wsdl, endpoint, self.connection, path)
+                service = open_service(name, wsdl, endpoint, self.connection, path, known_messages)
                 setattr(self, name, service)
                 self._look(name, service.client, service.path)
 

@@ -1,62 +1,81 @@
-"""The robot's SOAP services as the checks of its domain ask them: deliveries are sent, states read as JSON."""
+"""The robot's SOAP services as its checks use them: deliveries are sent, states are asked for."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
-from xml.sax.saxutils import escape
+from typing import TYPE_CHECKING
 
 from conformance.documents.xml import elements
 from conformance.documents.xml_names import local
 from conformance.robot.delivery import COFFEE, Delivery
-from conformance.soap.envelope import Envelope, read_answer
+from conformance.robot.delivery_messages import NAMESPACE, delivery, request
+from conformance.soap.calls import call, read_exchange
+from conformance.soap.content import number_at
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lxml import etree
 
+    from conformance.documents.wsdl import Operation
+    from conformance.documents.xml_node import Node
     from conformance.soap.service import SoapService
     from conformance.transport.exchange import Exchange
 
-_ENVELOPE: Final = "http://schemas.xmlsoap.org/soap/envelope/"
-_NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
-# In the order of the contract's XSD.
-_SEQUENCE: Final = ("depot_x", "depot_y", "destination_x", "destination_y", "message_code", "source_x", "source_y")
+# Where a robot may have a plan to, seen from where it is, m.
+_NEAR = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5))
 
 
-def message(operation: str, content: str = "") -> bytes:
-    """A request of an operation, with its children as XML."""
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>'
-        f'<s:Envelope xmlns:s="{_ENVELOPE}" xmlns:t="{_NAMESPACE}"><s:Body>'
-        f"<t:{operation}>{content}</t:{operation}></s:Body></s:Envelope>"
-    ).encode()
-
-
-def send_delivery(publishers: SoapService, delivery: Delivery, *, coffee: bool = False) -> Exchange:
+def send_delivery(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Exchange:
     """Send a delivery once, on a connection of its own so that nothing is sent again.
 
     Args:
         publishers: the service.
-        delivery: its values.
+        values: of the delivery.
         coffee: by ExecuteCoffeeRequest, which knows the code by itself.
     """
-    values = delivery._asdict() | ({"message_code": COFFEE} if coffee else {})
-    children = "".join(f"<{name}>{values[name]!r}</{name}>" for name in _SEQUENCE)
     operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
-    return publishers.post(message(operation, f"<arg0>{children}</arg0>"), fresh=True)
+    given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
+    return call(publishers, request(operation, **given), fresh=True).exchange
 
 
 def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> Exchange:
-    """Ask the subscribers service; parameters in the order of the contract's XSD."""
-    content = "".join(
-        f"<{name}>{escape(value) if isinstance(value, str) else repr(float(value))}</{name}>"
-        for name, value in parameters.items()
-    )
-    return subscribers.post(message(operation, content))
+    """Ask the subscribers service."""
+    return call(subscribers, request(operation, **parameters)).exchange
 
 
 def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
     """The ``return`` elements of a response, and what is wrong where it is none."""
-    read: Envelope | None = read_answer(exchange)
-    if not exchange.response.ok or read is None or read.first is None or read.fault:
+    answer = read_exchange(exchange)
+    if not answer.accepted or answer.first is None:
         return [], f"no SOAP response: {exchange.came}"
-    return [child for child in elements(read.first) if local(str(child.tag)) == "return"], ""
+    return [child for child in elements(answer.first) if local(str(child.tag)) == "return"], ""
+
+
+def position(subscribers: SoapService) -> tuple[float, float] | None:
+    """Where GetPose says that the robot is, in its odometry frame, m; None where it does not say.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    answer = call(subscribers, request("GetPose"))
+    if not answer.accepted or answer.first is None:
+        return None
+    x, y = (number_at(answer.first, "pose", "pose", "position", axis) for axis in "xy")
+    return None if x is None or y is None else (x, y)
+
+
+def known_messages(service: SoapService, operation: Operation) -> Iterator[Node]:
+    """Messages that a robot takes, likeliest first; none for operations that need none but the obvious.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    if service.contract.target_namespace != NAMESPACE:
+        return
+    if operation.name in {"ExecuteCoffeeRequest", "ExecuteDeliveryRequest"}:
+        yield delivery(operation.name)
+    elif operation.name == "GetPlan":
+        here = position(service)
+        if here is not None:
+            for east, north in _NEAR:
+                yield request("GetPlan", x=here[0] + east, y=here[1] + north)

@@ -90,8 +90,8 @@ class Siege:
                 answer.fault is not None or answer.status >= _REFUSED,
                 exchange,
                 refusal,
-                found=answer.told,
-                cause=f"{attack.name} taken" if answer.taken else "",
+                found=answer.describe(),
+                cause=f"{attack.name} taken" if answer.accepted else "",
             )
 
     def _well(self, attack: Attack, attempt: Attempt) -> None:

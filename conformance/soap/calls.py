@@ -1,4 +1,4 @@
-"""Asking a service, and what an answer comes to: taken, refused, or neither."""
+"""Calling a service, and what its response comes to: accepted, refused, or neither."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from conformance.documents.xml_node import Node
 from conformance.soap.envelope import Envelope, Fault, NotSoapError, envelope, read
 
 if TYPE_CHECKING:
+    from lxml import etree
+
     from conformance.soap.service import SoapService
     from conformance.transport.exchange import Exchange
 
@@ -16,7 +18,7 @@ _SHOWN = 200
 
 
 @dataclass(frozen=True)
-class Answer:
+class SoapResponse:
     """What a service answered.
 
     Attributes:
@@ -50,8 +52,8 @@ class Answer:
         return 200 <= self.status < 300 and self.fault is None  # noqa: PLR2004 - RFC 9110 15.3
 
     @property
-    def taken(self) -> bool:
-        """Whether the request was accepted: success, told by a message. A page in its place is none."""
+    def accepted(self) -> bool:
+        """Whether the request was accepted: success, said by a message. A page in its place says nothing."""
         return self.succeeded and self.envelope is not None
 
     @property
@@ -60,13 +62,16 @@ class Answer:
         return self.fault is not None or 400 <= self.status < 500  # noqa: PLR2004 - RFC 9110 15.5
 
     @property
-    def payload(self) -> str | None:
-        """Tag of the first child of the response's Body; None without one."""
-        first = self.envelope.first if self.envelope else None
-        return None if first is None else str(first.tag)
+    def first(self) -> etree._Element | None:
+        """The first child of the response's Body; None without one."""
+        return self.envelope.first if self.envelope else None
 
     @property
-    def told(self) -> str:
+    def payload(self) -> str | None:
+        """The tag of that child; None without one."""
+        return None if self.first is None else str(self.first.tag)
+
+    def describe(self) -> str:
         """What came, in words for a finding."""
         came = f"status {self.status}"
         if self.fault is not None:
@@ -76,21 +81,21 @@ class Answer:
         return f"{came}, {self.payload or 'an empty Body'}"
 
 
-def read_exchange(exchange: Exchange) -> Answer:
+def read_exchange(exchange: Exchange) -> SoapResponse:
     """What an exchange comes to."""
     if not exchange.response.body:
-        return Answer(exchange, None, "an empty body")
+        return SoapResponse(exchange, None, "an empty body")
     try:
-        return Answer(exchange, read(exchange.response.body), "")
+        return SoapResponse(exchange, read(exchange.response.body), "")
     except NotSoapError as error:
-        return Answer(exchange, None, str(error))
+        return SoapResponse(exchange, None, str(error))
 
 
-def ask(service: SoapService, message: Node | bytes | str, **how: Any) -> Answer:
+def send(service: SoapService, message: Node | bytes | str, **how: Any) -> SoapResponse:
     """Send a message and read the answer.
 
     Args:
-        service: whom to ask.
+        service: whom to send to.
         message: an Envelope as a node, or a document as it is.
         how: as SoapService.post().
 
@@ -104,10 +109,10 @@ def ask(service: SoapService, message: Node | bytes | str, **how: Any) -> Answer
     return read_exchange(service.post(message, **how))
 
 
-def call(service: SoapService, *payload: Node, headers: tuple[Node, ...] | None = None, **how: Any) -> Answer:
-    """Ask with an envelope of the given children of Body and Header.
+def call(service: SoapService, *payload: Node, headers: tuple[Node, ...] | None = None, **how: Any) -> SoapResponse:
+    """Send an envelope of the given children of Body and Header.
 
     Raises:
         NoAnswerError: no HTTP response came.
     """
-    return ask(service, envelope(payload, headers), **how)
+    return send(service, envelope(payload, headers), **how)

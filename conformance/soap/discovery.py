@@ -14,6 +14,7 @@ from conformance.transport.exchange import NoAnswerError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from conformance.soap.service import KnownMessages
     from conformance.transport.client import Connection
 
 # How long the address in a WSDL is given to answer before the WSDL's own is taken instead, s.
@@ -21,7 +22,12 @@ _PROBE_S = 3.0
 
 
 def open_service(
-    name: str, wsdl: str | None, endpoint: str | None, connection: Connection, contract_wsdl_path: Path | None
+    name: str,
+    wsdl: str | None,
+    endpoint: str | None,
+    connection: Connection,
+    contract_wsdl_path: Path | None,
+    known_messages: KnownMessages = lambda _service, _operation: (),
 ) -> SoapService:
     """Find out where a service is. Whatever the robot answers, there is a service to send to afterwards.
 
@@ -34,6 +40,7 @@ def open_service(
         endpoint: URL of the service.
         connection: deadline, credentials, ceiling and listeners.
         contract_wsdl_path: the contract's WSDL of this service.
+        known_messages: messages that a robot of this contract is likely to take.
 
     Raises:
         StatementError: what was given names no place: no HTTP URL, a file that cannot be read, or one that names no
@@ -49,7 +56,7 @@ def open_service(
             f"{name}: {wsdl} has no soap:address with an http URL; say where the service is with --{name}-endpoint"
         )
     base, path = split(where)
-    return SoapService(name, HttpClient(base, connection), path, published, contract_wsdl_path)
+    return SoapService(name, HttpClient(base, connection), path, published, contract_wsdl_path, known_messages)
 
 
 def _located(published: PublishedWsdl, connection: Connection) -> str | None:

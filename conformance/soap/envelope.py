@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from lxml import etree
 
-    from conformance.transport.exchange import Exchange
-
 
 class NotSoapError(ValueError):
     """An answer that is no SOAP 1.1 message; the message says what is wrong with it."""
@@ -100,14 +98,6 @@ def read_root(root: etree._Element) -> Envelope:
     payload = tuple(elements(parts[0]))
     fault = _fault(payload[0]) if payload and payload[0].tag == clark(ENVELOPE, "Fault") else None
     return Envelope(root, tuple(headers), parts[0], payload, fault)
-
-
-def read_answer(exchange: Exchange) -> Envelope | None:
-    """The message in an answer; None where the answer holds none (see read())."""
-    try:
-        return read(exchange.response.body)
-    except NotSoapError:
-        return None
 
 
 def _fault(element: etree._Element) -> Fault:

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING
 from hypothesis import strategies as st
 
 from conformance.documents import xsd_lexical as lexical
+from conformance.documents.xml_names import local
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
 from conformance.soap import forms
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from hypothesis.strategies import SearchStrategy
 
 
@@ -48,6 +51,19 @@ def _some(item: Element | Group, *, optional: bool) -> tuple[Node, ...]:
     return made * count
 
 
+def filled(element: Element, values: Mapping[str, str]) -> Node:
+    """A message of given values, in the order of the schema.
+
+    Args:
+        element: what to make.
+        values: text by the local name of its element; elements without one are left out, and so are those that would
+            be empty.
+    """
+    children = [filled(child, values) for child in element.children]
+    kept = [child for child in children if child.children or child.name in values]
+    return Node(element.tag, values.get(local(element.tag), ""), tuple(kept))
+
+
 def variants(element: Element, base: Node, fixed: frozenset[tuple[int, ...]] = frozenset()) -> SearchStrategy[Node]:
     """Valid messages of the same structure as ``base``, with other values.
 
@@ -63,19 +79,15 @@ def variants(element: Element, base: Node, fixed: frozenset[tuple[int, ...]] = f
     def filled(texts: tuple[str, ...]) -> Node:
         made = base
         for (path, _), text in zip(leaves, texts, strict=True):
-            made = _with_text(made, path, text)
+            made = with_text(made, path, text)
         return made
 
     return st.tuples(*(forms.values(simple) for _, simple in leaves)).map(filled)
 
 
-def _with_text(node: Node, path: tuple[int, ...], text: str) -> Node:
-    return node.changed(path, lambda leaf: (replace(leaf, text=text),)) if path else replace(node, text=text)
-
-
 def with_text(node: Node, path: tuple[int, ...], text: str) -> Node:
     """A copy of a message with another text at a path."""
-    return _with_text(node, path, text)
+    return node.changed(path, lambda leaf: (replace(leaf, text=text),)) if path else replace(node, text=text)
 
 
 def declarations(element: Element, node: Node) -> list[tuple[tuple[int, ...], Element]]:

@@ -25,7 +25,7 @@ _NOBODY: Final = "no_such_element"
 
 
 @dataclass(frozen=True)
-class Mutant:
+class Mutation:
     """A message with one thing wrong.
 
     Attributes:
@@ -41,18 +41,18 @@ class Mutant:
     reason: str = ""
 
 
-def invalid_ones(mutants: Iterable[Mutant], types: Types) -> Iterator[Mutant]:
+def invalid_ones(mutations: Iterable[Mutation], types: Types) -> Iterator[Mutation]:
     """Those that both validators refuse; and those that break a rule beyond the schema, which they cannot judge."""
-    for mutant in mutants:
-        if mutant.kind in {"body", "non-finite"}:
-            yield mutant
+    for mutation in mutations:
+        if mutation.kind in {"body", "non-finite"}:
+            yield mutation
             continue
-        reason = types.invalid(parse(mutant.payload[0].written()))
+        reason = types.invalid(parse(mutation.payload[0].written()))
         if reason:
-            yield replace(mutant, reason=reason)
+            yield replace(mutation, reason=reason)
 
 
-def mutants(element: Element, base: Node) -> Iterator[Mutant]:
+def mutations(element: Element, base: Node) -> Iterator[Mutation]:
     """All single mutations of a valid message.
 
     Args:
@@ -63,13 +63,13 @@ def mutants(element: Element, base: Node) -> Iterator[Mutant]:
         yield from make(element, base)
 
 
-def _missing(element: Element, base: Node) -> Iterator[Mutant]:
+def _missing(element: Element, base: Node) -> Iterator[Mutation]:
     for path, declared in declarations(element, base):
         if declared.minimum > 0:
-            yield Mutant("missing", f"{local(declared.tag)} dropped", (base.changed(path, lambda _: ()),))
+            yield Mutation("missing", f"{local(declared.tag)} dropped", (base.changed(path, lambda _: ()),))
 
 
-def _unknown(element: Element, base: Node) -> Iterator[Mutant]:
+def _unknown(element: Element, base: Node) -> Iterator[Mutation]:
     for path in sequences(element, base):
         parent = base.at(path)
         for where, position in (("first", 0), ("last", len(parent.children))):
@@ -78,20 +78,20 @@ def _unknown(element: Element, base: Node) -> Iterator[Mutant]:
                 children = (*parent.children[:position], extra, *parent.children[position:])
                 changed = replace(parent, children=children)
                 made = base.changed(path, lambda _, new=changed: (new,)) if path else changed  # type: ignore[misc] # a default argument binds the loop's value
-                yield Mutant("unknown", f"{extra.tag} {where} in {parent.name}", (made,))
+                yield Mutation("unknown", f"{extra.tag} {where} in {parent.name}", (made,))
 
 
-def _duplicate(element: Element, base: Node) -> Iterator[Mutant]:
+def _duplicate(element: Element, base: Node) -> Iterator[Mutation]:
     for path, declared in declarations(element, base):
         if declared.maximum is not None:
-            yield Mutant(
+            yield Mutation(
                 "duplicate",
                 f"{local(declared.tag)} twice",
                 (base.changed(path, lambda node: (node, node)),),
             )
 
 
-def _order(element: Element, base: Node) -> Iterator[Mutant]:
+def _order(element: Element, base: Node) -> Iterator[Mutation]:
     for path in sequences(element, base):
         parent = base.at(path)
         children = parent.children
@@ -108,52 +108,52 @@ def _order(element: Element, base: Node) -> Iterator[Mutant]:
                 continue
             changed = replace(parent, children=tuple(order))
             made = base.changed(path, lambda _, new=changed: (new,)) if path else changed  # type: ignore[misc] # as above
-            yield Mutant("order", f"children of {parent.name}: {what}", (made,))
+            yield Mutation("order", f"children of {parent.name}: {what}", (made,))
 
 
-def _namespace(element: Element, base: Node) -> Iterator[Mutant]:
+def _namespace(element: Element, base: Node) -> Iterator[Mutation]:
     own = namespace(base.tag)
     for space in ("", STRANGE):
-        yield Mutant(
+        yield Mutation(
             "namespace", f"{base.name} in {space or 'no'} namespace", (replace(base, tag=clark(space, base.name)),)
         )
     for path, declared in declarations(element, base):
         for space in ("", own, STRANGE):
             tag = clark(space, local(declared.tag))
             if tag != declared.tag:
-                yield Mutant(
+                yield Mutation(
                     "namespace",
                     f"{local(declared.tag)} in {space or 'no'} namespace",
                     (base.changed(path, lambda node, new=tag: (replace(node, tag=new),)),),  # type: ignore[misc] # as above
                 )
 
 
-def _values(element: Element, base: Node) -> Iterator[Mutant]:
+def _values(element: Element, base: Node) -> Iterator[Mutation]:
     for path, simple in simple_leaves(element, base):
         name = base.at(path).name
         for text in lexical.unreadable(simple):
-            yield Mutant("lexical", f"{name} is {text!r}", (with_text(base, path, text),))
+            yield Mutation("lexical", f"{name} is {text!r}", (with_text(base, path, text),))
         for text in lexical.outside(simple):
-            yield Mutant("range", f"{name} is {text}", (with_text(base, path, text),))
+            yield Mutation("range", f"{name} is {text}", (with_text(base, path, text),))
         if simple.builtin in lexical.FLOATS:
             for text in lexical.NON_FINITE:
-                yield Mutant("non-finite", f"{name} is {text}", (with_text(base, path, text),))
+                yield Mutation("non-finite", f"{name} is {text}", (with_text(base, path, text),))
 
 
-def _nil(element: Element, base: Node) -> Iterator[Mutant]:
+def _nil(element: Element, base: Node) -> Iterator[Mutation]:
     nil = (clark(XSI, "nil"), "true")
     for path, declared in declarations(element, base):
         if not declared.nillable:
             empty = Node(declared.tag, "", (), (nil,))
-            yield Mutant(
+            yield Mutation(
                 "nil",
                 f"{local(declared.tag)} is xsi:nil",
                 (base.changed(path, lambda _, new=empty: (new,)),),  # type: ignore[misc] # as above
             )
 
 
-def _body(_element: Element, base: Node) -> Iterator[Mutant]:
-    yield Mutant("body", "the Body is empty", ())
-    yield Mutant("body", f"{base.name} stands twice in the Body", (base, base))
-    yield Mutant("body", "a strange element stands beside it in the Body", (base, Node(clark(STRANGE, _NOBODY))))
-    yield Mutant("body", "a strange element stands before it in the Body", (Node(clark(STRANGE, _NOBODY)), base))
+def _body(_element: Element, base: Node) -> Iterator[Mutation]:
+    yield Mutation("body", "the Body is empty", ())
+    yield Mutation("body", f"{base.name} stands twice in the Body", (base, base))
+    yield Mutation("body", "a strange element stands beside it in the Body", (base, Node(clark(STRANGE, _NOBODY))))
+    yield Mutation("body", "a strange element stands before it in the Body", (Node(clark(STRANGE, _NOBODY)), base))

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from conformance.documents.xml_node import Node
     from conformance.transport.exchange import Exchange
 
+    # Messages that a robot is likely to take for an operation of a service, likeliest first.
+    KnownMessages = Callable[["SoapService", Operation], Iterable[Node]]
+
 MEDIA_TYPE = "text/xml; charset=utf-8"
 
 
@@ -32,7 +35,7 @@ class SoapService:
         path: the endpoint's path (and query, where it has one).
         published: the WSDL that the robot publishes.
         contract_wsdl_path: the contract's WSDL of this service, or None.
-        known_messages: messages that a robot of this contract is likely to take for an operation, likeliest first.
+        known_messages: those of this contract.
         examples: messages that the robot takes, by operation (see valid_messages).
     """
 
@@ -41,7 +44,7 @@ class SoapService:
     path: str
     published: PublishedWsdl = field(default_factory=PublishedWsdl)
     contract_wsdl_path: Path | None = None
-    known_messages: Callable[[SoapService, Operation], Iterable[Node]] = lambda _service, _operation: ()
+    known_messages: KnownMessages = lambda _service, _operation: ()
     examples: dict[str, Node | None] = field(default_factory=dict, repr=False)
 
     @property

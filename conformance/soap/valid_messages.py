@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Final
 
 from conformance.documents.xml_names import XSD, XSI, clark, namespace
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS, bounds
-from conformance.soap import delivery_messages as paper
 from conformance.soap.calls import call
 from conformance.soap.messages import ordinary, simple_leaves, with_text
 
@@ -45,7 +44,7 @@ def _found(service: SoapService, operation: Operation) -> Node | None:
     tried: set[bytes] = set()
     for candidate in candidates(service, operation, declared):
         document = candidate.written()
-        if document not in tried and call(service, candidate).taken:
+        if document not in tried and call(service, candidate).accepted:
             return candidate
         tried.add(document)
     return None
@@ -57,8 +56,7 @@ def candidates(service: SoapService, operation: Operation, declared: Element) ->
     Raises:
         NoAnswerError: no HTTP response came.
     """
-    if service.contract.target_namespace == paper.NAMESPACE:
-        yield from paper.examples(service, operation)
+    yield from service.known_messages(service, operation)
     for optional in (False, True):
         yield ordinary(declared, optional=optional)
     full = ordinary(declared, optional=True)

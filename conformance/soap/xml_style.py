@@ -26,7 +26,7 @@ _PREFIXES: Final = ("soapenv", "S", "SOAP-ENV", "_", "x.1-y")
 
 
 @dataclass(frozen=True)
-class Syntax:
+class XmlStyle:
     """The choices of a writer.
 
     Attributes:
@@ -56,30 +56,30 @@ class Syntax:
     header: bool = False
 
 
-def single_changes() -> tuple[tuple[str, Syntax], ...]:
+def single_changes() -> tuple[tuple[str, XmlStyle], ...]:
     """Spellings that differ from the plain one in one choice each, with a name for the choice."""
     return (
-        ("plain", Syntax()),
-        ("other prefixes", Syntax(envelope_prefix="S", payload_prefix="a")),
-        ("prefixes of other characters", Syntax(envelope_prefix="SOAP-ENV", payload_prefix="x.1-y")),
-        ("SOAP as default namespace", Syntax(envelope_prefix="")),
-        ("a default namespace on the wrapper, undone on its children", Syntax(payload_prefix="", early=False)),
-        ("namespaces bound where they are used", Syntax(early=False)),
-        *((f"declaration {text.strip()}", Syntax(declaration=text)) for text in DECLARATIONS[1:]),
-        ("single quotes", Syntax(quote="'")),
-        ("white space between elements", Syntax(indent=True)),
-        ("comments between elements", Syntax(comments=True)),
-        *((f"texts: {text}", Syntax(text=text)) for text in TEXTS[1:]),
-        ("start and end tags for empty elements", Syntax(empty_tags=False)),
-        ("xsi:schemaLocation", Syntax(location=True)),
-        ("an empty Header", Syntax(header=True)),
+        ("plain", XmlStyle()),
+        ("other prefixes", XmlStyle(envelope_prefix="S", payload_prefix="a")),
+        ("prefixes of other characters", XmlStyle(envelope_prefix="SOAP-ENV", payload_prefix="x.1-y")),
+        ("SOAP as default namespace", XmlStyle(envelope_prefix="")),
+        ("a default namespace on the wrapper, undone on its children", XmlStyle(payload_prefix="", early=False)),
+        ("namespaces bound where they are used", XmlStyle(early=False)),
+        *((f"declaration {text.strip()}", XmlStyle(declaration=text)) for text in DECLARATIONS[1:]),
+        ("single quotes", XmlStyle(quote="'")),
+        ("white space between elements", XmlStyle(indent=True)),
+        ("comments between elements", XmlStyle(comments=True)),
+        *((f"texts: {text}", XmlStyle(text=text)) for text in TEXTS[1:]),
+        ("start and end tags for empty elements", XmlStyle(empty_tags=False)),
+        ("xsi:schemaLocation", XmlStyle(location=True)),
+        ("an empty Header", XmlStyle(header=True)),
     )
 
 
-def syntaxes() -> SearchStrategy[Syntax]:
+def xml_styles() -> SearchStrategy[XmlStyle]:
     """Any combination of choices."""
     return st.builds(
-        Syntax,
+        XmlStyle,
         envelope_prefix=st.sampled_from(("", *_PREFIXES)),
         payload_prefix=st.sampled_from(("", "ns", "ns2", "_a", "tns")),
         early=st.booleans(),
@@ -96,13 +96,13 @@ def syntaxes() -> SearchStrategy[Syntax]:
 
 @dataclass
 class _Writer:
-    syntax: Syntax
+    style: XmlStyle
     prefixes: dict[str, str] = field(default_factory=dict)
 
     def prefix(self, space: str) -> str:
         """The prefix of a namespace; the same one wherever it is asked for."""
         if space not in self.prefixes:
-            given = self.syntax.envelope_prefix if space == ENVELOPE else self.syntax.payload_prefix
+            given = self.style.envelope_prefix if space == ENVELOPE else self.style.payload_prefix
             number = sum(1 for other in self.prefixes if other != ENVELOPE)
             self.prefixes[space] = given if space == ENVELOPE or not given or not number else f"{given}{number}"
         return self.prefixes[space]
@@ -119,17 +119,17 @@ class _Writer:
             f"{self._attribute(key, scope, attributes)}={self._quoted(value)}" for key, value in node.attributes
         ]
         start = " ".join([name, *attributes])
-        line = "\n" + "  " * depth if self.syntax.indent else ""
-        note = "<!-- <a> & -- -->".replace(" -- ", " - ") if self.syntax.comments else ""
+        line = "\n" + "  " * depth if self.style.indent else ""
+        note = "<!-- <a> & -- -->".replace(" -- ", " - ") if self.style.comments else ""
         inside = "".join(f"{line}  {note}" + self.element(child, scope, depth + 1) for child in node.children)
         inside += f"{note}{line}" if node.children else self._text(node.text)
-        if not inside and self.syntax.empty_tags:
+        if not inside and self.style.empty_tags:
             return f"<{start}/>"
         return f"<{start}>{inside}</{name}>"
 
     def _bindings(self, node: Node, scope: dict[str, str], *, root: bool) -> list[str]:
         wanted = {namespace(node.tag)}
-        if root and self.syntax.early:
+        if root and self.style.early:
             wanted |= _all_namespaces(node)
         made: list[str] = []
         for space in sorted(wanted):
@@ -144,7 +144,7 @@ class _Writer:
                 continue
             scope[prefix] = space
             made.append(f"xmlns{':' if prefix else ''}{prefix}={self._quoted(space)}")
-        if self.syntax.location and scope and namespace(node.tag) not in {"", ENVELOPE} and "xsi" not in scope:
+        if self.style.location and scope and namespace(node.tag) not in {"", ENVELOPE} and "xsi" not in scope:
             scope["xsi"] = XSI
             made.append(f"xmlns:xsi={self._quoted(XSI)}")
             made.append(f"xsi:schemaLocation={self._quoted(namespace(node.tag) + ' nowhere.xsd')}")
@@ -164,7 +164,7 @@ class _Writer:
         return f"{prefix}:{local(key)}"
 
     def _quoted(self, value: str) -> str:
-        quote = self.syntax.quote
+        quote = self.style.quote
         return quote + escape(value, {quote: "&#34;" if quote == '"' else "&#39;", "\n": "&#10;", "\t": "&#9;"}) + quote
 
     def _text(self, text: str) -> str:
@@ -178,7 +178,7 @@ class _Writer:
             "comment": f"{escape(text)}<!-- 1 -->",
             "split": f"{escape(text[:half])}<![CDATA[{text[half:]}]]>",
         }
-        return forms.get(self.syntax.text, escape(text))
+        return forms.get(self.style.text, escape(text))
 
 
 def _all_namespaces(node: Node) -> set[str]:
@@ -188,15 +188,15 @@ def _all_namespaces(node: Node) -> set[str]:
     return found
 
 
-def spell(message: Node, syntax: Syntax) -> str:
+def serialize(message: Node, style: XmlStyle) -> str:
     """Write a message (an Envelope) in one of its spellings."""
-    if syntax.header and not any(child.name == "Header" for child in message.children):
+    if style.header and not any(child.name == "Header" for child in message.children):
         message = type(message)(
             message.tag,
             message.text,
             (type(message)(f"{{{namespace(message.tag)}}}Header"), *message.children),
             message.attributes,
         )
-    before = "<!-- before -->" if syntax.comments else ""
-    after = "<!-- after -->" if syntax.comments else ""
-    return syntax.declaration + before + _Writer(syntax).element(message, {}, 0, root=True) + after
+    before = "<!-- before -->" if style.comments else ""
+    after = "<!-- after -->" if style.comments else ""
+    return style.declaration + before + _Writer(style).element(message, {}, 0, root=True) + after

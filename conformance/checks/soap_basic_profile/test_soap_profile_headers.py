@@ -10,7 +10,7 @@ import pytest
 from conformance.documents.xml_names import ENVELOPE, NEXT_ACTOR, clark
 from conformance.documents.xml_node import Node
 from conformance.soap.callable_services import askable, rounds
-from conformance.soap.calls import Answer, ask, call
+from conformance.soap.calls import SoapResponse, call, send
 from conformance.soap.envelope import envelope
 from conformance.soap.valid_messages import example, quiet_example
 
@@ -40,9 +40,9 @@ def _messages(service: SoapService) -> list[Node]:
     return [message for message in found if message is not None]
 
 
-def _is_fault(judge: Judge, id_: str, answer: Answer, code: str, what: str) -> bool:
+def _is_fault(judge: Judge, id_: str, answer: SoapResponse, code: str, what: str) -> bool:
     return judge.check(
-        id_, answer.code == code, answer.exchange, f"a fault with the code {code} for {what}", found=answer.told
+        id_, answer.code == code, answer.exchange, f"a fault with the code {code} for {what}", found=answer.describe()
     )
 
 
@@ -52,16 +52,16 @@ def test_other_versions(roaas: Session, judge: Judge, effort: Effort) -> None:
     for service in askable(roaas, "soap-basic-profile/R1015", "soap-basic-profile/version-mismatch"):
         messages = _messages(service)[: effort.cases(10)] or [_UNKNOWN]
         for message in messages:
-            answer = ask(service, envelope([message], space=_OTHER_VERSION))
+            answer = send(service, envelope([message], space=_OTHER_VERSION))
             judge.check(
                 "soap-basic-profile/R1015",
                 answer.fault is not None,
                 answer.exchange,
                 "a fault for an Envelope of another namespace",
-                found=answer.told,
+                found=answer.describe(),
             )
             _is_fault(judge, "soap-basic-profile/version-mismatch", answer, "VersionMismatch", "another envelope")
-        answer = ask(service, envelope([messages[0]], space=_SOAP_12))
+        answer = send(service, envelope([messages[0]], space=_SOAP_12))
         # A robot that speaks SOAP 1.2 as well answers in it, and has no other version before it.
         speaks_both = _SOAP_12.encode() in answer.exchange.response.body
         judge.check(
@@ -69,7 +69,7 @@ def test_other_versions(roaas: Session, judge: Judge, effort: Effort) -> None:
             speaks_both or answer.fault is not None,
             answer.exchange,
             "a fault for an Envelope of SOAP 1.2",
-            found=answer.told,
+            found=answer.describe(),
         )
 
 
@@ -109,7 +109,11 @@ def test_other_headers(roaas: Session, judge: Judge, effort: Effort) -> None:
             ):
                 answer = call(service, message, headers=headers)
                 judge.check(
-                    f"soap-basic-profile/{id_}", answer.taken, answer.exchange, f"2xx with {what}", found=answer.told
+                    f"soap-basic-profile/{id_}",
+                    answer.accepted,
+                    answer.exchange,
+                    f"2xx with {what}",
+                    found=answer.describe(),
                 )
 
 
@@ -128,7 +132,7 @@ def test_order_of_faults(roaas: Session, judge: Judge, effort: Effort) -> None:
             body = [payload] if payload is not None else []
             for space in (_OTHER_VERSION,) * rounds(effort, 3):
                 old = envelope(body, (_block("1", space=space),), space=space)
-                answer = ask(service, old)
+                answer = send(service, old)
                 _is_fault(
                     judge,
                     "soap-basic-profile/R2725",

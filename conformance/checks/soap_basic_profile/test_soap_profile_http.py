@@ -10,7 +10,7 @@ from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xml_node import Node
 from conformance.soap.callable_services import askable, rounds
-from conformance.soap.calls import Answer, ask, call, read_exchange
+from conformance.soap.calls import SoapResponse, call, read_exchange, send
 from conformance.soap.envelope import envelope
 from conformance.soap.valid_messages import quiet_example
 from conformance.transport.exchange import NoAnswer, NoAnswerError
@@ -47,10 +47,10 @@ def test_soap_action(roaas: Session, judge: Judge, effort: Effort) -> None:
             answer = call(service, message, soap_action=action)
             judge.check(
                 "soap-basic-profile/R1109",
-                answer.taken,
+                answer.accepted,
                 answer.exchange,
                 f"2xx with SOAPAction: {action}",
-                found=answer.told,
+                found=answer.describe(),
             )
 
 
@@ -82,7 +82,7 @@ def test_malformed(roaas: Session, judge: Judge, effort: Effort) -> None:
         apart = service.apart()
         for what, body in cases[: effort.cases(len(cases))]:
             try:
-                answer = ask(apart, body)
+                answer = send(apart, body)
             except NoAnswerError as none:
                 if none.kind is not NoAnswer.TIMEOUT:
                     raise
@@ -94,12 +94,16 @@ def test_malformed(roaas: Session, judge: Judge, effort: Effort) -> None:
         _truncated(judge, service)
 
 
-def _judge_malformed(judge: Judge, answer: Answer, what: str) -> None:
+def _judge_malformed(judge: Judge, answer: SoapResponse, what: str) -> None:
     fits = (answer.fault is None and 400 <= answer.status < 500) or (answer.fault is not None and answer.status == 500)
     expected = f"4xx without a fault or 500 with one, for {what}"
-    judge.check("soap-basic-profile/R1125", fits, answer.exchange, expected, found=answer.told)
+    judge.check("soap-basic-profile/R1125", fits, answer.exchange, expected, found=answer.describe())
     judge.check(
-        "soap-basic-profile/R1113", answer.status == 400, answer.exchange, f"status 400 for {what}", found=answer.told
+        "soap-basic-profile/R1113",
+        answer.status == 400,
+        answer.exchange,
+        f"status 400 for {what}",
+        found=answer.describe(),
     )
 
 
@@ -111,7 +115,7 @@ def _truncated(judge: Judge, service: SoapService) -> None:
     document = envelope([_message(service)]).written()
     apart = service.apart()
     try:
-        answer = ask(
+        answer = send(
             apart,
             document[: len(document) * 2 // 3],
             fresh=True,
@@ -145,7 +149,7 @@ def test_methods(roaas: Session, judge: Judge, effort: Effort) -> None:
                 status == 405 or (method == "GET" and _is_description(exchange)),
                 exchange,
                 f"405 for {method}",
-                found=read_exchange(exchange).told if status == 500 else "",
+                found=read_exchange(exchange).describe() if status == 500 else "",
             )
 
 
@@ -165,11 +169,11 @@ def test_media_types(roaas: Session, judge: Judge, effort: Effort) -> None:
     for service in askable(roaas, "soap-basic-profile/R1115"):
         body = envelope([_message(service)]).written()
         for media_type in types * rounds(effort, 3):
-            answer = ask(service, body, content_type=media_type)
+            answer = send(service, body, content_type=media_type)
             judge.check(
                 "soap-basic-profile/R1115",
                 answer.status == 415,
                 answer.exchange,
                 f"415 for {media_type}",
-                found=answer.told,
+                found=answer.describe(),
             )

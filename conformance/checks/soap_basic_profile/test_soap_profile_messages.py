@@ -10,11 +10,11 @@ import pytest
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.soap.callable_services import askable
-from conformance.soap.calls import ask, call
+from conformance.soap.calls import call, send
 from conformance.soap.envelope import envelope
-from conformance.soap.mutations import invalid_ones, mutants
+from conformance.soap.mutations import invalid_ones, mutations
 from conformance.soap.valid_messages import candidates, example, typed
-from conformance.soap.xml_style import Syntax, spell
+from conformance.soap.xml_style import XmlStyle, serialize
 
 if TYPE_CHECKING:
     from conformance.documents.wsdl import Operation
@@ -53,18 +53,18 @@ def test_answers(roaas: Session, judge: Judge, effort: Effort) -> None:
                 answer = call(service, message)
                 judge.check(
                     "soap-basic-profile/R1017",
-                    answer.taken,
+                    answer.accepted,
                     answer.exchange,
                     "2xx for a valid message without xsi:type",
-                    found=answer.told,
+                    found=answer.describe(),
                 )
-                if answer.taken:
+                if answer.accepted:
                     judge.check(
                         "soap-basic-profile/R2712",
                         answer.payload == operation.response,
                         answer.exchange,
                         f"{operation.response} in the Body",
-                        found=answer.told,
+                        found=answer.describe(),
                     )
 
 
@@ -75,10 +75,10 @@ def _untyped(judge: Judge, service: SoapService) -> None:
         if declared is None or example(service, operation) is not None:
             continue
         plain = next(candidates(service, operation, declared))
-        answer = ask(service, typed(envelope([plain]), declared, plain))
+        answer = send(service, typed(envelope([plain]), declared, plain))
         judge.check(
             "soap-basic-profile/R1017",
-            not answer.taken,
+            not answer.accepted,
             answer.exchange,
             "the message taken without xsi:type as well",
             found=f"{operation.name} is taken with xsi:type alone",
@@ -97,9 +97,13 @@ def test_dispatch(roaas: Session, judge: Judge, effort: Effort) -> None:
             spoofed += [f'"{other.name}"' for other in others] + ['"urn:example:strange"']
             for action in spoofed[: effort.cases(len(spoofed))]:
                 answer = call(service, message, soap_action=action)
-                right = answer.taken and answer.payload == operation.response
+                right = answer.accepted and answer.payload == operation.response
                 judge.check(
-                    ids[0], right, answer.exchange, f"{operation.response}, the Body's operation", found=answer.told
+                    ids[0],
+                    right,
+                    answer.exchange,
+                    f"{operation.response}, the Body's operation",
+                    found=answer.describe(),
                 )
                 # To refuse such a message is safe, if not by the profile; to run the other operation is neither.
                 judge.check(
@@ -107,7 +111,7 @@ def test_dispatch(roaas: Session, judge: Judge, effort: Effort) -> None:
                     right or answer.refused,
                     answer.exchange,
                     f"{operation.response} or a refusal",
-                    found=answer.told,
+                    found=answer.describe(),
                 )
 
 
@@ -124,7 +128,7 @@ def test_unknown_operation(roaas: Session, judge: Judge, effort: Effort) -> None
         for tag in tags[: effort.cases(len(tags))]:
             for action in ('""', f'"{known[0].input_action or known[0].name}"') if known else ('""',):
                 answer = call(service, Node(tag), soap_action=action)
-                judge.check(id_, answer.refused, answer.exchange, f"a fault or 4xx for {tag}", found=answer.told)
+                judge.check(id_, answer.refused, answer.exchange, f"a fault or 4xx for {tag}", found=answer.describe())
 
 
 @pytest.mark.requirement("soap-basic-profile/R4001", "soap-basic-profile/utf-16")
@@ -132,23 +136,23 @@ def test_encodings(roaas: Session, judge: Judge, effort: Effort) -> None:
     """A byte order mark is taken, and so is UTF-16."""
     for service in askable(roaas, "soap-basic-profile/R4001", "soap-basic-profile/utf-16"):
         for operation, message in _examples(service)[: effort.cases(6)]:
-            plain = spell(envelope([message]), Syntax())
+            plain = serialize(envelope([message]), XmlStyle())
             declared = '<?xml version="1.0" encoding="UTF-16"?>' + plain
-            utf8 = spell(envelope([message]), Syntax(declaration='<?xml version="1.0" encoding="UTF-8"?>'))
+            utf8 = serialize(envelope([message]), XmlStyle(declaration='<?xml version="1.0" encoding="UTF-8"?>'))
             for id_, what, body, charset in (
                 ("R4001", "UTF-8 with a byte order mark", codecs.BOM_UTF8 + plain.encode(), "utf-8"),
                 ("R4001", "UTF-8 with mark and declaration", codecs.BOM_UTF8 + utf8.encode(), "utf-8"),
                 ("utf-16", "UTF-16, little end first", codecs.BOM_UTF16_LE + declared.encode("utf-16-le"), "utf-16"),
                 ("utf-16", "UTF-16, big end first", codecs.BOM_UTF16_BE + declared.encode("utf-16-be"), "utf-16"),
             ):
-                answer = ask(service, body, content_type=f"text/xml; charset={charset}")
-                right = answer.taken and answer.payload == operation.response
+                answer = send(service, body, content_type=f"text/xml; charset={charset}")
+                right = answer.accepted and answer.payload == operation.response
                 judge.check(
                     f"soap-basic-profile/{id_}",
                     right,
                     answer.exchange,
                     f"2xx for a message in {what}",
-                    found=answer.told,
+                    found=answer.describe(),
                 )
 
 
@@ -160,7 +164,7 @@ def test_invalid_messages(roaas: Session, judge: Judge, effort: Effort) -> None:
             declared = service.contract.shape(operation.request) if operation.request else None
             if declared is None:
                 continue
-            wrong = [item for item in mutants(declared, message) if item.kind not in {"body", "non-finite"}]
+            wrong = [item for item in mutations(declared, message) if item.kind not in {"body", "non-finite"}]
             # Spread over all kinds and elements, rather than the first of them.
             step = max(1, len(wrong) // effort.cases(40))
             for mutant in invalid_ones(wrong[::step], service.contract.types):
@@ -170,6 +174,6 @@ def test_invalid_messages(roaas: Session, judge: Judge, effort: Effort) -> None:
                     answer.code == "Client",
                     answer.exchange,
                     f"a Client fault where {mutant.what}",
-                    found=answer.told,
+                    found=answer.describe(),
                     cause=f"{mutant.kind} {answer.status} {answer.code}",
                 )

@@ -10,18 +10,18 @@ from hypothesis import strategies as st
 from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import ADDRESSING, clark, local
 from conformance.documents.xml_node import Node
-from conformance.soap import delivery_messages as paper
+from conformance.robot import delivery_messages
 from conformance.soap.callable_services import rounds
-from conformance.soap.calls import Answer, ask, call
+from conformance.soap.calls import SoapResponse, call, send
 from conformance.soap.envelope import envelope
 from conformance.soap.forms import written_integer
 from conformance.soap.messages import variants, with_text
-from conformance.soap.xml_style import single_changes, spell, syntaxes
+from conformance.soap.xml_style import serialize, single_changes, xml_styles
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
     from conformance.soap.service import SoapService
-    from conformance.soap.xml_style import Syntax
+    from conformance.soap.xml_style import XmlStyle
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
     from conformance.verdict.explorer import Explorer
@@ -39,17 +39,17 @@ def publishers(roaas: Session) -> SoapService:
     return roaas.publishers
 
 
-def _answered(judge: Judge, id_: str, operation: str, answer: Answer, what: str) -> bool:
+def _answered(judge: Judge, id_: str, operation: str, answer: SoapResponse, what: str) -> bool:
     """Judge that a valid request was taken, and that the answer is what the XSD says."""
-    taken = judge.check(id_, answer.taken, answer.exchange, f"2xx for {what}", found=answer.told)
+    taken = judge.check(id_, answer.accepted, answer.exchange, f"2xx for {what}", found=answer.describe())
     return _valid(judge, operation, answer) and taken if answer.succeeded else taken
 
 
-def _valid(judge: Judge, operation: str, answer: Answer) -> bool:
-    expected = clark(paper.NAMESPACE, f"{operation}Response")
-    wrapper = answer.envelope.first if answer.envelope else None
+def _valid(judge: Judge, operation: str, answer: SoapResponse) -> bool:
+    expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
+    wrapper = answer.first
     if wrapper is None or wrapper.tag != expected:
-        return judge.check(_VALID, False, answer.exchange, f"{expected} in the Body", found=answer.told)
+        return judge.check(_VALID, False, answer.exchange, f"{expected} in the Body", found=answer.describe())
     inside = [local(str(child.tag)) for child in elements(wrapper)]
     text = text_of(wrapper).strip()
     return judge.check(
@@ -67,14 +67,14 @@ def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> No
     for number in range(effort.cases(55)):
         for operation, id_ in zip(_BOTH, ("soap-delivery/delivery", "soap-delivery/coffee"), strict=True):
             code = "3" if operation == "ExecuteDeliveryRequest" and number % 2 else "4"
-            answer = call(publishers, paper.delivery(operation, code))
-            right = answer.payload == clark(paper.NAMESPACE, f"{operation}Response")
+            answer = call(publishers, delivery_messages.delivery(operation, code))
+            right = answer.payload == clark(delivery_messages.NAMESPACE, f"{operation}Response")
             judge.check(
                 id_,
-                answer.taken and right,
+                answer.accepted and right,
                 answer.exchange,
                 f"2xx with {operation}Response for code {code}",
-                found=answer.told,
+                found=answer.describe(),
             )
             if answer.succeeded:
                 _valid(judge, operation, answer)
@@ -83,30 +83,31 @@ def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> No
 @pytest.mark.requirement("soap-delivery/range", _VALID)
 def test_range(publishers: SoapService, judge: Judge, explore: Explorer) -> None:
     """Doubles over their whole range and both codes, each written in any form that XML Schema allows."""
-    declared = publishers.contract.shape(clark(paper.NAMESPACE, "ExecuteDeliveryRequest"))
+    declared = publishers.contract.shape(clark(delivery_messages.NAMESPACE, "ExecuteDeliveryRequest"))
     if declared is None:
         pytest.skip("the contract has no ExecuteDeliveryRequest")
-    base = paper.delivery()
+    base = delivery_messages.delivery()
+    code_path = base.path_to("message_code")
 
     def taken(case: tuple[Node, str, int, str]) -> None:
         message, operation, form, space = case
         code = 3 if operation == "ExecuteDeliveryRequest" and form % 2 else 4
-        message = with_text(message, paper.CODE_PATH, f"{space}{written_integer(code, form // 2)}{space}")
-        message = Node(clark(paper.NAMESPACE, operation), "", message.children)
+        message = with_text(message, code_path, f"{space}{written_integer(code, form // 2)}{space}")
+        message = Node(clark(delivery_messages.NAMESPACE, operation), "", message.children)
         answer = call(publishers, message)
         values = ", ".join(f"{leaf.name} {leaf.text!r}" for leaf in message.children[0].children)
         judge.require(
             "soap-delivery/range",
-            answer.taken,
+            answer.accepted,
             answer.exchange,
             "2xx for finite doubles and code 3 or 4",
-            found=f"{answer.told}, for {values}",
+            found=f"{answer.describe()}, for {values}",
             cause=f"{answer.status} {answer.code}",
         )
         _valid(judge, operation, answer)
 
     strategy = st.tuples(
-        variants(declared, base, frozenset({paper.CODE_PATH})),
+        variants(declared, base, frozenset({code_path})),
         st.sampled_from(_BOTH),
         st.integers(0, 7),
         st.sampled_from(["", " ", "\n"]),
@@ -118,24 +119,24 @@ def test_range(publishers: SoapService, judge: Judge, explore: Explorer) -> None
 def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort: Effort) -> None:
     """Requests that differ only in how their XML is written are all taken."""
 
-    def taken(operation: str, syntax: Syntax, what: str) -> None:
-        document = spell(envelope([paper.delivery(operation)]), syntax)
-        answer = ask(publishers, document)
+    def taken(operation: str, style: XmlStyle, what: str) -> None:
+        document = serialize(envelope([delivery_messages.delivery(operation)]), style)
+        answer = send(publishers, document)
         judge.require(
             "soap-delivery/syntax",
-            answer.taken,
+            answer.accepted,
             answer.exchange,
             f"2xx for the same message with {what}",
-            found=answer.told,
+            found=answer.describe(),
         )
         _valid(judge, operation, answer)
 
     for operation in _BOTH:
-        for what, syntax in single_changes()[: effort.cases(len(single_changes()))]:
-            document = spell(envelope([paper.delivery(operation)]), syntax)
-            _answered(judge, "soap-delivery/syntax", operation, ask(publishers, document), f"the same with {what}")
+        for what, style in single_changes()[: effort.cases(len(single_changes()))]:
+            document = serialize(envelope([delivery_messages.delivery(operation)]), style)
+            _answered(judge, "soap-delivery/syntax", operation, send(publishers, document), f"the same with {what}")
     explore(
-        st.tuples(st.sampled_from(_BOTH), syntaxes()),
+        st.tuples(st.sampled_from(_BOTH), xml_styles()),
         lambda case: taken(case[0], case[1], "several changes of syntax"),
         cases=60,
     )
@@ -148,7 +149,7 @@ def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> No
     for number in range(rounds(effort, 5)):
         for operation in _BOTH:
             for form in (operation, f"{operation}Request"):
-                action = f"{paper.NAMESPACE}TurtlebotPublishersInterface/{form}"
+                action = f"{delivery_messages.NAMESPACE}TurtlebotPublishersInterface/{form}"
                 headers = (
                     Node(clark(ADDRESSING, "Action"), action),
                     Node(clark(ADDRESSING, "MessageID"), f"urn:uuid:7f0e6c3a-52c5-4f0d-9c63-{number:012d}"),
@@ -159,26 +160,26 @@ def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> No
                         (Node(clark(ADDRESSING, "Address"), f"{ADDRESSING}/anonymous"),),
                     ),
                 )
-                answer = call(publishers, paper.delivery(operation), headers=headers)
+                answer = call(publishers, delivery_messages.delivery(operation), headers=headers)
                 _answered(judge, "soap-delivery/addressing", operation, answer, f"wsa:Action {form}")
 
 
 @pytest.mark.requirement("soap-delivery/refuses-code", "strict-input/soap-code", "strict-input/soap-fault")
 def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
     """Codes other than 3 and 4 are refused."""
-    if publishers.contract.target_namespace != paper.NAMESPACE:
+    if publishers.contract.target_namespace != delivery_messages.NAMESPACE:
         # The requirement on faults is one of every contract; these codes are not.
         return
     codes = ("5", "0", "2", "-4", "1", "7", "44", "2147483647", "-2147483648", "34", "-3", "100")
     for code in codes[: effort.cases(len(codes))]:
-        answer = call(publishers, paper.delivery(code=code))
+        answer = call(publishers, delivery_messages.delivery(code=code))
         for id_ in ("soap-delivery/refuses-code", "strict-input/soap-code"):
-            judge.check(id_, answer.refused, answer.exchange, f"a refusal of code {code}", found=answer.told)
-        if not answer.taken:
+            judge.check(id_, answer.refused, answer.exchange, f"a refusal of code {code}", found=answer.describe())
+        if not answer.accepted:
             judge.check(
                 "strict-input/soap-fault",
                 answer.fault is not None and answer.status == 500,
                 answer.exchange,
                 "a fault with status 500",
-                found=answer.told,
+                found=answer.describe(),
             )

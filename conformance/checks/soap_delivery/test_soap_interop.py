@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from conformance.soap import delivery_messages as paper
+from conformance.robot import delivery_messages
+from conformance.robot.delivery import COFFEE, COURIER
 from conformance.soap.callable_services import rounds
 from conformance.soap.valid_messages import example
 from conformance.transport.exchange import NoAnswerError
@@ -83,11 +84,13 @@ def test_publishers(roaas: Session, judge: Judge, effort: Effort) -> None:
     client = _client(judge, "soap-delivery/interop", roaas.publishers)
     if client is None:
         return
-    for code in (paper.COFFEE, paper.COURIER) * rounds(effort, 4):
-        values: dict[str, Any] = {key: float(text) for key, text in paper.COORDINATES.items()} | {"message_code": code}
+    for code in (COFFEE, COURIER) * rounds(effort, 4):
+        values: dict[str, Any] = {key: float(text) for key, text in delivery_messages.COORDINATES.items()} | {
+            "message_code": code
+        }
         for operation in ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest"):
             if operation == "ExecuteCoffeeRequest":
-                values["message_code"] = paper.COFFEE
+                values["message_code"] = COFFEE
             _, problem, exchange = client.call(operation, values)
             judge.check("soap-delivery/interop", not problem, exchange, f"{operation} by zeep", found=problem)
 

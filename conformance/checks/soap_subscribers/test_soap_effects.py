@@ -9,13 +9,13 @@ import pytest
 
 from conformance.documents.xml_names import ENVELOPE, clark
 from conformance.documents.xml_node import Node
+from conformance.robot import delivery_messages
 from conformance.robot.geometry import Pose
 from conformance.robot.goal import goal_body
 from conformance.robot.message_shapes import DELIVERIES, read_as
 from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
 from conformance.soap import content
-from conformance.soap import delivery_messages as paper
 from conformance.soap.calls import call
 
 if TYPE_CHECKING:
@@ -54,12 +54,12 @@ def test_misunderstood_has_no_effect(roaas: Session, judge: Judge, effort: Effor
     block = Node(clark("urn:example:strange", "Transaction"), "5", (), ((clark(ENVELOPE, "mustUnderstand"), "1"),))
     for number in range(effort.cases(4)):
         depot_x = _DEPOT_X + number
-        answer = call(service, paper.delivery(depot_x=repr(depot_x)), headers=(block,))
+        answer = call(service, delivery_messages.delivery(depot_x=repr(depot_x)), headers=(block,))
         if answer.code != "MustUnderstand":
             continue
         # A valid delivery after it shows when the robot is through with both.
         marker = depot_x + 0.5
-        call(service, paper.delivery(depot_x=repr(marker)))
+        call(service, delivery_messages.delivery(depot_x=repr(marker)))
         _until(lambda marker=marker: (_listed(rest, marker) or 0) > 0, 1.0)  # type: ignore[misc] # a default argument binds the loop's value
         judge.check(
             "soap-basic-profile/R1028",
@@ -94,7 +94,7 @@ def test_goal_is_shown(roaas: Session, judge: Judge) -> None:
     # A short goal may have ended before anybody could see it; then REST does not show it either.
     ended = robot.goal()[0] is None
     if shown or not ended:
-        answer = call(service, Node(clark(paper.NAMESPACE, "GetGoal")))
+        answer = call(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
         judge.check(
             "soap-subscribers/goal",
             shown,
@@ -106,8 +106,8 @@ def test_goal_is_shown(roaas: Session, judge: Judge) -> None:
 
 
 def _goal_id(service: SoapService) -> str | None:
-    answer = call(service, Node(clark(paper.NAMESPACE, "GetGoal")))
-    first = answer.envelope.first if answer.taken and answer.envelope else None
+    answer = call(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
+    first = answer.first if answer.accepted else None
     return content.text_at(first, "goal_id", "id") if first is not None else None
 
 

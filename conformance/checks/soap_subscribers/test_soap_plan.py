@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.documents.xml_names import clark, local
+from conformance.robot import delivery_messages, soap_services
 from conformance.robot.geometry import Pose
 from conformance.robot.plan import START_OFF
 from conformance.soap import content
-from conformance.soap import delivery_messages as paper
-from conformance.soap.calls import Answer, call
+from conformance.soap.calls import SoapResponse, call
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -48,7 +48,7 @@ def subscribers(roaas: Session) -> SoapService:
 
 
 def _returned(service: SoapService) -> Element:
-    wrapper = service.contract.shape(clark(paper.NAMESPACE, "GetPlanResponse"))
+    wrapper = service.contract.shape(clark(delivery_messages.NAMESPACE, "GetPlanResponse"))
     if wrapper is None:
         pytest.skip("the contract has no GetPlan")
     return wrapper.children[0]
@@ -74,7 +74,7 @@ def _path(wrapper: etree._Element, expected: Element) -> tuple[_Path | None, str
 
 def _here(roaas: Session, service: SoapService) -> Pose | None:
     """Where the robot is in the frame of plans."""
-    position = paper.position(service)
+    position = soap_services.position(service)
     if position is None:
         return None
     return Pose(*position, 0.0).seen_from(Pose(*roaas.statement.motion.odom_to_map))
@@ -101,25 +101,25 @@ def test_plan(roaas: Session, subscribers: SoapService, judge: Judge, effort: Ef
     if here is None:
         judge.check(_PLAN, False, None, "a plan", found="GetPose does not say where the robot is")
         return
-    answer: Answer | None = None
+    answer: SoapResponse | None = None
     for number, target in enumerate(_targets(roaas, here)):
         # Frame and tolerance may be left out: then they are map and 0.1 (contract, REST).
         given = {"frame_id": frame, "tolerance": repr(_TOLERANCE)} if number % 2 or frame != "map" else {}
         before = _here(roaas, subscribers) or here
-        answer = call(subscribers, paper.plan(target.x, target.y, yaw="0.0", **given))
+        answer = call(subscribers, delivery_messages.request("GetPlan", x=target.x, y=target.y, yaw="0.0", **given))
         after = _here(roaas, subscribers) or before
         if answer.fault is not None:
             continue
         planned += 1
-        wrapper = answer.envelope.first if answer.taken and answer.envelope else None
-        path, problem = (None, answer.told) if wrapper is None else _path(wrapper, expected)
+        wrapper = answer.first if answer.accepted else None
+        path, problem = (None, answer.describe()) if wrapper is None else _path(wrapper, expected)
         if path is not None:
             problem = _problem(path, before, after, target, frame)
         judge.check(_PLAN, not problem, answer.exchange, "a path from the robot to the asked pose", found=problem)
         if planned >= wanted:
             break
     if not planned and answer is not None:
-        judge.check(_PLAN, False, answer.exchange, "a plan to where the robot is", found=answer.told)
+        judge.check(_PLAN, False, answer.exchange, "a plan to where the robot is", found=answer.describe())
 
 
 def _problem(path: _Path, before: Pose, after: Pose, target: Pose, frame: str) -> str:
@@ -141,11 +141,14 @@ def test_no_plan(subscribers: SoapService, judge: Judge) -> None:
     """Where there can be no plan, the answer is a fault: far outside any map, and in a frame that nobody knows."""
     expected = _returned(subscribers)
     for message, what in (
-        (paper.plan(1e7, -1e7), "a position 10,000 km away"),
-        (paper.plan(0.0, 0.0, frame_id="no_such_frame"), "a frame that the robot does not know"),
+        (delivery_messages.request("GetPlan", x=1e7, y=-1e7), "a position 10,000 km away"),
+        (
+            delivery_messages.request("GetPlan", x=0.0, y=0.0, frame_id="no_such_frame"),
+            "a frame that the robot does not know",
+        ),
     ):
         answer = call(subscribers, message)
-        wrapper = answer.envelope.first if answer.taken and answer.envelope else None
+        wrapper = answer.first if answer.accepted else None
         path = _path(wrapper, expected)[0] if wrapper is not None else None
         # A robot in an open world may know a way to anywhere; then it has to end there.
         arrives = path is not None and math.hypot(path.points[-1][0] - 1e7, path.points[-1][1] + 1e7) < 1
@@ -154,5 +157,5 @@ def test_no_plan(subscribers: SoapService, judge: Judge) -> None:
             answer.fault is not None or arrives,
             answer.exchange,
             f"a fault for {what}",
-            found=answer.told,
+            found=answer.describe(),
         )

@@ -9,9 +9,9 @@ import pytest
 from conformance.documents.xml import text_of
 from conformance.documents.xml_names import clark, local
 from conformance.documents.xml_node import Node
+from conformance.robot import delivery_messages
 from conformance.soap import content
-from conformance.soap import delivery_messages as paper
-from conformance.soap.calls import Answer, call
+from conformance.soap.calls import SoapResponse, call
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -36,18 +36,18 @@ def subscribers(roaas: Session) -> SoapService:
 
 def _returned(service: SoapService, operation: str) -> Element:
     """Declaration of what an operation returns, by the contract."""
-    wrapper = service.contract.shape(clark(paper.NAMESPACE, f"{operation}Response"))
+    wrapper = service.contract.shape(clark(delivery_messages.NAMESPACE, f"{operation}Response"))
     if wrapper is None or not wrapper.children:
         pytest.skip(f"the contract has no {operation}")
     return wrapper.children[0]
 
 
-def _wrapper(judge: Judge, service: SoapService, operation: str, answer: Answer) -> etree._Element | None:
+def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapResponse) -> etree._Element | None:
     """The response wrapper of an answer without a fault, judged by its name and by the description."""
-    expected = clark(paper.NAMESPACE, f"{operation}Response")
-    first = answer.envelope.first if answer.envelope is not None and answer.fault is None else None
+    expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
+    first = answer.first if answer.fault is None else None
     if first is None or first.tag != expected:
-        judge.check(_VALID, False, answer.exchange, f"{expected} in the Body", found=answer.told)
+        judge.check(_VALID, False, answer.exchange, f"{expected} in the Body", found=answer.describe())
         return None
     described = service.described
     if described.shape(expected) is None:
@@ -59,15 +59,17 @@ def _wrapper(judge: Judge, service: SoapService, operation: str, answer: Answer)
 
 def _complete(judge: Judge, id_: str, service: SoapService, operation: str) -> etree._Element | None:
     """Ask an operation without arguments, and judge that it returns all that the contract says; return it."""
-    answer = call(service, Node(clark(paper.NAMESPACE, operation)))
-    judge.check(id_, answer.taken, answer.exchange, f"{operation}Response", found=answer.told)
+    answer = call(service, Node(clark(delivery_messages.NAMESPACE, operation)))
+    judge.check(id_, answer.accepted, answer.exchange, f"{operation}Response", found=answer.describe())
     if not answer.succeeded:
         return None
     wrapper = _wrapper(judge, service, operation, answer)
     expected = _returned(service, operation)
     returned = content.content_of(wrapper, expected) if wrapper is not None else None
     if returned is None:
-        judge.check(id_, False, answer.exchange, f"{operation}Response with content", found=f"{answer.told}, empty")
+        judge.check(
+            id_, False, answer.exchange, f"{operation}Response with content", found=f"{answer.describe()}, empty"
+        )
         return None
     problem = next(content.incomplete(returned, expected), "")
     return returned if judge.check(id_, not problem, answer.exchange, _named(expected), found=problem) else None
@@ -102,8 +104,8 @@ def test_lists(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
             ("GetSensors", "soap-subscribers/sensors"),
             ("GetNavigationServices", "soap-subscribers/services"),
         ):
-            answer = call(subscribers, Node(clark(paper.NAMESPACE, operation)))
-            judge.check(id_, answer.taken, answer.exchange, f"{operation}Response", found=answer.told)
+            answer = call(subscribers, Node(clark(delivery_messages.NAMESPACE, operation)))
+            judge.check(id_, answer.accepted, answer.exchange, f"{operation}Response", found=answer.describe())
             if not answer.succeeded:
                 continue
             wrapper = _wrapper(judge, subscribers, operation, answer)
@@ -135,13 +137,13 @@ def test_goal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """GetGoal gives a complete goal; without one an empty response, or a fault."""
     expected = _returned(subscribers, "GetGoal")
     for _ in range(effort.cases(30)):
-        answer = call(subscribers, Node(clark(paper.NAMESPACE, "GetGoal")))
+        answer = call(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
         if answer.fault is not None:
             judge.check("soap-subscribers/goal", True, answer.exchange, "a fault where there is no goal")
             continue
         wrapper = _wrapper(judge, subscribers, "GetGoal", answer) if answer.succeeded else None
         if wrapper is None:
-            judge.check("soap-subscribers/goal", False, answer.exchange, "GetGoalResponse", found=answer.told)
+            judge.check("soap-subscribers/goal", False, answer.exchange, "GetGoalResponse", found=answer.describe())
             continue
         returned = content.content_of(wrapper, expected)
         empty = returned is None or (len(returned) == 0 and not text_of(returned).strip())

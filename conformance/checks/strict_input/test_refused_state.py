@@ -11,14 +11,16 @@ from conformance.rest.calls import JSON
 from conformance.rest.mutations import near_misses
 from conformance.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.robot.delivery import Delivery, path_of
+from conformance.robot.delivery_messages import request
 from conformance.robot.drive import Drive
 from conformance.robot.goal import await_goal, await_none, difference, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.message_shapes import body_of
 from conformance.robot.probe.client import ProbeError
 from conformance.robot.robot import GOAL_PATH, LINEAR, STILL, VELOCITY, Robot, Velocity
-from conformance.robot.soap_services import message, send_delivery
+from conformance.robot.soap_services import send_delivery
 from conformance.robot.stopping import bring_to_rest
+from conformance.soap.calls import call
 
 if TYPE_CHECKING:
     from conformance.engine.session import Session
@@ -198,8 +200,7 @@ def test_an_invalid_delivery_reaches_nobody(roaas: Session, rest: HttpClient, ju
 
 def _invalid_soap(publishers: SoapService) -> list[Exchange]:
     """Messages with a bad code, a value that is not finite, a missing and a second element."""
-    values = dict(zip(("depot_x", "depot_y", "destination_x", "destination_y"), _CORRECT[1:5], strict=True))
-    values |= {"message_code": "3", "source_x": "5.5", "source_y": "6.5"}
+    values = dict(zip(Delivery._fields, _CORRECT, strict=True))
     changes: list[dict[str, str | None]] = [
         {"message_code": "5"},
         {"message_code": "abc"},
@@ -211,7 +212,6 @@ def _invalid_soap(publishers: SoapService) -> list[Exchange]:
     exchanges = [send_delivery(publishers, Delivery(0, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5))]
     for change in changes:
         given = {**values, **change}
-        content = "".join(f"<{name}>{value}</{name}>" for name, value in given.items() if value is not None)
-        body = message("ExecuteDeliveryRequest", f"<arg0>{content}</arg0>")
-        exchanges.append(publishers.post(body, fresh=True))
+        message = request("ExecuteDeliveryRequest", **{name: text for name, text in given.items() if text is not None})
+        exchanges.append(call(publishers, message, fresh=True).exchange)
     return exchanges

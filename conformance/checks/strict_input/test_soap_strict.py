@@ -9,9 +9,9 @@ import pytest
 from hypothesis import strategies as st
 
 from conformance.soap.callable_services import askable
-from conformance.soap.calls import Answer, call
+from conformance.soap.calls import SoapResponse, call
 from conformance.soap.messages import ordinary, variants
-from conformance.soap.mutations import Mutant, invalid_ones, mutants
+from conformance.soap.mutations import Mutation, invalid_ones, mutations
 from conformance.soap.valid_messages import example
 from conformance.verdict.evidence import RefutedError
 
@@ -42,7 +42,7 @@ def _targets(service: SoapService) -> list[tuple[Operation, Element, Node]]:
     return found
 
 
-def _judged(judge: Judge, mutant: Mutant, answer: Answer) -> bool:
+def _judged(judge: Judge, mutant: Mutation, answer: SoapResponse) -> bool:
     """Judge that a mutant was refused, and how."""
     why = f" ({mutant.reason})" if mutant.reason else ""
     refused = judge.check(
@@ -50,17 +50,17 @@ def _judged(judge: Judge, mutant: Mutant, answer: Answer) -> bool:
         answer.refused,
         answer.exchange,
         f"a refusal where {mutant.what}{why}",
-        found=answer.told,
-        cause=f"{mutant.kind} {answer.status} {answer.taken}",
+        found=answer.describe(),
+        cause=f"{mutant.kind} {answer.status} {answer.accepted}",
     )
-    if answer.taken:
+    if answer.accepted:
         return refused
     return judge.check(
         _FAULT,
         answer.fault is not None and answer.status == 500,
         answer.exchange,
         f"a fault with status 500 where {mutant.what}",
-        found=answer.told,
+        found=answer.describe(),
         cause=f"{answer.status} {answer.fault is None}",
     )
 
@@ -73,7 +73,7 @@ def test_single_mutations(roaas: Session, judge: Judge, effort: Effort) -> None:
     services = askable(roaas, *_IDS)
     for service in services:
         found = [
-            (declared, mutant) for _, declared, message in _targets(service) for mutant in mutants(declared, message)
+            (declared, mutant) for _, declared, message in _targets(service) for mutant in mutations(declared, message)
         ]
         chance.shuffle(found)
         # Of each kind alike, so that the many ways to miswrite a number do not crowd out the rest.
@@ -102,7 +102,7 @@ def test_mutations_of_any_message(roaas: Session, judge: Judge, explore: Explore
         if not targets:
             continue
 
-        def refused(case: tuple[Element, Mutant], service: SoapService = service) -> None:
+        def refused(case: tuple[Element, Mutation], service: SoapService = service) -> None:
             for invalid in invalid_ones([case[1]], service.contract.types):
                 if not _judged(judge, invalid, call(service, *invalid.payload)):
                     raise RefutedError(invalid.what)
@@ -110,11 +110,11 @@ def test_mutations_of_any_message(roaas: Session, judge: Judge, explore: Explore
         explore(st.sampled_from(targets).flatmap(_broken), refused, cases=80)
 
 
-def _broken(target: tuple[Element, Node]) -> st.SearchStrategy[tuple[Element, Mutant]]:
+def _broken(target: tuple[Element, Node]) -> st.SearchStrategy[tuple[Element, Mutation]]:
     """Any single mutation of any valid message of an operation."""
     declared, base = target
     return variants(declared, base).flatmap(
-        lambda drawn: st.sampled_from(list(mutants(declared, drawn))).map(lambda mutant: (declared, mutant))
+        lambda drawn: st.sampled_from(list(mutations(declared, drawn))).map(lambda mutant: (declared, mutant))
     )
 
 

@@ -129,9 +129,9 @@ MUTANTS = (
     ),
     _mutant(
         "soap-coffee-sometimes-503",
-        "One coffee in 50 is refused with 503.",
+        "One coffee in ten is refused with 503.",
         "soap-delivery/coffee",
-        altered(_COFFEE, _unavailable, nth=50),
+        altered(_COFFEE, _unavailable, nth=10),
     ),
     _mutant(
         "soap-response-full",

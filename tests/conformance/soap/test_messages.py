@@ -18,8 +18,8 @@ from conformance.documents.xsd_lexical import plain, unreadable
 from conformance.soap.envelope import envelope, read
 from conformance.soap.forms import written_float, written_integer
 from conformance.soap.messages import ordinary, simple_leaves, variants, with_text
-from conformance.soap.mutations import invalid_ones, mutants
-from conformance.soap.xml_style import Syntax, single_changes, spell, syntaxes
+from conformance.soap.mutations import invalid_ones, mutations
+from conformance.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
 
 XSD = b"""<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:t="urn:t" targetNamespace="urn:t"
                      elementFormDefault="qualified">
@@ -65,7 +65,7 @@ def test_variants_of_the_contract_are_valid_and_finite(message):
 
 
 def test_mutations_are_of_every_kind_and_invalid_to_both():
-    found = list(invalid_ones(mutants(ORDER, ordinary(ORDER, optional=True)), TYPES))
+    found = list(invalid_ones(mutations(ORDER, ordinary(ORDER, optional=True)), TYPES))
     kinds = {mutant.kind for mutant in found}
     assert kinds == {
         "missing",
@@ -122,21 +122,19 @@ def canonical(document: str) -> bytes:
     return repr(texts).replace("\\n", "").replace("  ", "").encode()
 
 
-@pytest.mark.parametrize(
-    "syntax", [syntax for _, syntax in single_changes()], ids=[name for name, _ in single_changes()]
-)
-def test_single_spellings_say_the_same(syntax):
+@pytest.mark.parametrize("style", [style for _, style in single_changes()], ids=[name for name, _ in single_changes()])
+def test_single_spellings_say_the_same(style):
     message = envelope([ordinary(REQUEST)])
-    assert canonical(spell(message, syntax)) == canonical(spell(message, Syntax()))
-    assert DELIVERY.types.valid(read(spell(message, syntax).encode()).first)
+    assert canonical(serialize(message, style)) == canonical(serialize(message, XmlStyle()))
+    assert DELIVERY.types.valid(read(serialize(message, style).encode()).first)
 
 
 @settings(max_examples=200, database=None, deadline=None)
-@given(syntaxes())
-def test_any_spelling_says_the_same(syntax):
+@given(xml_styles())
+def test_any_spelling_says_the_same(style):
     message = envelope([ordinary(REQUEST)])
-    assert canonical(spell(message, syntax)) == canonical(spell(message, Syntax()))
-    assert DELIVERY.types.valid(read(spell(message, syntax).encode()).first)
+    assert canonical(serialize(message, style)) == canonical(serialize(message, XmlStyle()))
+    assert DELIVERY.types.valid(read(serialize(message, style).encode()).first)
 
 
 def test_every_simple_type_has_an_ordinary_value():

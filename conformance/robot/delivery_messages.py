@@ -1,0 +1,58 @@
+"""The requests of this contract's SOAP services: values put into the shapes that its XSD has."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Final
+
+from conformance.contract.files import CONTRACT_DIR
+from conformance.documents.wsdl import read_file
+from conformance.documents.xml_names import clark
+from conformance.soap.messages import filled
+
+if TYPE_CHECKING:
+    from conformance.documents.xml_node import Node
+    from conformance.documents.xsd_shapes import Element
+
+NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
+# The paper's example client call.
+COORDINATES: Final = {
+    "depot_x": "68.269",
+    "depot_y": "38.718",
+    "destination_x": "60.633",
+    "destination_y": "37.51",
+    "source_x": "76.02",
+    "source_y": "41.35",
+}
+
+
+def request(operation: str, **values: float | str) -> Node:
+    """A request, its elements in the order of the XSD.
+
+    Args:
+        operation: its name.
+        values: by the element's name; numbers in the shortest form that gives them back, texts as written. An element
+            without a value is left out.
+    """
+    texts = {name: value if isinstance(value, str) else repr(value) for name, value in values.items()}
+    return filled(_shape(operation), texts)
+
+
+def delivery(operation: str = "ExecuteDeliveryRequest", code: str = "4", **coordinates: str) -> Node:
+    """A delivery request.
+
+    Args:
+        operation: ExecuteDeliveryRequest or ExecuteCoffeeRequest.
+        code: as written.
+        coordinates: those that differ from the paper's, as written.
+    """
+    return request(operation, **(COORDINATES | coordinates), message_code=code)
+
+
+@cache
+def _shape(operation: str) -> Element:
+    for service in ("publishers", "subscribers"):
+        shape = read_file(CONTRACT_DIR / f"{service}.wsdl").shape(clark(NAMESPACE, operation))
+        if shape is not None:
+            return shape
+    raise KeyError(operation)
