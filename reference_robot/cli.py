@@ -9,8 +9,7 @@ from typing import Final
 
 import click
 
-EXIT_FAILED: Final = 1
-EXIT_USAGE: Final = 2
+from conformance.contract.exit_codes import ExitCode
 
 _HIGHEST_DOMAIN_ID: Final = 101
 _FILE: Final = click.Path(exists=True, dir_okay=False, path_type=Path)
@@ -60,14 +59,14 @@ def robot(**options: object) -> None:
             import_module(module)
         except ImportError as error:
             click.echo(f"roaas robot needs {module}, which cannot be imported ({error}). Install {remedy}", err=True)
-            sys.exit(EXIT_USAGE)
+            sys.exit(ExitCode.USAGE)
     # Only now: it imports ROS and the web server.
     launch = import_module("reference_robot.launch")
     try:
         launch.run(launch.Options(**options))
     except launch.UnusableError as error:
         click.echo(f"Error: {error}", err=True)
-        sys.exit(EXIT_USAGE)
+        sys.exit(ExitCode.USAGE)
     except launch.RobotLostError as error:
         click.echo(f"Error: {error}", err=True)
-        sys.exit(EXIT_FAILED)
+        sys.exit(ExitCode.FAILED)

@@ -14,7 +14,7 @@ from sensor_msgs.msg import BatteryState, Imu, LaserScan
 from reference_robot.names import RosNames
 from reference_robot.simulation.kinematics import Motion
 from reference_robot.simulation.messages import quaternion_of
-from reference_robot.simulation.office import OFFICE, Office
+from reference_robot.simulation.office import OFFICE
 
 _SCAN_PERIOD_S: Final = 0.2
 _IMU_PERIOD_S: Final = 0.04
@@ -37,13 +37,11 @@ class Sensors:
         node: The node to work through.
         names: Topics and frames.
         motion: Gives the body's pose and velocity now.
-        office: What the laser sees.
     """
 
-    def __init__(self, node: Node, names: RosNames, motion: Callable[[], Motion], office: Office = OFFICE) -> None:
+    def __init__(self, node: Node, names: RosNames, motion: Callable[[], Motion]) -> None:
         self._clock = node.get_clock()
         self._motion = motion
-        self._office = office
         self._angles = np.linspace(-math.pi, math.pi, _BEAMS, endpoint=False)
         self._scan = LaserScan(
             angle_min=float(self._angles[0]),
@@ -77,7 +75,7 @@ class Sensors:
 
     def _look(self) -> None:
         motion = self._motion()
-        ranges = self._office.distances(motion.x, motion.y, self._angles + motion.yaw, _RANGE_MAX_M)
+        ranges = OFFICE.distances(motion.x, motion.y, self._angles + motion.yaw, _RANGE_MAX_M)
         self._scan.header.stamp = self._clock.now().to_msg()
         # rclpy takes an array of C floats as it is, where it checks a list number by number.
         self._scan.ranges = array.array("f", ranges.astype(np.float32).tobytes())

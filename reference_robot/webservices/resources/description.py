@@ -18,18 +18,24 @@ if TYPE_CHECKING:
 _WADL_NAMESPACE: Final = "{http://wadl.dev.java.net/2009/02}"
 
 
-class OpenApi(Resource):
+class _Description(Resource):
+    """A description of the interface.
+
+    Args:
+        address: Tells the interface's base URL, as a request names it.
+    """
+
+    def __init__(self, address: Callable[[Request], str]) -> None:
+        self._address = address
+
+
+class OpenApi(_Description):
     """The OpenAPI description, as JSON."""
 
     path: ClassVar = "/openapi.json"
 
     def __init__(self, address: Callable[[Request], str]) -> None:
-        """Read the description.
-
-        Args:
-            address: Tells the interface's base URL, as a request names it.
-        """
-        self._address = address
+        super().__init__(address)
         document: Any = yaml.safe_load((CONTRACT_DIR / "openapi.yaml").read_text(encoding="utf-8"))
         self._document: dict[str, Any] = document
 
@@ -39,18 +45,13 @@ class OpenApi(Resource):
         return content(200, "application/json", json.dumps(document, default=str).encode())
 
 
-class Wadl(Resource):
+class Wadl(_Description):
     """The WADL description."""
 
     path: ClassVar = "/application.wadl"
 
     def __init__(self, address: Callable[[Request], str]) -> None:
-        """Read the description.
-
-        Args:
-            address: Tells the interface's base URL, as a request names it.
-        """
-        self._address = address
+        super().__init__(address)
         self._document = etree.parse(CONTRACT_DIR / "robot.wadl")
 
     def get(self, request: Request) -> Response:
