@@ -17,7 +17,7 @@ def main() -> int:
     """Do the run; returns the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during the imports ends it without a traceback
     from loadtests.engine.run import carry_out  # noqa: PLC0415 -- it takes a second, during which Ctrl-C has to work
-    from loadtests.settings import Settings  # noqa: PLC0415 -- as above
+    from loadtests.settings.settings import Settings  # noqa: PLC0415 -- as above
 
     _raise_file_limit()
     try:

@@ -14,19 +14,12 @@ import click
 
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.statement import Statement, load_statement
-from conformance.contract.thresholds import Threshold, load_thresholds
+from conformance.contract.thresholds import load_thresholds
 from conformance.contract.toml_file import TomlFileError
 from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
-from loadtests.settings import (
-    DEFAULT_DURATION_S,
-    DEFAULT_RATE,
-    DEFAULT_WARMUP_S,
-    Settings,
-    SettingsError,
-    Wishes,
-    settle,
-)
-from loadtests.statistics.steps import STEP_S
+from loadtests.settings.cli_options import CliOptions
+from loadtests.settings.settings import STEP_S, Settings
+from loadtests.settings.settle import DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, SettingsError, settle
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -91,13 +84,15 @@ def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[fl
 @click.option("--rate", type=float, help=f"Open model: requests per second (default {DEFAULT_RATE:g}).")
 @click.option("--users", type=int, help="Closed model: users that each wait for their answer.")
 @click.option("--arrivals", type=click.Choice(["constant", "poisson"]), default="constant", show_default=True)
-@click.option("--duration", type=float, help=f"Seconds to measure (default {DEFAULT_DURATION_S:g}).")
-@click.option("--warmup", type=float, help=f"Seconds of load before, not counted (default {DEFAULT_WARMUP_S:g}).")
-@click.option("--timeout", type=float, help="Deadline of a request in seconds.")
+@click.option("--duration", "duration_s", type=float, help=f"Seconds to measure (default {DEFAULT_DURATION_S:g}).")
+@click.option(
+    "--warmup", "warmup_s", type=float, help=f"Seconds of load before, not counted (default {DEFAULT_WARMUP_S:g})."
+)
+@click.option("--timeout", "timeout_s", type=float, help="Deadline of a request in seconds.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Fixes schedule, payloads and intervals.")
 @click.option("--processes", type=click.IntRange(0, 256), default=1, show_default=True, help="Workers on this machine.")
 @click.option(
-    "--expect-workers", type=click.IntRange(0, 1000), default=0, help="Workers in all, on other machines too."
+    "--expect-workers", "expect", type=click.IntRange(0, 1000), default=0, help="Workers in all, on other machines too."
 )
 @click.option("--master-host", default="127.0.0.1", show_default=True, help="Where the master listens for workers.")
 @click.option("--master-port", type=click.IntRange(0, 65535), default=0, help="Its port; 0 picks a free one.")
@@ -107,7 +102,12 @@ def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[fl
 @click.option("--steps", is_flag=True, help="Then step the load up to find where the robot gives way.")
 @click.option("--step-rates", callback=_rates, metavar="R,R,…", help="The rates to step through.")
 @click.option(
-    "--step-duration", type=float, default=STEP_S, show_default=True, help="Seconds for each step and interface."
+    "--step-duration",
+    "step_s",
+    type=float,
+    default=STEP_S,
+    show_default=True,
+    help="Seconds for each step and interface.",
 )
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
 @click.option("--token-file", metavar="FILE", help="Holds the robot's bearer token.")
@@ -124,27 +124,17 @@ def load(ctx: click.Context, /, statement: Path | None, **options: Any) -> None:
         said = load_statement(statement) if statement is not None else Statement()
         limits = load_thresholds(options.pop("thresholds")) if options["thresholds"] else ()
         options.pop("thresholds", None)
-        settings = settle(_wishes(options, limits), said)
-        _check_folder(Path(settings.out))
+        settings = settle(CliOptions.of(**options, thresholds=limits, command=_command_line()), said)
+        _check_folder(Path(settings.output.folder))
     except (TomlFileError, SettingsError) as error:
         click.echo(f"roaas load: {error}", err=True)
         ctx.exit(ExitCode.USAGE)
     ctx.exit(run_load(settings))
 
 
-def _wishes(options: dict[str, Any], limits: tuple[Threshold, ...]) -> Wishes:
-    renamed = {
-        "duration": "duration_s",
-        "warmup": "warmup_s",
-        "timeout": "timeout_s",
-        "step_duration": "step_s",
-        "expect_workers": "expect",
-    }
-    return Wishes(
-        **{renamed.get(key, key): value for key, value in options.items()},
-        thresholds=limits,
-        command=shlex.join(["roaas", *(Path(word).name if word.startswith("/") else word for word in sys.argv[1:])]),
-    )
+def _command_line() -> str:
+    """As it was given, without the folders of this machine."""
+    return shlex.join(["roaas", *(Path(word).name if word.startswith("/") else word for word in sys.argv[1:])])
 
 
 def _check_folder(folder: Path) -> None:

@@ -7,7 +7,7 @@ figures to rely on (open model, alternating blocks, intervals) there is `roaas l
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import locust.stats
 from locust import User, constant_throughput, events, tag, task
@@ -19,13 +19,17 @@ from loadtests.clients.endpoint import EndpointError
 from loadtests.clients.failures import CallError
 from loadtests.clients.library import read_document
 from loadtests.clients.payloads import CATALOGUE, VARIANTS
-from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import WsdlError, with_addresses
-from loadtests.settings import Settings, SettingsError, Wishes, settle
+from loadtests.settings.cli_options import CliOptions
+from loadtests.settings.settle import SettingsError, settle
+
+if TYPE_CHECKING:
+    from loadtests.settings.settings import Settings
 
 OPERATIONS = tuple(CATALOGUE)
 _TEXTS = ("rest", "publishers-wsdl", "subscribers-wsdl", "publishers-endpoint", "subscribers-endpoint")
+_FILES = ("token-file", "ca-file")
 
 
 def microseconds(response_time_ms: float) -> float:
@@ -41,7 +45,7 @@ def add_options(parser: Any) -> None:
     """Our options beside Locust's own; they appear in the web UI too, but for the token's file."""
     for name in _TEXTS:
         parser.add_argument(f"--{name}", env_var=f"ROAAS_{name.upper().replace('-', '_')}", default="")
-    for name in ("token-file", "ca-file"):
+    for name in _FILES:
         parser.add_argument(
             f"--{name}", env_var=f"ROAAS_{name.upper().replace('-', '_')}", default="", include_in_web_ui=False
         )
@@ -88,17 +92,11 @@ def settings_of(options: Any) -> Settings:
     Raises:
         SettingsError: see there.
     """
-    texts: dict[str, Any] = {
-        name.replace("-", "_"): getattr(options, name.replace("-", "_")) or None for name in _TEXTS
-    }
-    wishes = Wishes(
-        **texts,
-        token_file=options.token_file or None,
-        ca_file=options.ca_file or None,
-        timeout_s=options.robot_timeout,
-        allow_motion=options.allow_motion,
+    names = [name.replace("-", "_") for name in (*_TEXTS, *_FILES)]
+    given = {name: getattr(options, name) for name in names}
+    return settle(
+        CliOptions.of(**given, timeout_s=options.robot_timeout, allow_motion=options.allow_motion), Statement()
     )
-    return settle(wishes, Statement())
 
 
 def workload_of(options: Any) -> Workload:
@@ -108,18 +106,7 @@ def workload_of(options: Any) -> Workload:
         StopTest: the options do not lead to a robot; the message says why.
     """
     try:
-        settings = settings_of(options)
-        found = Robot(
-            settings.rest,
-            settings.publishers,
-            settings.subscribers,
-            settings.publishers_wsdl,
-            settings.subscribers_wsdl,
-            settings.ca_file,
-            settings.token,
-            settings.timeout_s,
-        )
-        robot = with_addresses(found)
+        robot = with_addresses(settings_of(options).robot)
         locations = {name: robot.wsdl(name) for name in CATALOGUE}
         documents = {name: read_document(location, robot) for name, location in locations.items() if location}
     except (SettingsError, WsdlError, CallError, EndpointError) as error:

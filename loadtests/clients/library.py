@@ -18,6 +18,7 @@ from urllib3.connection import HTTPConnection, HTTPSConnection
 from zeep.transports import Transport
 from zeep.wsdl import Document
 
+from conformance.contract.thresholds import Client
 from loadtests.clients.failures import CallError, answer_error, connect_error
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
 
 now_ns = time.monotonic_ns
+#: What options and results call it, after the library that speaks SOAP; over REST it is requests.
+LIBRARY = Client.ZEEP
 
 
 @dataclass(slots=True)

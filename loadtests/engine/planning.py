@@ -8,7 +8,7 @@ from loadtests.schedule.plan import Plan
 
 if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
-    from loadtests.settings import Settings
+    from loadtests.settings.settings import Settings
 
 _LEAST_USERS, _MOST_USERS = 32, 512
 _STALL_S = 3.0  # the stall that the users of an open model outlast before arrivals queue for one
@@ -16,35 +16,29 @@ _STALL_S = 3.0  # the stall that the users of an open model outlast before arriv
 
 def duel_plan(settings: Settings, robot: Robot) -> tuple[Plan, list[str]]:
     """The plan of the duel between the interfaces, and notes on what cannot be measured."""
+    wanted = settings.selection
     interfaces, offers, missing = [], {}, set()
-    for interface in settings.interfaces:
-        for client in settings.clients:
-            numbers = [
-                number for number, name in enumerate(settings.operations) if robot.offers(interface, client, name)
-            ]
+    for interface in wanted.interfaces:
+        for client in wanted.clients:
+            numbers = [number for number, name in enumerate(wanted.operations) if robot.offers(interface, client, name)]
             missing |= {
                 f"{name} is not measured over {interface} ({client}): no endpoint or WSDL for it"
-                for number, name in enumerate(settings.operations)
+                for number, name in enumerate(wanted.operations)
                 if number not in numbers
             }
             offers[f"{interface}/{client}"] = numbers
-        if any(offers[f"{interface}/{client}"] for client in settings.clients):
+        if any(offers[f"{interface}/{client}"] for client in wanted.clients):
             interfaces.append(interface)
     clients = tuple(
-        client for client in settings.clients if all(offers[f"{interface}/{client}"] for interface in interfaces)
+        client for client in wanted.clients if all(offers[f"{interface}/{client}"] for interface in interfaces)
     )
-    workers = max(1, settings.expect)
+    workers = max(1, settings.generator.expect)
     plan = Plan(
-        operations=settings.operations,
+        operations=wanted.operations,
         interfaces=tuple(interfaces),
         clients=clients,
-        rate=settings.rate,
-        users=settings.users,
-        duration_s=settings.duration_s,
-        warmup_s=settings.warmup_s,
-        arrivals=settings.arrivals,
-        seed=settings.seed,
-        timeout_s=settings.timeout_s,
+        load=settings.load,
+        timeout_s=robot.timeout_s,
         workers=workers,
         connections=users(settings, workers),
         offers=offers,
@@ -54,8 +48,9 @@ def duel_plan(settings: Settings, robot: Robot) -> tuple[Plan, list[str]]:
 
 def users(settings: Settings, workers: int) -> int:
     """How many users come up in all."""
-    if settings.users is not None and not settings.step_rates:
-        return settings.users
-    rate = max(settings.rate or 0.0, *settings.step_rates, 0.0)
+    load, steps = settings.load, settings.steps
+    if load.users is not None and not steps.rates:
+        return load.users
+    rate = max(load.rate or 0.0, *steps.rates, 0.0)
     each = min(_MOST_USERS, max(_LEAST_USERS, int(rate / workers * _STALL_S)))
     return each * workers

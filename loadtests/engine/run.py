@@ -17,7 +17,6 @@ import locust  # patches the standard library, which has to come before our modu
 
 from conformance.contract.exit_codes import ExitCode
 from loadtests.clients.failures import CallError
-from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.engine.liveness import Liveness
 from loadtests.engine.planning import duel_plan
@@ -34,7 +33,7 @@ from loadtests.result.terminal import summary
 
 if TYPE_CHECKING:
     from loadtests.schedule.plan import Plan
-    from loadtests.settings import Settings
+    from loadtests.settings.settings import Settings
     from loadtests.statistics.recorder import Recorder
 
 
@@ -53,20 +52,11 @@ class Run:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        self.robot = Robot(
-            settings.rest if "rest" in settings.interfaces else None,
-            settings.publishers if "soap" in settings.interfaces else None,
-            settings.subscribers if "soap" in settings.interfaces else None,
-            settings.publishers_wsdl if "soap" in settings.interfaces else None,
-            settings.subscribers_wsdl if "soap" in settings.interfaces else None,
-            settings.ca_file,
-            settings.token,
-            settings.timeout_s,
-        )
+        self.robot = settings.robot
         self.outcome = Outcome(settings, self.robot, datetime.now(UTC))
         self.plan, _ = duel_plan(settings, self.robot)  # as far as can be said before the WSDLs are read
         self.collector: Collector | None = None
-        self._liveness = Liveness(REPORT_S if settings.expect else 0.0)
+        self._liveness = Liveness(REPORT_S if settings.generator.expect else 0.0)
         self._told = 0.0
         self._parent = os.getppid()
 
@@ -102,7 +92,7 @@ class Run:
         names = self.plan.series_names()
         if not names:
             raise RunAborted(ExitCode.USAGE, "no operation can be measured with these endpoints")
-        findings = self.outcome.findings = preflight(self.robot, names, self.settings.seed)
+        findings = self.outcome.findings = preflight(self.robot, names, self.settings.load.seed)
         self.outcome.notes += findings.notes
         if self.outcome.interrupted:
             raise RunAborted(ExitCode.INTERRUPTED, "interrupted before the measurement began")
@@ -124,19 +114,17 @@ class Run:
         Raises:
             RunAborted: the generator cannot work.
         """
-        plan, settings = self.plan, self.settings
+        plan, settings, generator = self.plan, self.settings, self.settings.generator
         with ExitStack() as stack:
             try:
                 executor = self.outcome.executor = self._executor()
                 stack.callback(executor.close)
-                if settings.metrics_port is not None:
-                    self.collector = Collector(lambda: executor.recorder, settings.operations)
-                    stack.callback(serve(self.collector, settings.web_host, settings.metrics_port).stop)
-                if settings.web_port is not None:
-                    self._web(executor, settings.web_host, settings.web_port)
-                executor.prepare(
-                    self.robot, settings.operations, settings.seed, zeep="zeep" in plan.clients, users=plan.connections
-                )
+                if generator.metrics_port is not None:
+                    self.collector = Collector(lambda: executor.recorder, plan.operations)
+                    stack.callback(serve(self.collector, generator.web_host, generator.metrics_port).stop)
+                if generator.web_port is not None:
+                    self._web(executor, generator.web_host, generator.web_port)
+                executor.prepare(self.robot, plan)
             except GeneratorError as error:
                 raise RunAborted(
                     ExitCode.INTERRUPTED if self.outcome.interrupted else ExitCode.USAGE, str(error)
@@ -144,22 +132,15 @@ class Run:
             self._tell_plan(plan, executor)
             self._carry_out(plan, executor)
             self.outcome.cpu_share = busiest(executor)
-            if settings.step_rates and not self.outcome.interrupted and self.outcome.dead_at is None:
+            if settings.steps.rates and not self.outcome.interrupted and self.outcome.dead_at is None:
                 self.outcome.steps += step_load(
                     plan, executor, settings, lambda: self.outcome.interrupted, self._number, tell
                 )
 
     def _executor(self) -> Executor:
-        settings = self.settings
-        if settings.expect:
-            return DistributedExecutor(
-                settings.master_host,
-                settings.master_port,
-                settings.processes,
-                settings.expect,
-                tell,
-                lambda: self.outcome.interrupted,
-            )
+        generator = self.settings.generator
+        if generator.expect:
+            return DistributedExecutor(generator, tell, lambda: self.outcome.interrupted)
         return LocalExecutor()
 
     @staticmethod
@@ -174,7 +155,7 @@ class Run:
     def _carry_out(self, plan: Plan, executor: Executor) -> None:
         """Run a plan, watching for its end, Ctrl-C and the robot's death."""
         self._number(plan)
-        ceiling = self.settings.max_rate if not plan.open_model else None
+        ceiling = self.settings.limits.max_rate if not plan.open_model else None
         executor.run(plan, ceiling, lambda elapsed: self._watch(plan, executor.recorder, elapsed))
 
     def _watch(self, plan: Plan, recorder: Recorder, elapsed: float) -> bool:
@@ -201,10 +182,10 @@ class Run:
 
     @staticmethod
     def _tell_plan(plan: Plan, executor: Executor) -> None:
-        load = f"{plan.rate:g} requests/s" if plan.open_model else f"{plan.users} users"
+        load = f"{plan.load.rate:g} requests/s" if plan.open_model else f"{plan.load.users} users"
         tell(
             f"measuring {', '.join(plan.operations)} over {' and '.join(plan.interfaces)} at {load} "
-            f"for {plan.duration_s:g} s after {plan.warmup_s:g} s of warm-up, {plan.blocks} blocks, "
+            f"for {plan.load.duration_s:g} s after {plan.load.warmup_s:g} s of warm-up, {plan.blocks} blocks, "
             f"paced by {executor.pacing}"
         )
 
@@ -228,7 +209,7 @@ def carry_out(settings: Settings) -> int:
         aborted = RunAborted(ExitCode.INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
     code, document = compose(run.outcome, run.plan, aborted)
     if aborted is None or aborted.code != ExitCode.USAGE:
-        path = write(Path(settings.out), document)
+        path = write(Path(settings.output.folder), document)
         tell(f"written: {path}")
     if aborted is None:
         sys.stdout.write(summary(document))

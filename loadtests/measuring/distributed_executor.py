@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import gevent
 from locust.exception import RPCError
 
+from loadtests.clients.library import LIBRARY
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import LEAD_S, Member, boot_id, new_environment, now_ns
 from loadtests.statistics.recorder import Recorder
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from loadtests.clients.robot import Robot
     from loadtests.schedule.plan import Plan
+    from loadtests.settings.settings import Generator
 
 _NS = 1_000_000_000
 _READY_S = 60.0
@@ -32,22 +34,13 @@ class DistributedExecutor:
     """Workers led by a Locust master.
 
     Args:
-        host, port: where the master listens for workers; port 0 picks a free one.
-        processes: workers to start on this machine.
-        expected: workers to wait for in all; those beyond `processes` come from elsewhere.
+        generator: where the master listens; how many workers to start here, and how many to wait for in all.
         tell: says how things stand, for the terminal.
         stopped: whether somebody wants an end; asked while waiting for workers.
     """
 
-    def __init__(
-        self,
-        host: str,
-        port: int,
-        processes: int,
-        expected: int,
-        tell: Callable[[str], None],
-        stopped: Callable[[], bool],
-    ) -> None:
+    def __init__(self, generator: Generator, tell: Callable[[str], None], stopped: Callable[[], bool]) -> None:
+        host, port = generator.master_host, generator.master_port
         self.environment = new_environment()
         try:
             self.runner = self.environment.create_master_runner(host, port)
@@ -61,8 +54,8 @@ class DistributedExecutor:
         self.tell = tell
         self.stopped = stopped
         self._host, self._port = host, self.runner.server.port if port == 0 else port
-        self._processes = processes
-        self._expected = max(expected, processes)
+        self._processes = generator.processes
+        self._expected = max(generator.expect, generator.processes)
         self._children: dict[int, subprocess.Popen[bytes]] = {}
         self._by_client: dict[str, Member] = {}
         self._refusals: list[str] = []
@@ -77,7 +70,7 @@ class DistributedExecutor:
         """How many processes share the work."""
         return self._expected
 
-    def prepare(self, robot: Robot, operations: tuple[str, ...], seed: int, *, zeep: bool, users: int) -> None:
+    def prepare(self, robot: Robot, plan: Plan) -> None:
         """Start the workers of this machine, wait for all, and have their users come up.
 
         Raises:
@@ -99,15 +92,15 @@ class DistributedExecutor:
         self._wait(lambda: self.runner.worker_count >= self._expected, "workers connected")
         job = {
             "robot": asdict(replace(robot, token=None)),  # a token does not travel: each worker has its own
-            "operations": list(operations),
-            "seed": seed,
-            "zeep": zeep,
+            "operations": list(plan.operations),
+            "seed": plan.load.seed,
+            "library": LIBRARY in plan.clients,
         }
         self.runner.send_message("roaas_prepare", job)
         self._wait(lambda: self._prepared >= self._expected or bool(self._refusals), "workers are ready")
         if self._refusals:
             raise GeneratorError(f"a worker cannot work: {self._refusals[0]}")
-        self.runner.start(users, spawn_rate=users)
+        self.runner.start(plan.connections, spawn_rate=plan.connections)
 
     def _wait(self, reached: Callable[[], bool], what: str) -> None:
         deadline = time.monotonic() + (_READY_S if self._expected <= self._processes else 10 * _READY_S)

@@ -18,6 +18,7 @@ from loadtests.clients.endpoint import Endpoint
 
 if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
+    from loadtests.settings.settings import Output
 
 _SECRET = re.compile(r"^-.*(token|password|secret|key)\b(?!-file)", re.IGNORECASE)
 _PACKAGES = (
@@ -34,14 +35,13 @@ _PACKAGES = (
 )
 
 
-def describe(robot: Robot, about: dict[str, str], servers: dict[str, str | None], command: str) -> dict[str, Any]:
+def describe(robot: Robot, output: Output, servers: dict[str, str | None]) -> dict[str, Any]:
     """The `environment` of latency.json.
 
     Args:
         robot: addresses.
-        about: name, vendor and version from the statement.
+        output: the robot's name, vendor and version as the statement gives them, and our command line.
         servers: Server header by interface.
-        command: the load generator's command line.
     """
     addresses = [address for address in (robot.rest, robot.publishers, robot.subscribers) if address]
     here = bool(addresses) and all(_is_here(Endpoint.parse(address).host) for address in addresses)
@@ -53,12 +53,12 @@ def describe(robot: Robot, about: dict[str, str], servers: dict[str, str | None]
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         "versions": _versions(),
-        "command": command,
+        "command": output.command,
         "robot_command": _listener(addresses[0]) if here else None,
         "robot": {
-            "name": about.get("name"),
-            "vendor": about.get("vendor"),
-            "version": about.get("version"),
+            "name": output.about.get("name"),
+            "vendor": output.about.get("vendor"),
+            "version": output.about.get("version"),
             "rest": robot.rest,
             "publishers": robot.publishers,
             "subscribers": robot.subscribers,

@@ -17,6 +17,7 @@ from locust import User, task
 from locust.env import Environment
 from locust.event import Events
 
+from loadtests.clients.library import LIBRARY
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.user_session import Session
 from loadtests.statistics.recorder import Recorder
@@ -74,7 +75,7 @@ class Executor(Protocol):
     def workers(self) -> int:
         """How many processes share the work."""
 
-    def prepare(self, robot: Robot, operations: tuple[str, ...], seed: int, *, zeep: bool, users: int) -> None:
+    def prepare(self, robot: Robot, plan: Plan) -> None:
         """Get ready: clients built, users waiting."""
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
@@ -118,11 +119,12 @@ class LocalExecutor:
         """One."""
         return 1
 
-    def prepare(self, robot: Robot, operations: tuple[str, ...], seed: int, *, zeep: bool, users: int) -> None:
+    def prepare(self, robot: Robot, plan: Plan) -> None:
         """Get ready: clients built, users waiting."""
-        session = Session(self.environment, robot, operations, seed, zeep=zeep)
+        session = Session(self.environment, robot, plan.operations, plan.load.seed, library=LIBRARY in plan.clients)
         self._session = self.environment.roaas_session = session
         self.recorder, self.pacing = session.recorder, session.pacer.pacing
+        users = plan.connections
         self.runner.start(users, spawn_rate=users)
         with gevent.Timeout(30, GeneratorError(f"only {session.pacer.waiting} of {users} users came up within 30 s")):
             while session.pacer.waiting < users:

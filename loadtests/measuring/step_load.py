@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from loadtests.measuring.executor import busiest
 from loadtests.schedule.arrivals import arrivals_due
-from loadtests.schedule.plan import Plan, step_operation
+from loadtests.schedule.plan import step_operation
 from loadtests.statistics import steps
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from loadtests.measuring.executor import Executor
-    from loadtests.settings import Settings
+    from loadtests.schedule.plan import Plan
+    from loadtests.settings.settings import Settings
 
 
 def step_load(
@@ -39,22 +41,14 @@ def step_load(
     standing = [name for name in first.interfaces if operation in first.offered(name, "wire")]
     used = first.first_segment + len(first.segments)
     found: list[dict[str, Any]] = []
-    for rate in settings.step_rates:
+    for rate in settings.steps.rates:
         if not standing or stopped():
             break
-        plan = Plan(
-            operations=first.operations,
+        plan = replace(
+            first,
             interfaces=tuple(standing),
             clients=("wire",),
-            rate=rate,
-            users=None,
-            duration_s=settings.step_s,
-            warmup_s=0.0,
-            arrivals=settings.arrivals,
-            seed=settings.seed,
-            timeout_s=settings.timeout_s,
-            workers=first.workers,
-            connections=first.connections,
+            load=replace(first.load, rate=rate, users=None, duration_s=settings.steps.step_s, warmup_s=0.0),
             offers={f"{name}/wire": [operation] for name in standing},
             step_rate=rate,
             first_segment=used,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import gevent
 
 from loadtests.clients.callers import Caller, Workload
-from loadtests.clients.library import Sent, read_document
+from loadtests.clients.library import LIBRARY, Sent, read_document
 from loadtests.clients.payloads import VARIANTS
 from loadtests.measuring.locust_feed import LocustFeed
 from loadtests.schedule.arrivals import Schedule
@@ -49,10 +49,12 @@ class Session:
         robot: what to call.
         operations: names, in the order in which plans number them.
         seed: fixes the payloads.
-        zeep: whether plans may use the zeep client.
+        library: whether plans may use the library client.
     """
 
-    def __init__(self, environment: Any, robot: Robot, operations: tuple[str, ...], seed: int, *, zeep: bool) -> None:
+    def __init__(
+        self, environment: Any, robot: Robot, operations: tuple[str, ...], seed: int, *, library: bool
+    ) -> None:
         self.robot = robot
         self.series_of: dict[int, int] = {}
         self.segments: dict[int, Segment] = {}
@@ -64,11 +66,11 @@ class Session:
         self._busy = 0
         self._cpu: list[tuple[float, float]] = []
         documents: dict[str, Any] = {}
-        if zeep:
+        if library:
             parsed: dict[str, Any] = {}
             for name in operations:
                 wsdl = robot.wsdl(name)
-                if wsdl is not None and robot.offers("soap", "zeep", name):
+                if wsdl is not None and robot.offers("soap", LIBRARY, name):
                     parsed[wsdl] = parsed.get(wsdl) or read_document(wsdl, robot)
                     documents[name] = parsed[wsdl]
         self.workload = Workload(robot, operations, seed, documents)

@@ -51,7 +51,7 @@ class Worker:
         error = ""
         try:
             robot = Robot.from_message(job["robot"] | {"token": self.token})
-            self.session = Session(environment, robot, tuple(job["operations"]), job["seed"], zeep=job["zeep"])
+            self.session = Session(environment, robot, tuple(job["operations"]), job["seed"], library=job["library"])
             self.session.after_segment = self._pack
             environment.roaas_session = self.session
         except Exception as trouble:  # noqa: BLE001 -- whatever it is, the master has to hear of it

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from conformance.contract.exit_codes import ExitCode
+from loadtests.clients.library import LIBRARY
 from loadtests.clients.payloads import CATALOGUE
 from loadtests.measuring.environment import describe
 from loadtests.result.files import FORMAT
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from loadtests.measuring.preflight import Findings
     from loadtests.result.outcome import Outcome, RunAborted
     from loadtests.schedule.plan import Plan
-    from loadtests.settings import Settings
+    from loadtests.settings.settings import Settings
 
 CLIENT_WORDS = {
     "wire": "our own HTTP/1.1 client on gevent and llhttp, the same for both interfaces; requests built beforehand, "
@@ -54,7 +55,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "exit_code": code,
         "started": _stamp(outcome.started),
         "finished": _stamp(datetime.now(UTC)),
-        "environment": describe(outcome.robot, settings.about, outcome.findings.servers, settings.command),
+        "environment": describe(outcome.robot, settings.output, outcome.findings.servers),
         "plan": _plan_words(settings, plan, pacing),
         "generator": generator,
         "workers": workers,
@@ -73,7 +74,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
 def _generator(outcome: Outcome, measured: figures.Measured) -> dict[str, Any]:
     plan = measured.plan
     asked = sum(arrivals_due(plan, outcome.elapsed_s, phase=phase) for phase in ("duel", "aa"))
-    elapsed_s = max(0.0, outcome.elapsed_s - plan.warmup_s)
+    elapsed_s = max(0.0, outcome.elapsed_s - plan.load.warmup_s)
     return verdict.generator_figures(measured, asked, elapsed_s, outcome.cpu_share)
 
 
@@ -162,27 +163,27 @@ def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
 def _plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
     return {
         "model": "open" if plan.open_model else "closed",
-        "arrivals": plan.arrivals if plan.open_model else None,
-        "rate": plan.rate,
-        "users": plan.users,
-        "duration_s": plan.duration_s,
-        "warmup_s": plan.warmup_s,
+        "arrivals": plan.load.arrivals if plan.open_model else None,
+        "rate": plan.load.rate,
+        "users": plan.load.users,
+        "duration_s": plan.load.duration_s,
+        "warmup_s": plan.load.warmup_s,
         "block_s": round(plan.block_s, 6),
         "gap_s": GAP_S,
         "blocks": plan.blocks,
-        "seed": plan.seed,
+        "seed": plan.load.seed,
         "timeout_s": plan.timeout_s,
         "operations": list(plan.operations),
         "interfaces": list(plan.interfaces),
         "clients": {name: CLIENT_WORDS[name] for name in plan.clients},
-        "zeep_rate": plan.rate_of("zeep") if plan.open_model and "zeep" in plan.clients else None,
+        "zeep_rate": plan.rate_of(LIBRARY) if plan.open_model and LIBRARY in plan.clients else None,
         "methods": {name: CATALOGUE[name].element for name in plan.operations},
         "processes": plan.workers,
         "connections": plan.connections,
         "pacing": pacing,
-        "limits": {"max_rate": settings.max_rate, "max_duration_s": settings.max_duration_s},
-        "step_rates": list(settings.step_rates),
-        "step_s": settings.step_s if settings.step_rates else None,
+        "limits": {"max_rate": settings.limits.max_rate, "max_duration_s": settings.limits.max_duration_s},
+        "step_rates": list(settings.steps.rates),
+        "step_s": settings.steps.step_s if settings.steps.rates else None,
     }
 
 

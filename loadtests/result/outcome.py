@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from loadtests.clients.robot import Robot
     from loadtests.measuring.executor import Executor
-    from loadtests.settings import Settings
+    from loadtests.settings.settings import Settings
 
 
 class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code

@@ -36,7 +36,7 @@ class Schedule:
         plan = self.plan
         if not plan.open_model and plan.step_rate is None:
             return [0] * len(plan.segments)
-        if plan.arrivals == "poisson":
+        if plan.load.arrivals == "poisson":
             return [
                 int(self._lot(index, 2).poisson(segment.rate * (segment.end_ns - segment.start_ns) / _NS))
                 for index, segment in enumerate(plan.segments)
@@ -51,7 +51,7 @@ class Schedule:
         return counts
 
     def _lot(self, segment: int, purpose: int) -> np.random.Generator:
-        return np.random.default_rng([self.plan.seed, purpose, self.plan.first_segment + segment])
+        return np.random.default_rng([self.plan.load.seed, purpose, self.plan.first_segment + segment])
 
     def count(self) -> int:
         """How many segments there are."""
@@ -84,7 +84,7 @@ class Schedule:
         count = self._counts[segment]
         start, end = self.starts_ns(segment), self.ends_ns(segment)
         lot = self._lot(segment, 3)
-        if self.plan.arrivals == "poisson":
+        if self.plan.load.arrivals == "poisson":
             places = np.sort(lot.random(count))
         else:  # a phase by lot, lest the schedule beat with the robot's own clock
             places = (np.arange(count) + lot.random()) / max(count, 1)

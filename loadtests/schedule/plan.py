@@ -8,10 +8,11 @@ clients get quartets of their own, for their CPU time would delay the wire clien
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from conformance.contract.thresholds import Client, Interface, Operation
@@ -29,7 +30,6 @@ _BLOCK_S = 0.1
 _MAX_BLOCKS = 600  # bounds memory: each block keeps its own histograms
 _ARRIVALS_PER_BLOCK = 10
 _QUARTET = 4
-_LISTS = frozenset({"operations", "interfaces", "clients"})
 _NS = 1_000_000_000
 
 
@@ -60,6 +60,25 @@ class Segment:
 
 
 @dataclass(frozen=True)
+class Load:
+    """How much is asked of the robot, and for how long.
+
+    Attributes:
+        rate: arrivals per second over all workers (open model); None in the closed model.
+        users: users that each wait for their answer (closed model).
+        arrivals: `constant` or `poisson`.
+        seed: fixes schedule, payloads and intervals.
+    """
+
+    rate: float | None
+    users: int | None
+    duration_s: float
+    warmup_s: float
+    arrivals: str
+    seed: int
+
+
+@dataclass(frozen=True)
 class Plan:
     """Everything that fixes a run. Workers rebuild the same plan from `as_message`.
 
@@ -72,12 +91,7 @@ class Plan:
     operations: tuple[str, ...]
     interfaces: tuple[str, ...]
     clients: tuple[str, ...]
-    rate: float | None
-    users: int | None
-    duration_s: float
-    warmup_s: float
-    arrivals: str
-    seed: int
+    load: Load
     timeout_s: float
     workers: int
     connections: int
@@ -88,13 +102,13 @@ class Plan:
 
     def as_message(self) -> dict[str, Any]:
         """A form that msgpack carries."""
-        return asdict(self)
+        message: dict[str, Any] = msgspec.to_builtins(self)
+        return message
 
     @classmethod
     def from_message(cls, message: dict[str, Any]) -> Plan:
         """Read what `as_message` wrote."""
-        fields: dict[str, Any] = {key: tuple(value) if key in _LISTS else value for key, value in message.items()}
-        return cls(**fields)
+        return msgspec.convert(message, cls)
 
     def offered(self, interface: str, client: str) -> tuple[int, ...]:
         """The operations that a client can call over an interface, by number."""
@@ -113,25 +127,25 @@ class Plan:
     @property
     def open_model(self) -> bool:
         """Requests start at their times, whether or not earlier ones have come back."""
-        return self.users is None or self.step_rate is not None
+        return self.load.users is None or self.step_rate is not None
 
     @cached_property
     def blocks(self) -> int:
         """How many blocks the duel has: whole quartets, or two where there is no time for four."""
-        least = max(_BLOCK_S, self.duration_s / _MAX_BLOCKS)
-        if self.rate:
-            least = max(least, _ARRIVALS_PER_BLOCK / self.rate)
-        blocks = int(self.duration_s / least + 1e-9)
+        least = max(_BLOCK_S, self.load.duration_s / _MAX_BLOCKS)
+        if self.load.rate:
+            least = max(least, _ARRIVALS_PER_BLOCK / self.load.rate)
+        blocks = int(self.load.duration_s / least + 1e-9)
         return blocks - blocks % _QUARTET if blocks >= _QUARTET else 2
 
     @property
     def block_s(self) -> float:
         """Length of a block."""
-        return self.duration_s / self.blocks
+        return self.load.duration_s / self.blocks
 
     def rate_of(self, client: str) -> float:
         """Arrivals per second over all workers while a client has its turn."""
-        rate = self.rate or 0.0
+        rate = self.load.rate or 0.0
         return rate if client == "wire" else min(rate, LIBRARY_RATE * self.workers)
 
     @cached_property
@@ -146,22 +160,22 @@ class Plan:
 
     def _warmup(self) -> list[Segment]:
         turns = [(client, interface) for client in self.clients for interface in self.interfaces]
-        if self.warmup_s <= 0:
+        if self.load.warmup_s <= 0:
             return []
-        count = max(len(turns), round(self.warmup_s / _BLOCK_S))
+        count = max(len(turns), round(self.load.warmup_s / _BLOCK_S))
         made = []
         for index in range(count):
             client, interface = turns[index % len(turns)]
-            start, end = (int(self.warmup_s * edge / count * _NS) for edge in (index, index + 1))
+            start, end = (int(self.load.warmup_s * edge / count * _NS) for edge in (index, index + 1))
             made.append(Segment(start, end, "warmup", interface, client, "", -1, self.rate_of(client)))
         return made
 
     def _duel(self) -> list[Segment]:
-        lot = np.random.default_rng([self.seed, 1])
+        lot = np.random.default_rng([self.load.seed, 1])
         made: list[Segment] = []
         for quartet in range((self.blocks + _QUARTET - 1) // _QUARTET):
             made += self._quartet(quartet, bool(lot.integers(2)))
-        origin = self.warmup_s
+        origin = self.load.warmup_s
         placed = []
         for index, segment in enumerate(made[: self.blocks]):
             start, end = (int((origin + self.block_s * edge) * _NS) for edge in (index, index + 1))
@@ -202,11 +216,11 @@ class Plan:
         made = []
         at = 0.0
         for interface in self.interfaces:
-            pieces = max(1, round(self.duration_s / 0.5))
+            pieces = max(1, round(self.load.duration_s / 0.5))
             for piece in range(pieces):
-                start, end = (int((at + self.duration_s * edge / pieces) * _NS) for edge in (piece, piece + 1))
+                start, end = (int((at + self.load.duration_s * edge / pieces) * _NS) for edge in (piece, piece + 1))
                 made.append(Segment(start, end, "step", interface, "wire", "", -1, float(self.step_rate or 0.0)))
-            at += self.duration_s + self.settle_s
+            at += self.load.duration_s + self.settle_s
         return made
 
     def series_of(self) -> dict[int, int]:

@@ -107,7 +107,7 @@ def series(measured: Measured, sizes: dict[SeriesName, tuple[int, int]]) -> list
         intervals: dict[str, dict[str, Any]] = {"service": {}, "response": {}}
         for quantile in ("p50", "p99"):
             for time, kept in intervals.items():
-                kept[quantile], reason = _interval_of(blocks, time, quantile, measured.plan.seed)
+                kept[quantile], reason = _interval_of(blocks, time, quantile, measured.plan.load.seed)
                 if reason:
                     reasons[f"ci95 {quantile}"] = reason
         request, response = sizes.get(name, (None, None))
@@ -156,7 +156,7 @@ def comparisons(measured: Measured) -> list[dict[str, Any]]:
             pairs = [(first[pair], second[pair]) for pair in sorted(set(first) & set(second))]
             found += [
                 {"operation": operation, "client": client}
-                | _compared(pairs, quantile, measured.plan.seed, "soap_minus_rest_ms")
+                | _compared(pairs, quantile, measured.plan.load.seed, "soap_minus_rest_ms")
                 for quantile in COMPARED
             ]
     return found
@@ -173,7 +173,7 @@ def noise_floor(measured: Measured) -> list[dict[str, Any]]:
             pairs = [(first[pair], second[pair]) for pair in sorted(set(first) & set(second))]
             found += [
                 {"operation": name[0], "interface": interface, "client": client}
-                | _compared(pairs, quantile, measured.plan.seed, "difference_ms")
+                | _compared(pairs, quantile, measured.plan.load.seed, "difference_ms")
                 for quantile in COMPARED
             ]
     return found

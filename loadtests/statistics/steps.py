@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from conformance.contract.thresholds import Threshold
     from loadtests.schedule.plan import Plan
 
-DEFAULT_RATES = (100.0, 200.0, 400.0, 800.0, 1600.0, 3200.0, 6400.0, 12800.0)
-STEP_S = 3.0
 _NS = 1_000_000_000
 _MOST_P99_MS = 50.0
 _MOST_ERRORS = 0.01

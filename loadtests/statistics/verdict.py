@@ -128,7 +128,7 @@ def judge(measured: Measured, thresholds: Iterable[Threshold]) -> list[dict[str,
             bound, reason = entry["measured_ms"], None if whole.total else "no samples"
         else:
             interval, reason = quantile_interval_ms(
-                [getattr(cell, threshold.time) for cell in blocks], threshold.quantile, measured.plan.seed
+                [getattr(cell, threshold.time) for cell in blocks], threshold.quantile, measured.plan.load.seed
             )
             bound = rounded(interval[1]) if interval else None
         entry["bound_ms"], entry["reason"] = bound, reason

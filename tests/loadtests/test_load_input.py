@@ -9,7 +9,6 @@ from click.testing import CliRunner
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.statement import Endpoints, Load, Statement
 from conformance.contract.thresholds import ThresholdsError, load_thresholds
-from loadtests import settings
 from loadtests.cli import load
 from loadtests.clients import wsdl
 from loadtests.clients.endpoint import Endpoint
@@ -18,7 +17,9 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Request
 from loadtests.clients.wsdl import WsdlError
 from loadtests.measuring.equivalence import request_difference, requests_difference
-from loadtests.settings import Settings, SettingsError, Wishes, settle
+from loadtests.settings.cli_options import CliOptions
+from loadtests.settings.settings import Settings
+from loadtests.settings.settle import MOTION_RATE, SettingsError, settle
 
 CONTRACT = Path(__file__).parents[2] / "conformance" / "contract"
 REST = {"rest": "http://robot:7003"}
@@ -26,67 +27,69 @@ REST = {"rest": "http://robot:7003"}
 
 def test_options_win_over_the_statement_and_defaults_fill_the_rest():
     found = settle(
-        Wishes(rest="http://other:1", rate=50.0),
+        CliOptions.of(rest="http://other:1", rate=50.0),
         Statement(
             endpoints=Endpoints(rest="http://robot:7003", publishers_endpoint="http://robot:5555/p", timeout_s=3.0)
         ),
     )
-    assert (found.rest, found.publishers, found.rate, found.timeout_s) == (
+    assert (found.robot.rest, found.robot.publishers, found.load.rate, found.robot.timeout_s) == (
         "http://other:1",
         "http://robot:5555/p",
         50.0,
         3.0,
     )
-    assert found.operations == ("pose",)
-    assert found.interfaces == ("rest", "soap")
-    assert found.clients == ("wire", "zeep")
+    assert found.selection.operations == ("pose",)
+    assert found.selection.interfaces == ("rest", "soap")
+    assert found.selection.clients == ("wire", "zeep")
     assert Settings.from_json(found.to_json()) == found
 
 
 @pytest.mark.parametrize(
-    ("wishes", "message"),
+    ("options", "message"),
     [
-        (Wishes(), "no endpoint"),
-        (Wishes(rest="robot"), "'robot' does not begin with http"),
-        (Wishes(**REST, operations=("delivery",)), "--allow-motion"),
-        (Wishes(**REST, rate=10.0, users=2), "exclude each other"),
-        (Wishes(**REST, rate=0.0), "--rate 0 is out of range"),
-        (Wishes(**REST, rate=float("nan")), "--rate nan is out of range"),
-        (Wishes(**REST, users=0), "--users 0 is out of range"),
-        (Wishes(**REST, duration_s=-1.0), "--duration -1 is out of range"),
-        (Wishes(**REST, warmup_s=-1.0), "--warmup -1 is out of range"),
-        (Wishes(**REST, rate=501.0, allow_motion=True), "exceeds 500 requests/s (the default limit"),
-        (Wishes(**REST, duration_s=121.0, allow_motion=True), "exceeds 120 s (the default limit"),
+        (CliOptions.of(), "no endpoint"),
+        (CliOptions.of(rest="robot"), "'robot' does not begin with http"),
+        (CliOptions.of(**REST, operations=("delivery",)), "--allow-motion"),
+        (CliOptions.of(**REST, rate=10.0, users=2), "exclude each other"),
+        (CliOptions.of(**REST, rate=0.0), "--rate 0 is out of range"),
+        (CliOptions.of(**REST, rate=float("nan")), "--rate nan is out of range"),
+        (CliOptions.of(**REST, users=0), "--users 0 is out of range"),
+        (CliOptions.of(**REST, duration_s=-1.0), "--duration -1 is out of range"),
+        (CliOptions.of(**REST, warmup_s=-1.0), "--warmup -1 is out of range"),
+        (CliOptions.of(**REST, rate=501.0, allow_motion=True), "exceeds 500 requests/s (the default limit"),
+        (CliOptions.of(**REST, duration_s=121.0, allow_motion=True), "exceeds 120 s (the default limit"),
         (
-            Wishes(**REST, step_rates=(100.0, 600.0), allow_motion=True, operations=("delivery",)),
+            CliOptions.of(**REST, step_rates=(100.0, 600.0), allow_motion=True, operations=("delivery",)),
             "--step-rates 600 exceeds 500",
         ),
-        (Wishes(**REST, token_file="/nonexistent"), "token file '/nonexistent': No such file"),  # noqa: S106 - a path
-        (Wishes(**REST, ca_file="/nonexistent"), "ca_file '/nonexistent'"),
-        (Wishes(**REST, interfaces=("soap",)), "--interface soap needs"),
+        (CliOptions.of(**REST, token_file="/nonexistent"), "token file '/nonexistent': No such file"),  # noqa: S106 - a path
+        (CliOptions.of(**REST, ca_file="/nonexistent"), "ca_file '/nonexistent'"),
+        (CliOptions.of(**REST, interfaces=("soap",)), "--interface soap needs"),
     ],
 )
-def test_runs_that_must_not_be(wishes, message):
+def test_runs_that_must_not_be(options, message):
     with pytest.raises(SettingsError, match=re.escape(message)):
-        settle(wishes, Statement())
+        settle(options, Statement())
 
 
 def test_the_statements_limits_hold_and_lift():
     limits = Statement(endpoints=Endpoints(request_rate=80.0), load=Load(max_duration_s=5.0))
-    assert settle(Wishes(**REST), limits).rate == 80
-    assert settle(Wishes(**REST), limits).duration_s == 5
+    assert settle(CliOptions.of(**REST), limits).load.rate == 80
+    assert settle(CliOptions.of(**REST), limits).load.duration_s == 5
     with pytest.raises(
         SettingsError, match=re.escape("exceeds 80 requests/s (the statement's [endpoints] request_rate)")
     ):
-        settle(Wishes(**REST, rate=81.0), limits)
+        settle(CliOptions.of(**REST, rate=81.0), limits)
     lifted = Statement(load=Load(max_rate=2000.0, max_duration_s=900.0))
-    found = settle(Wishes(**REST, rate=1500.0, duration_s=600.0, allow_motion=True), lifted)
-    assert (found.rate, found.max_rate) == (1500.0, 2000.0)
-    assert settle(Wishes(**REST, rate=9000.0, duration_s=600.0), Statement()).rate == 9000.0, "reads are not bounded"
-    assert settle(Wishes(**REST, step_rates=(6000.0,), allow_motion=True), Statement()).step_rates == (6000.0,), (
-        "of reads"
+    found = settle(CliOptions.of(**REST, rate=1500.0, duration_s=600.0, allow_motion=True), lifted)
+    assert (found.load.rate, found.limits.max_rate) == (1500.0, 2000.0)
+    assert settle(CliOptions.of(**REST, rate=9000.0, duration_s=600.0), Statement()).load.rate == 9000.0, (
+        "reads are not bounded"
     )
-    assert settle(Wishes(**REST, users=4, allow_motion=True), Statement()).max_rate == settings.MOTION_RATE
+    assert settle(CliOptions.of(**REST, step_rates=(6000.0,), allow_motion=True), Statement()).steps.rates == (
+        6000.0,
+    ), "of reads"
+    assert settle(CliOptions.of(**REST, users=4, allow_motion=True), Statement()).limits.max_rate == MOTION_RATE
 
 
 def test_a_slip_in_any_table_of_the_statement_is_refused(tmp_path):
@@ -125,7 +128,7 @@ def test_tokens_that_no_header_may_hold(tmp_path, content):
     path = tmp_path / "token"
     path.write_bytes(content)
     with pytest.raises(SettingsError, match="token"):
-        settle(Wishes(**REST, token_file=str(path)), Statement())
+        settle(CliOptions.of(**REST, token_file=str(path)), Statement())
 
 
 def test_the_address_is_read_from_the_wsdl():

@@ -9,22 +9,14 @@ from hypothesis import strategies as st
 from loadtests.clients.wire import now_ns
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Pacer
-from loadtests.schedule.plan import CLIENTS, INTERFACES, Plan
+from loadtests.schedule.plan import CLIENTS, INTERFACES, Load, Plan
 
-PLAN = Plan(
-    operations=("delivery", "pose"),
-    interfaces=INTERFACES,
-    clients=CLIENTS,
-    rate=100.0,
-    users=None,
-    duration_s=20.0,
-    warmup_s=1.0,
-    arrivals="constant",
-    seed=1,
-    timeout_s=10.0,
-    workers=1,
-    connections=32,
-)
+LOAD = Load(rate=100.0, users=None, duration_s=20.0, warmup_s=1.0, arrivals="constant", seed=1)
+PLAN = Plan(("delivery", "pose"), INTERFACES, CLIENTS, LOAD, timeout_s=10.0, workers=1, connections=32)
+
+
+def varied(clients=CLIENTS, workers=1, **load):
+    return replace(PLAN, clients=clients, workers=workers, load=replace(LOAD, **load))
 
 
 def everything(plan, worker=0, workers=1):
@@ -41,7 +33,7 @@ def everything(plan, worker=0, workers=1):
     st.floats(0.3, 4.0),
 )
 def test_the_workers_shares_make_up_the_schedule(workers, arrivals, seed, rate, duration):
-    plan = replace(PLAN, arrivals=arrivals, seed=seed, rate=rate, duration_s=duration)
+    plan = varied(arrivals=arrivals, seed=seed, rate=rate, duration_s=duration)
     shares = [everything(plan, worker, workers) for worker in range(workers)]
     assert sorted(arrival for share in shares for arrival in share) == everything(plan)
     for worker, share in enumerate(shares):
@@ -55,13 +47,13 @@ def test_the_workers_shares_make_up_the_schedule(workers, arrivals, seed, rate, 
 def test_a_plan_survives_its_message_and_a_seed_fixes_it():
     assert Plan.from_message(PLAN.as_message()) == PLAN
     assert everything(PLAN) == everything(Plan.from_message(PLAN.as_message()))
-    assert everything(PLAN) != everything(replace(PLAN, seed=2))
+    assert everything(PLAN) != everything(varied(seed=2))
 
 
 def test_the_rate_is_kept_exactly_by_constant_and_on_average_by_poisson_arrivals():
     due = [arrival for arrival in everything(PLAN) if PLAN.segments[arrival[0]].phase != "warmup"]
     assert len(due) == 2000
-    plan = replace(PLAN, arrivals="poisson", rate=1000.0)
+    plan = varied(arrivals="poisson", rate=1000.0)
     wire = [arrival for arrival in everything(plan) if plan.segments[arrival[0]].client == "wire"]
     seconds = sum((s.end_ns - s.start_ns) / 1e9 for s in plan.segments if s.client == "wire")
     assert abs(len(wire) - 1000 * seconds) < 4 * (1000 * seconds) ** 0.5
@@ -90,19 +82,19 @@ def test_no_second_passes_without_the_wire_client():
     for segment in PLAN.segments:
         if (segment.phase, segment.client) == ("duel", "wire"):
             gap, last = max(gap, segment.start_ns - last), segment.end_ns
-    assert gap <= PLAN.warmup_s * 1e9 or gap <= 0.5e9
+    assert gap <= LOAD.warmup_s * 1e9 or gap <= 0.5e9
 
 
 @settings(deadline=None)
 @given(st.floats(0.1, 3600.0), st.floats(0.01, 5000.0) | st.none())
 def test_the_number_of_blocks_is_bounded_whatever_the_run(duration, rate):
-    plan = replace(PLAN, duration_s=duration, rate=rate, users=None if rate else 3)
+    plan = varied(duration_s=duration, rate=rate, users=None if rate else 3)
     assert 2 <= plan.blocks <= 600
-    assert plan.length_s == pytest.approx(plan.warmup_s + duration, abs=1e-6)
+    assert plan.length_s == pytest.approx(plan.load.warmup_s + duration, abs=1e-6)
 
 
 def test_the_ordinary_clients_rate_is_bounded():
-    plan = replace(PLAN, rate=4000.0, workers=2)
+    plan = varied(rate=4000.0, workers=2)
     assert {segment.rate for segment in plan.segments if segment.client == "zeep"} == {200.0}
     assert {segment.rate for segment in plan.segments if segment.client == "wire"} == {4000.0}
 
@@ -139,7 +131,7 @@ def paced(plan, users, work=0.0, timeout_ns=10**10):
 
 
 def test_arrivals_are_started_at_their_times_and_never_before():
-    plan = replace(PLAN, rate=500.0, duration_s=1.0, warmup_s=0.0, clients=("wire",))
+    plan = varied(rate=500.0, duration_s=1.0, warmup_s=0.0, clients=("wire",))
     taken, dropped, origin = paced(plan, 20)
     wanted = everything(plan)
     assert not dropped
@@ -150,7 +142,7 @@ def test_arrivals_are_started_at_their_times_and_never_before():
 
 
 def test_arrivals_wait_for_a_user_when_all_are_busy_and_are_dropped_after_their_deadline():
-    plan = replace(PLAN, rate=100.0, duration_s=0.6, warmup_s=0.0, clients=("wire",))
+    plan = varied(rate=100.0, duration_s=0.6, warmup_s=0.0, clients=("wire",))
     taken, dropped, _ = paced(plan, 1, work=0.05, timeout_ns=100_000_000)
     assert len(taken) < len(everything(plan))
     assert dropped
@@ -159,7 +151,7 @@ def test_arrivals_wait_for_a_user_when_all_are_busy_and_are_dropped_after_their_
 
 
 def test_users_of_the_closed_model_go_on_as_soon_as_they_are_done():
-    plan = replace(PLAN, rate=None, users=3, duration_s=0.5, warmup_s=0.0, clients=("wire",))
+    plan = varied(rate=None, users=3, duration_s=0.5, warmup_s=0.0, clients=("wire",))
     taken, _, origin = paced(plan, 3, work=0.005)
     assert 30 < len(taken) < 330
     for arrival, _ in taken:

@@ -5,7 +5,7 @@ import pytest
 
 from conformance.contract.thresholds import Interface, Operation, Quantile, Threshold
 from loadtests.schedule.arrivals import Schedule
-from loadtests.schedule.plan import Plan
+from loadtests.schedule.plan import Load, Plan
 from loadtests.statistics.figures import Measured, quantiles, series, time_series
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.intervals import (
@@ -102,20 +102,8 @@ def test_a_threshold_is_judged_by_what_is_certain(values, below, outcome):
     assert found["reason"] if outcome != "met" else not found["reason"]
 
 
-STALL = Plan(
-    operations=("pose",),
-    interfaces=("rest", "soap"),
-    clients=("wire", "zeep"),
-    rate=100.0,
-    users=None,
-    duration_s=20.0,
-    warmup_s=0.0,
-    arrivals="constant",
-    seed=1,
-    timeout_s=10.0,
-    workers=1,
-    connections=300,
-)
+LOAD = Load(rate=100.0, users=None, duration_s=20.0, warmup_s=0.0, arrivals="constant", seed=1)
+STALL = Plan(("pose",), ("rest", "soap"), ("wire", "zeep"), LOAD, timeout_s=10.0, workers=1, connections=300)
 
 
 def simulated(plan, stall_from, stall_s, service_ms=1.0, *, open_model=True):

@@ -1,0 +1,51 @@
+"""The command line's options, as they were given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+from conformance.contract.statement import Endpoints
+from loadtests.settings.settings import STEP_S, Generator, Selection
+
+if TYPE_CHECKING:
+    from conformance.contract.thresholds import Threshold
+
+
+@dataclass(frozen=True)
+class CliOptions:
+    """None or empty where an option was not given.
+
+    Attributes:
+        endpoints: those that were given of the statement's [endpoints], which they override.
+    """
+
+    endpoints: dict[str, Any] = field(default_factory=dict)
+    selection: Selection = field(default_factory=Selection)
+    generator: Generator = field(default_factory=Generator)
+    rate: float | None = None
+    users: int | None = None
+    duration_s: float | None = None
+    warmup_s: float | None = None
+    arrivals: str = "constant"
+    seed: int = 1
+    steps: bool = False
+    step_rates: tuple[float, ...] = ()
+    step_s: float = STEP_S
+    allow_motion: bool = False
+    thresholds: tuple[Threshold, ...] = ()
+    out: str = ""
+    command: str = ""
+
+    @classmethod
+    def of(cls, **given: Any) -> CliOptions:
+        """Sort options by their names into the groups that they belong to."""
+        endpoints = _take(given, Endpoints.__struct_fields__)
+        endpoints = {name: value for name, value in endpoints.items() if value not in {None, ""}}
+        selection = Selection(**_take(given, [item.name for item in fields(Selection)]))
+        generator = Generator(**_take(given, [item.name for item in fields(Generator)]))
+        return cls(endpoints, selection, generator, **given)
+
+
+def _take(given: dict[str, Any], names: list[str] | tuple[str, ...]) -> dict[str, Any]:
+    return {name: given.pop(name) for name in names if name in given}

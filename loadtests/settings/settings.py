@@ -1,0 +1,94 @@
+"""A run, ready to be carried out: frozen groups of values, each passed whole to whom it concerns."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import msgspec
+
+from conformance.contract.thresholds import Threshold
+from loadtests.clients.robot import Robot
+from loadtests.schedule.plan import Load
+
+STEP_S = 3.0
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What is measured; each empty in the options where all that there is is meant."""
+
+    operations: tuple[str, ...] = ()
+    interfaces: tuple[str, ...] = ()
+    clients: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The stepped load after the duel: arrivals per second, none where it is not asked for; seconds for each."""
+
+    rates: tuple[float, ...] = ()
+    step_s: float = STEP_S
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the statement allows, or the default for what moves a robot: requests per second, and seconds."""
+
+    max_rate: float | None
+    max_duration_s: float | None
+
+
+@dataclass(frozen=True)
+class Generator:
+    """The processes that make the load, and where they are watched.
+
+    Attributes:
+        processes: workers on this machine.
+        expect: workers in all, those of other machines included; 0 when only this process works.
+        master_host, master_port: where the master listens for workers; port 0 picks a free one.
+        web_host: where Locust's web UI (`web_port`) and Prometheus' metrics (`metrics_port`) are, if anywhere.
+    """
+
+    processes: int = 1
+    expect: int = 0
+    master_host: str = "127.0.0.1"
+    master_port: int = 0
+    web_host: str = "127.0.0.1"
+    web_port: int | None = None
+    metrics_port: int | None = None
+
+
+@dataclass(frozen=True)
+class Output:
+    """The result's folder; and what the result repeats: the command line, and the robot's name, vendor and version."""
+
+    folder: str
+    command: str
+    about: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A run. Whatever was not asked for is filled in.
+
+    Attributes:
+        robot: addresses of the selected interfaces only; a SOAP address that only the WSDL knows is None.
+        load: rate is None in the closed model.
+    """
+
+    robot: Robot
+    selection: Selection
+    load: Load
+    steps: Steps
+    limits: Limits
+    generator: Generator
+    output: Output
+    thresholds: tuple[Threshold, ...]
+
+    def to_json(self) -> str:
+        """For the process that measures."""
+        return msgspec.json.encode(self).decode()
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Read what `to_json` wrote."""
+        return msgspec.json.decode(text, type=cls)

@@ -1,0 +1,220 @@
+"""From options and statement to settings: options over statement over defaults."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
+from loadtests.clients.robot import Robot
+from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS, Load
+from loadtests.settings.settings import Limits, Output, Selection, Settings, Steps
+
+if TYPE_CHECKING:
+    from conformance.contract.statement import Endpoints, Statement
+    from loadtests.settings.cli_options import CliOptions
+
+DEFAULT_RATE = 200.0
+DEFAULT_DURATION_S = 20.0
+DEFAULT_WARMUP_S = 2.0
+DEFAULT_STEP_RATES = (100.0, 200.0, 400.0, 800.0, 1600.0, 3200.0, 6400.0, 12800.0)
+#: For anything that moves a robot, unless its statement's [load] says otherwise.
+MOTION_RATE = 500.0
+MOTION_DURATION_S = 120.0
+_MOST_RATE = 1_000_000.0
+_MOST_USERS = 10_000
+_MOST_DURATION_S = 24 * 3600.0
+
+
+class SettingsError(ValueError):
+    """A run that cannot be, or must not be; the message says what to change."""
+
+
+def settle(options: CliOptions, statement: Statement) -> Settings:
+    """Fill in and check.
+
+    Raises:
+        SettingsError: contradictions, values out of range, limits of the statement exceeded, motion not allowed.
+    """
+    endpoints = msgspec.structs.replace(statement.endpoints, **options.endpoints)
+    _check_endpoints(endpoints)
+    interfaces = _interfaces(options, endpoints)
+    operations = _operations(options)
+    _check_numbers(options)
+    rate, duration_s = _bounded(options, statement, operations)
+    generator = options.generator
+    return Settings(
+        robot=_robot(endpoints, interfaces),
+        selection=Selection(
+            operations=operations,
+            interfaces=interfaces,
+            clients=tuple(name for name in CLIENTS if name in (options.selection.clients or CLIENTS)),
+        ),
+        load=Load(
+            rate=rate,
+            users=options.users,
+            duration_s=duration_s,
+            warmup_s=DEFAULT_WARMUP_S if options.warmup_s is None else options.warmup_s,
+            arrivals=options.arrivals,
+            seed=options.seed,
+        ),
+        steps=Steps(_step_rates(options, statement, operations), options.step_s),
+        limits=Limits(_ceiling(statement, operations)[0], _longest(statement, operations)[0]),
+        generator=replace(
+            generator, expect=max(generator.expect, generator.processes if generator.processes > 1 else 0)
+        ),
+        output=Output(options.out, options.command, statement.robot),
+        thresholds=options.thresholds or statement.load.thresholds,
+    )
+
+
+def _check_endpoints(endpoints: Endpoints) -> None:
+    descriptions = (endpoints.publishers_wsdl, endpoints.subscribers_wsdl)
+    try:
+        for address in (endpoints.rest, endpoints.publishers_endpoint, endpoints.subscribers_endpoint):
+            if address:
+                Endpoint.parse(address)
+        for location in descriptions:
+            if location and "://" in location:  # else it is a file
+                Endpoint.parse(location)
+        if endpoints.ca_file:
+            tls_context(Path(endpoints.ca_file))
+    except EndpointError as error:
+        raise SettingsError(str(error)) from None
+
+
+def _interfaces(options: CliOptions, endpoints: Endpoints) -> tuple[str, ...]:
+    soap = endpoints.publishers or endpoints.subscribers
+    there = {"rest": bool(endpoints.rest), "soap": soap}
+    interfaces = options.selection.interfaces or tuple(name for name in INTERFACES if there[name])
+    if not interfaces:
+        raise SettingsError("no endpoint: give a statement, --rest, --publishers-wsdl or --subscribers-wsdl")
+    if "rest" in interfaces and not endpoints.rest:
+        raise SettingsError("--interface rest needs --rest or the statement's [endpoints] rest")
+    if "soap" in interfaces and not soap:
+        raise SettingsError("--interface soap needs --publishers-wsdl, --subscribers-wsdl or an endpoint")
+    return tuple(name for name in INTERFACES if name in interfaces)
+
+
+def _robot(endpoints: Endpoints, interfaces: tuple[str, ...]) -> Robot:
+    """The robot, with no more addresses than the interfaces need."""
+    soap = endpoints if "soap" in interfaces else type(endpoints)()
+    return Robot(
+        rest=endpoints.rest if "rest" in interfaces else None,
+        publishers=soap.publishers_endpoint,
+        subscribers=soap.subscribers_endpoint,
+        publishers_wsdl=soap.publishers_wsdl,
+        subscribers_wsdl=soap.subscribers_wsdl,
+        ca_file=endpoints.ca_file,
+        token=_token(endpoints.token_file),
+        timeout_s=endpoints.timeout_s,
+    )
+
+
+def _operations(options: CliOptions) -> tuple[str, ...]:
+    if not options.selection.operations:
+        return ("delivery", "pose") if options.allow_motion else ("pose",)
+    moving = [name for name in options.selection.operations if name in MOVES]
+    if moving and not options.allow_motion:
+        raise SettingsError(
+            f"operation {moving[0]!r} makes the robot drive: say --allow-motion when its surroundings are clear, "
+            "or measure --operation pose"
+        )
+    return tuple(name for name in OPERATIONS if name in options.selection.operations)
+
+
+def _check_numbers(options: CliOptions) -> None:
+    if options.rate is not None and options.users is not None:
+        raise SettingsError("--rate (open model) and --users (closed model) exclude each other")
+    if options.users is not None and (options.steps or options.step_rates):
+        raise SettingsError("--steps offers rates, which is an open model: give --rate instead of --users")
+    if options.generator.processes + options.generator.expect < 1:
+        raise SettingsError("--processes 0 leaves the work to others: say how many with --expect-workers")
+    ranges: list[tuple[str, Any, float, float]] = [
+        ("--rate", options.rate, 0.0, _MOST_RATE),
+        ("--users", options.users, 0, _MOST_USERS),
+        ("--duration", options.duration_s, 0.0, _MOST_DURATION_S),
+        ("--timeout", options.endpoints.get("timeout_s"), 0.0, 3600.0),
+        ("--step-duration", options.step_s, 0.0, 600.0),
+        *(("--step-rates", rate, 0.0, _MOST_RATE) for rate in options.step_rates),
+    ]
+    for name, value, low, high in ranges:
+        if value is not None and not low < value <= high:
+            raise SettingsError(f"{name} {value:g} is out of range: above {low:g}, at most {high:g}")
+    if options.warmup_s is not None and not 0 <= options.warmup_s <= _MOST_DURATION_S:
+        raise SettingsError(f"--warmup {options.warmup_s:g} is out of range: 0 or more")
+
+
+def _ceiling(statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, str]:
+    """The highest rate allowed, and who says so."""
+    found: list[tuple[float, str]] = []
+    if statement.endpoints.request_rate is not None:
+        found.append((statement.endpoints.request_rate, "the statement's [endpoints] request_rate"))
+    if statement.load.max_rate is not None:
+        found.append((statement.load.max_rate, "the statement's [load] max_rate"))
+    elif MOVES.intersection(operations):
+        found.append(
+            (MOTION_RATE, "the default limit for what moves a robot; the statement's [load] max_rate lifts it")
+        )
+    return min(found) if found else (None, "")
+
+
+def _longest(statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, str]:
+    """The longest duration allowed, and who says so."""
+    if statement.load.max_duration_s is not None:
+        return statement.load.max_duration_s, "the statement's [load] max_duration_s"
+    if MOVES.intersection(operations):
+        why = "the default limit for what moves a robot; the statement's [load] max_duration_s lifts it"
+        return MOTION_DURATION_S, why
+    return None, ""
+
+
+def _bounded(options: CliOptions, statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, float]:
+    """Rate and duration within what is allowed; defaults bend, options are refused."""
+    most, why = _ceiling(statement, operations)
+    longest, reason = _longest(statement, operations)
+    rate = None if options.users is not None else (options.rate or min(DEFAULT_RATE, most or DEFAULT_RATE))
+    if rate is not None and most is not None and rate > most:
+        raise SettingsError(f"--rate {rate:g} exceeds {most:g} requests/s ({why})")
+    duration_s = options.duration_s or min(DEFAULT_DURATION_S, longest or DEFAULT_DURATION_S)
+    if longest is not None and duration_s > longest:
+        raise SettingsError(f"--duration {duration_s:g} exceeds {longest:g} s ({reason})")
+    return rate, duration_s
+
+
+def _step_rates(options: CliOptions, statement: Statement, operations: tuple[str, ...]) -> tuple[float, ...]:
+    """The rates of the stepped load, which is one of reads where there is one; empty when it was not asked for."""
+    reads = tuple(name for name in operations if name not in MOVES)
+    ceiling = _ceiling(statement, reads or operations)[0]
+    if options.step_rates:
+        above = [rate for rate in options.step_rates if ceiling is not None and rate > ceiling]
+        if above:
+            raise SettingsError(
+                f"--step-rates {above[0]:g} exceeds {ceiling:g} requests/s, which is the highest allowed"
+            )
+        return tuple(sorted(set(options.step_rates)))
+    if not options.steps:
+        return ()
+    if ceiling is None:
+        return DEFAULT_STEP_RATES
+    return tuple(rate for rate in DEFAULT_STEP_RATES if rate <= ceiling) or (ceiling,)
+
+
+def _token(path: str | None) -> str | None:
+    """The bearer token in a file.
+
+    Raises:
+        SettingsError: unreadable, empty, or nothing that a header may hold (RFC 6750 section 2.1).
+    """
+    if path is None:
+        return None
+    try:
+        token = Path(path).read_text("utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise SettingsError(f"token file {path!r}: {getattr(error, 'strerror', None) or error}") from None
+    if not token or not token.isascii() or not token.isprintable() or " " in token:
+        raise SettingsError(f"token file {path!r} holds no token: one line of printable ASCII without spaces")
+    return token
