@@ -103,28 +103,24 @@ def refused(served: Served, foreign: ForeignRobot, answer, status: int) -> None:
     assert foreign.next("velocity")["x"] == 0.123
 
 
-@pytest.mark.parametrize("body", NO_JSON.values(), ids=NO_JSON)
-def test_what_is_no_json_is_400(served: Served, foreign: ForeignRobot, body: bytes):
-    answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": "application/json"})
-    refused(served, foreign, answer, 400)
-
-
-@pytest.mark.parametrize("body", WRONG_JSON.values(), ids=WRONG_JSON)
-def test_json_of_the_wrong_shape_or_value_is_422(served: Served, foreign: ForeignRobot, body: str):
-    answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": "application/json"})
-    refused(served, foreign, answer, 422)
-
-
-@pytest.mark.parametrize("body", NO_XML.values(), ids=NO_XML)
-def test_what_is_no_xml_or_an_attack_is_400(served: Served, foreign: ForeignRobot, body: str):
-    answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": "application/xml"})
-    refused(served, foreign, answer, 400)
-
-
-@pytest.mark.parametrize("body", WRONG_XML.values(), ids=WRONG_XML)
-def test_xml_of_the_wrong_shape_or_value_is_422(served: Served, foreign: ForeignRobot, body: str):
-    answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": "application/xml"})
-    refused(served, foreign, answer, 422)
+@pytest.mark.parametrize(
+    ("media_type", "status", "body"),
+    [
+        pytest.param(media_type, status, body, id=f"{media_type} {name}")
+        for media_type, status, bodies in (
+            ("application/json", 400, NO_JSON),
+            ("application/json", 422, WRONG_JSON),
+            ("application/xml", 400, NO_XML),
+            ("application/xml", 422, WRONG_XML),
+        )
+        for name, body in bodies.items()
+    ],
+)
+def test_what_is_no_document_is_400_and_a_wrong_one_422(
+    served: Served, foreign: ForeignRobot, media_type: str, status: int, body: str | bytes
+):
+    answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": media_type})
+    refused(served, foreign, answer, status)
 
 
 @pytest.mark.parametrize(
