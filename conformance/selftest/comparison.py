@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from lxml import etree
 
 from conformance.contract.files import CONTRACT_DIR
-from conformance.selftest.proxy import unchanged
+from conformance.selftest.change import unchanged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
 from conformance.selftest.certifying import Job, Outcome, run_job
-from conformance.selftest.proxy import Proxy, unchanged
+from conformance.selftest.change import unchanged
+from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import REFERENCE, Robot, running, statement_of
 
 if TYPE_CHECKING:

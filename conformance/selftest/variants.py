@@ -11,17 +11,15 @@ import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from conformance.selftest.change import unchanged
 from conformance.selftest.mutants.changes import parsed, problem
-from conformance.selftest.proxy import unchanged
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from conformance.selftest.proxy import Change
-    from conformance.selftest.wire import Request, Response
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Change, Forward
+    from conformance.selftest.messages import Request, Response
 
 _PREFIX = "/r2d2/api"
 _TOKEN = "open-sesame"  # noqa: S105 - of a robot that lives for seconds, on loopback
@@ -101,11 +99,8 @@ def _closing(request: Request, forward: Forward) -> Response:
 
 
 def _guarded(request: Request, forward: Forward) -> Response:
-    """A token is wanted for everything; without it, 401 as RFC 9110 has it."""
+    """A token is wanted for everything that is HTTP; without it, 401 as RFC 9110 has it."""
     if request.raw is None and request.field("Authorization") != f"Bearer {_TOKEN}":
-        # Framing is looked at first, by the robot; a request that is none never comes to the question of the token.
-        if sum(name.lower() == "host" for name, _ in request.fields) != 1:
-            return forward(request)
         return problem(401, "a bearer token is wanted", ("WWW-Authenticate", 'Bearer realm="robot"'))(request)
     return forward(request)
 

@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
-from conformance.selftest.wire import Response
+from conformance.selftest.messages import Response
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.proxy import Change
-    from conformance.selftest.wire import Request
+    from conformance.selftest.change import Change, Forward
+    from conformance.selftest.messages import Request
 
     Where = Callable[[Request], bool]
     When = Callable[[Response], bool]
     Make = Callable[[], Change]
-    Forward = Callable[[Request], Response]
 
 POSE, VELOCITY, LINEAR = "/robot/pose/", "/robot/velocity/", "/robot/velocity/linear/"
 SENSORS, SERVICES = "/robot/sensors/", "/robot/navigation/services/"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from conformance.selftest.change import HangUpError
 from conformance.selftest.mutants.changes import (
     altered,
     becomes,
@@ -16,12 +17,12 @@ from conformance.selftest.mutants.changes import (
     rewritten,
 )
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.proxy import HangUpError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NON_FINITE = re.compile(r"[+-]?(nan|inf|infinity|1e400|\d+e\d{3,})", re.IGNORECASE)
@@ -77,7 +78,7 @@ class _OnlyOnce:
     def __init__(self) -> None:
         self._seen: set[str] = set()
 
-    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         if deliveries(request):
             if request.target in self._seen:
                 return problem(409, "code: this delivery was accepted before")(request)
@@ -85,7 +86,7 @@ class _OnlyOnce:
         return forward(request)
 
 
-def _hung_up(request: Request, forward: Callable[[Request], Response]) -> Response:
+def _hung_up(request: Request, forward: Forward) -> Response:
     if deliveries(request):
         raise HangUpError
     return forward(request)

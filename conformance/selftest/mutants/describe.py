@@ -22,7 +22,7 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request
+    from conformance.selftest.messages import Request
 
 _OPENAPI, _WADL = rest("GET", "/openapi.json"), rest("GET", "/application.wadl")
 

@@ -12,9 +12,8 @@ from conformance.selftest.mutants.changes import deliveries, plain, soap
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _COFFEE = soap("ExecuteCoffeeRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from conformance.selftest.messages import Request
 from conformance.selftest.mutants.changes import (
     GOAL,
     LINEAR,
@@ -21,12 +22,12 @@ from conformance.selftest.mutants.changes import (
     tree,
 )
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.wire import Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Response
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Response
 
 _GET = rest("GET")
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
@@ -87,7 +88,7 @@ def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
     return Mutant(name, says, (f"rest-formats/{id_}",), "rest", make)
 
 
-def _no_xml_input(request: Request, forward: Callable[[Request], Response]) -> Response:
+def _no_xml_input(request: Request, forward: Forward) -> Response:
     if _PUT(request) and request.media_type.endswith("xml"):
         return problem(415, f"Content-Type: {request.media_type} is not taken")(request)
     return forward(request)

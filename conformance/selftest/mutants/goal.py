@@ -37,9 +37,8 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 

@@ -7,15 +7,12 @@ import math
 import threading
 from typing import TYPE_CHECKING, Any
 
+from conformance.selftest.messages import Response
 from conformance.selftest.mutants.changes import GOAL, parsed, plain, problem, rest, success
-from conformance.selftest.wire import Response
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.wire import Request
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request
 
 _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 

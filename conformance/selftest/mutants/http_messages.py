@@ -25,9 +25,8 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _ANY, _GET, _POSE = rest(), rest("GET"), rest("GET", POSE)
 _INPUT = rest("PUT", *RESOURCES)
@@ -59,44 +58,54 @@ def _valueless(value: Any) -> None:
 
 
 def _longer(response: Response) -> None:
-    wire = response.wire()
+    wire = response.octets()
     response.raw = re.sub(
         rb"(?i)(content-length: )(\d+)", lambda found: found[1] + str(int(found[2]) + 7).encode(), wire
     )
 
 
 def _shorter(response: Response) -> None:
-    response.raw = response.wire() + b"left over"
+    response.raw = response.octets() + b"left over"
 
 
 def _broken_field(response: Response) -> None:
-    response.raw = response.wire().replace(b"\r\n", b"\r\nThis is no field\r\n", 1)
+    response.raw = response.octets().replace(b"\r\n", b"\r\nThis is no field\r\n", 1)
 
 
 def _two_lengths(response: Response) -> None:
-    response.raw = response.wire().replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1)
+    response.raw = response.octets().replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1)
+
+
+def _with_field(request: Request, name: str, value: str) -> Request:
+    """A request that is no HTTP, with one field of this name in place of all of them."""
+    head, _, body = (request.raw or b"").partition(b"\r\n\r\n")
+    line, *fields = head.split(b"\r\n")
+    others = [field for field in fields if not field.lower().startswith(f"{name.lower()}:".encode())]
+    return request.copy(raw=b"\r\n".join([line, f"{name}: {value}".encode(), *others, b"", b""]) + body)
+
+
+def _count(request: Request, name: str) -> int | None:
+    """How many fields of a request of REST that is no HTTP have this name, or None where it is HTTP, or of SOAP."""
+    if request.side != "rest" or request.raw is None:
+        return None
+    return len(re.findall(rb"(?i)\r\n%s:" % name.encode(), request.raw))
 
 
 def _hosts(count: int) -> Callable[[Request, Forward], Response]:
     """Requests with this many Host fields are taken like others."""
 
     def change(request: Request, forward: Forward) -> Response:
-        if request.raw is None and sum(name.lower() == "host" for name, _ in request.fields) == count:
-            request = request.copy()
-            request.put("Host", "robot")
-        return forward(request)
+        taken = _count(request, "Host") == count
+        return forward(_with_field(request, "Host", "robot") if taken else request)
 
     return change
 
 
 def _first_length(request: Request, forward: Forward) -> Response:
     """Of several Content-Length fields the first one counts, for what there is."""
-    if request.side == "rest" and request.raw is not None and request.raw.lower().count(b"content-length:") > 1:
-        head, _, body = request.raw.partition(b"\r\n\r\n")
-        line, *fields = head.split(b"\r\n")
-        kept = [field for field in fields if not field.lower().startswith(b"content-length:")]
-        kept += [b"Content-Length: %d" % len(body), b"Connection: close"]
-        return forward(request.copy(raw=b"\r\n".join([line, *kept, b"", b""]) + body))
+    if (_count(request, "Content-Length") or 0) > 1:
+        _, _, body = (request.raw or b"").partition(b"\r\n\r\n")
+        request = _with_field(request, "Content-Length", str(len(body)))
     return forward(request)
 
 

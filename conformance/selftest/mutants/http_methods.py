@@ -32,9 +32,8 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _ANY, _GET, _HEAD, _OPTIONS = rest(), rest("GET"), rest("HEAD"), rest("OPTIONS")
 _INPUT = rest("PUT", *RESOURCES)
@@ -46,7 +45,7 @@ def _with_body(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if _HEAD(request) and success(response):
         body = forward(request.copy(method="GET")).body
-        head = response.wire().split(b"\r\n\r\n")[0]
+        head = response.octets().split(b"\r\n\r\n")[0]
         response.raw = head + b"\r\n\r\n" + body
     return response
 

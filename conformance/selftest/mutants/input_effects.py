@@ -11,9 +11,8 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 _INVALID = {400, 415, 422}

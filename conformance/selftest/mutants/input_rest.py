@@ -30,9 +30,8 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}

@@ -14,7 +14,7 @@ from conformance.selftest.mutants.soap_profile import is_fault
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
+    from conformance.selftest.messages import Request, Response
 
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 _ANY = soap()

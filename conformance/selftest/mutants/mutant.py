@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.proxy import Change, IncompleteRequest
+    from conformance.selftest.change import Change, IncompleteRequest
 
 
 @dataclass(frozen=True)

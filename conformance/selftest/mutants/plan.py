@@ -12,7 +12,7 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
+    from conformance.selftest.messages import Request, Response
 
 _GET = rest("GET", PLAN)
 

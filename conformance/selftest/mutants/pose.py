@@ -22,8 +22,8 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.proxy import Change
-    from conformance.selftest.wire import Request, Response
+    from conformance.selftest.change import Change, Forward
+    from conformance.selftest.messages import Request, Response
 
 _AT = rest("GET", POSE)
 
@@ -71,7 +71,7 @@ class _Frozen:
         self._parts = parts
         self._first: Any = None
 
-    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         response = forward(request)
         value = parsed(response.body) if _AT(request) and response.status == 200 else None
         if isinstance(value, dict):
@@ -86,7 +86,7 @@ class _Backwards:
     def __init__(self) -> None:
         self._count = 0
 
-    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         response = forward(request)
         if _AT(request) and response.status == 200:
             self._count += 1
@@ -105,7 +105,7 @@ class _NotYet:
     def __init__(self) -> None:
         self._left = 10
 
-    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         if _AT(request) and self._left:
             self._left -= 1
             return problem(503, "no odometry yet")(request)

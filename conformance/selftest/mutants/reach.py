@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from conformance.selftest.change import HangUpError
 from conformance.selftest.mutants.changes import instead, plain
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.proxy import HangUpError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.proxy import Change
-    from conformance.selftest.wire import Request, Response
+    from conformance.selftest.change import Change, Forward
+    from conformance.selftest.messages import Request, Response
 
 _REST_CLASSES = ("rest-resources", "rest-delivery", "http", "safety", "equivalence", "strict-input")
 _LOST = plain(404, b"<html><body>It works!</body></html>", "text/html")
 
 
 def _hung_up() -> Change:
-    def change(request: Request, forward: Callable[[Request], Response]) -> Response:
+    def change(request: Request, forward: Forward) -> Response:
         if request.side == "rest":
             raise HangUpError
         return forward(request)
@@ -32,7 +32,7 @@ def _service(name: str) -> Callable[[Request], bool]:
 
 
 def _nothing_there() -> Change:
-    def change(request: Request, forward: Callable[[Request], Response]) -> Response:  # noqa: ARG001 - a change has a way forward
+    def change(request: Request, forward: Forward) -> Response:  # noqa: ARG001 - a change has a way forward
         if request.side == "rest":
             raise HangUpError
         return _LOST(request)

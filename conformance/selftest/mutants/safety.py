@@ -6,6 +6,7 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
+from conformance.selftest.messages import Request
 from conformance.selftest.mutants.changes import (
     GOAL,
     LINEAR,
@@ -22,14 +23,12 @@ from conformance.selftest.mutants.changes import (
 from conformance.selftest.mutants.goal_memory import active
 from conformance.selftest.mutants.input_effects import drive, goal_ahead, sent
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.wire import Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Response
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Response
 
 _PUT = rest("PUT", VELOCITY)
 _PUTS = rest("PUT", VELOCITY, LINEAR)
@@ -236,10 +235,10 @@ def _zero(value: Any) -> bool:
         return False
 
 
-def _torn_drive() -> Callable[[str, bytes, Forward], None]:
+def _incomplete_drive() -> Callable[[str, bytes, Forward], None]:
     """A request that ends in the middle is carried out with what had come."""
 
-    def incomplete_request(side: str, _got: bytes, forward: Forward) -> None:
+    def incomplete_request(side: str, _octets: bytes, forward: Forward) -> None:
         if side == "rest":
             drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
 
@@ -294,7 +293,7 @@ MUTANTS = (
         "A request that ends in the middle moves the robot.",
         ("client-vanished",),
         _unchanged,
-        incomplete_request=_torn_drive,
+        incomplete_request=_incomplete_drive,
     ),
     _mutant(
         "safety-one-at-a-time",

@@ -13,7 +13,8 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _ANY = soap()
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
@@ -175,7 +176,7 @@ def _empty(response: Response, value: int) -> None:
     response.drop("Content-Type")
 
 
-def _any_type(request: Request, forward: Callable[[Request], Response]) -> Response:
+def _any_type(request: Request, forward: Forward) -> Response:
     if _posted(request) and request.media_type != "text/xml":
         request = request.copy()
         request.put("Content-Type", "text/xml; charset=utf-8")

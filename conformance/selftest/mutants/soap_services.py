@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
+from conformance.selftest.messages import Response
 from conformance.selftest.mutants.changes import (
     SOAP,
     TNS,
@@ -21,14 +22,12 @@ from conformance.selftest.mutants.changes import (
     wsdls,
 )
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.wire import Response
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _ACT, _READ = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"), soap("Get[A-Z][A-Za-z]+")

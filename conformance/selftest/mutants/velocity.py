@@ -27,7 +27,8 @@ from conformance.selftest.mutants.mutant import Mutant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _GET, _PUT = rest("GET", VELOCITY), rest("PUT", VELOCITY)
 _GET_LINEAR, _PUT_LINEAR = rest("GET", LINEAR), rest("PUT", LINEAR)
@@ -61,7 +62,7 @@ class _Commanded:
     def __init__(self) -> None:
         self._last: Any = _STILL
 
-    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         response = forward(request)
         if _PUT(request) and response.status in {200, 204}:
             self._last = parsed(request.body) or self._last
@@ -73,7 +74,7 @@ class _Commanded:
 class _WhileGoal:
     """During a goal, a velocity is answered with a status that nobody expects."""
 
-    def __call__(self, request: Request, forward: Callable[[Request], Response]) -> Response:
+    def __call__(self, request: Request, forward: Forward) -> Response:
         if _PUT(request):
             goal = forward(request.copy(method="GET", target=GOAL, body=b""))
             if goal.status == 200:
@@ -81,7 +82,7 @@ class _WhileGoal:
         return forward(request)
 
 
-def _whole(request: Request, forward: Callable[[Request], Response]) -> Response:
+def _whole(request: Request, forward: Forward) -> Response:
     """PUT of the linear part sets the whole velocity, with no turning."""
     if not _PUT_LINEAR(request):
         return forward(request)
@@ -93,7 +94,7 @@ def _whole(request: Request, forward: Callable[[Request], Response]) -> Response
     return plain(204)(request) if response.status == 200 else response
 
 
-def _stuck(request: Request, forward: Callable[[Request], Response]) -> Response:
+def _stuck(request: Request, forward: Forward) -> Response:
     """Valid linear velocities are accepted and forgotten."""
     if _PUT_LINEAR(request):
         vector = parsed(request.body)
@@ -102,7 +103,7 @@ def _stuck(request: Request, forward: Callable[[Request], Response]) -> Response
     return forward(request)
 
 
-def _other_half(request: Request, forward: Callable[[Request], Response]) -> Response:
+def _other_half(request: Request, forward: Forward) -> Response:
     if not _GET_LINEAR(request):
         return forward(request)
     response = forward(request.copy(target=VELOCITY))

@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
+from conformance.selftest.change import HangUpError
 from conformance.selftest.mutants.changes import TNS, altered, named, plain, text, tree, wsdls
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.proxy import HangUpError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.wire import Request, Response
-
-    Forward = Callable[[Request], Response]
+    from conformance.selftest.change import Forward
+    from conformance.selftest.messages import Request, Response
 
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _XSD = "http://www.w3.org/2001/XMLSchema"
