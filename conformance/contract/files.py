@@ -45,6 +45,7 @@ class Contract:
         wadl_path: the WADL, or None.
         publishers_path: the WSDL of the service that acts, or None.
         subscribers_path: the WSDL of the service that only reads, or None.
+        only: ids of the requirements to judge by, so that other checks do not run; empty: all.
     """
 
     directory: Path
@@ -52,9 +53,10 @@ class Contract:
     wadl_path: Path | None
     publishers_path: Path | None
     subscribers_path: Path | None
+    only: tuple[str, ...] = ()
 
     @classmethod
-    def load(cls, directory: Path = CONTRACT_DIR) -> Contract:
+    def load(cls, directory: Path = CONTRACT_DIR, *, only: tuple[str, ...] = ()) -> Contract:
         """Find the files in a folder.
 
         ``openapi.yaml`` (or .yml, .json), one ``*.wadl``, and at most two ``*.wsdl``: one whose name holds
@@ -81,6 +83,7 @@ class Contract:
             next(iter(sorted(directory.glob("*.wadl"))), None),
             acting[0] if acting else None,
             reading[0] if reading else None,
+            only,
         )
 
     @cached_property
@@ -111,11 +114,16 @@ class Contract:
     def ledger(self) -> dict[str, Requirement]:
         """The requirements that apply, by id.
 
-        A contract of another domain brings its own ``requirements.toml``, or is judged by the generic classes of ours.
-
         Raises:
-            ContractError: its ledger cannot be read.
+            ContractError: its ledger cannot be read, or lacks one of ``only``.
         """
+        ledger = self._whole_ledger()
+        if unknown := set(self.only) - set(ledger):
+            raise ContractError(f"{self.directory} has no requirement {min(unknown)!r}")
+        return {id_: item for id_, item in ledger.items() if not self.only or id_ in self.only}
+
+    def _whole_ledger(self) -> dict[str, Requirement]:
+        """Of another domain: its own ``requirements.toml``, or what is generic in ours."""
         path = self.directory / "requirements.toml"
         try:
             if path.is_file():

@@ -15,6 +15,12 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from conformance.contract.classes import ConformanceClass
+from conformance.contract.files import Contract
+from conformance.contract.statement import load_statement
+from conformance.engine.certification import certify
+from conformance.engine.pytest_run import connection_of
+from conformance.engine.session import Session
+from conformance.verdict.effort import Effort
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection as Pipe
@@ -104,14 +110,11 @@ def run_job(job: Job) -> Outcome:
 
 def _run(job: Job, pipe: Pipe) -> None:
     """Certify, in the child, and send what came of it."""
-    from conformance.engine.certification import certify  # noqa: PLC0415 - in the child, where it is preloaded
-
     with tempfile.TemporaryDirectory() as folder, Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(io.StringIO()):
             certification = certify(session_of(job, Path(folder)), Path(folder), progress=None)
         document = certification.document
-        wanted = set(job.requirements)
-        items = [item for item in document["requirements"] if not wanted or item["id"] in wanted]
+        items = document["requirements"]
         pipe.send(
             {
                 "exit_code": certification.exit_code,
@@ -122,14 +125,8 @@ def _run(job: Job, pipe: Pipe) -> None:
         )
 
 
-def session_of(job: Job, folder: Path) -> Any:
+def session_of(job: Job, folder: Path) -> Session:
     """The session that a job describes; ``folder`` is for its token."""
-    from conformance.contract.files import Contract  # noqa: PLC0415 - see _run
-    from conformance.contract.statement import load_statement  # noqa: PLC0415 - see _run
-    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - see _run
-    from conformance.engine.session import Session  # noqa: PLC0415 - see _run
-    from conformance.verdict.effort import Effort  # noqa: PLC0415 - see _run
-
     statement = load_statement(job.statement)
     given = dict(job.endpoints)
     if job.token:
@@ -145,13 +142,9 @@ def session_of(job: Job, folder: Path) -> Any:
     ros = msgspec.structs.replace(statement.ros, domain_id=job.domain_id)
     claims = tuple(map(ConformanceClass, job.classes)) or statement.claims
     statement = msgspec.structs.replace(statement, endpoints=where, claims=claims, ros=ros)
-    contract = Contract.load()
-    if job.requirements:
-        # A ledger of these alone: checks that judge none of them are not run.
-        vars(contract)["ledger"] = {id_: contract.ledger[id_] for id_ in job.requirements}
     return Session(
         statement=statement,
-        contract=contract,
+        contract=Contract.load(only=job.requirements),
         claims=statement.claimed(),
         allow_motion=True,
         seed=job.seed,

@@ -1,0 +1,45 @@
+"""A job becomes a run of its own, that judges what the job names and nothing else."""
+
+from pathlib import Path
+
+import pytest
+
+from conformance.contract.files import Contract, ContractError
+from conformance.selftest.certifying import Job, Outcome, run_job, session_of
+from conformance.selftest.robots import statement_of
+
+
+def job(rest="http://127.0.0.1:9", **more):
+    return Job(statement_of("baroque"), rest, f"{rest}/p?wsdl", f"{rest}/s?wsdl", **more)
+
+
+def test_a_job_says_where_the_robot_is_and_what_is_claimed(tmp_path):
+    session = session_of(job(classes=("http",), token="t", endpoints={"request_rate": 5.0}, seed=7), tmp_path)
+    where = session.statement.endpoints
+    assert (where.rest, where.publishers_wsdl, where.request_rate) == (
+        "http://127.0.0.1:9",
+        "http://127.0.0.1:9/p?wsdl",
+        5.0,
+    )
+    assert Path(where.token_file).read_text() == "t"
+    assert (session.claims, session.seed, session.statement.ros.domain_id) == (("http",), 7, None)
+
+
+def test_a_job_judges_by_its_requirements_alone(tmp_path):
+    assert list(session_of(job(requirements=("http/date",)), tmp_path).contract.ledger) == ["http/date"]
+    assert len(session_of(job(), tmp_path).contract.ledger) > 200
+
+
+def test_a_requirement_that_is_not_there_is_an_error():
+    with pytest.raises(ContractError, match="http/no-such"):
+        _ = Contract.load(only=("http/no-such",)).ledger
+
+
+def test_a_run_that_takes_too_long_is_given_up_and_has_caught_nothing(listening):
+    outcome = run_job(job(listening(lambda sock: sock.recv(1) and sock.recv(1)), timeout_s=0.2))
+    assert (outcome.exit_code, outcome.caught()) == (-1, ())
+
+
+def test_fail_and_warn_count_as_caught():
+    verdicts = {"a": "pass", "b": "fail", "c": "warn", "d": "skip", "e": "error"}
+    assert Outcome(1, verdicts, {}, 1, 1.0).caught() == ("b", "c")
