@@ -15,7 +15,7 @@ _WAIT_S = 0.2
 _REPLY = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nContent-Length: 4\r\nConnection: close\r\n\r\n<a/>"
 
 
-class Trap:
+class CallbackServer:
     """Listens where the robot would reach it, and remembers what was asked for.
 
     Use as a context manager: it listens as long as the block lasts.
@@ -30,7 +30,7 @@ class Trap:
         self.address = self._socket.getsockname()
         self._seen: list[str] = []
         self._closing = False
-        self._thread = threading.Thread(target=self._listen, name="trap", daemon=True)
+        self._thread = threading.Thread(target=self._listen, name="callback server", daemon=True)
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -44,14 +44,14 @@ class Trap:
         self._thread.join(1.0)
         self._socket.close()
 
-    def url(self, lure: str) -> str:
-        """The URL that stands for ``lure``."""
+    def url(self, canary: str) -> str:
+        """The URL that stands for ``canary``."""
         host = f"[{self.address[0]}]" if ":" in self.address[0] else self.address[0]
-        return f"http://{host}:{self.address[1]}/{lure}"
+        return f"http://{host}:{self.address[1]}/{canary}"
 
-    def calls(self, lure: str) -> int:
-        """How often the URL of ``lure`` has been asked for, or the address alone."""
-        return sum(1 for line in list(self._seen) if f"/{lure}" in line or line == "")
+    def calls(self, canary: str) -> int:
+        """How often the URL of ``canary`` has been asked for, or the address alone."""
+        return sum(1 for line in list(self._seen) if f"/{canary}" in line or line == "")
 
     def settle(self) -> None:
         """Give a robot that calls back in its own time a moment to do so."""

@@ -9,9 +9,9 @@ import pytest
 
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
 from conformance.documents.xml_node import Node
-from conformance.soap.attack_runner import Siege, judge_calls, outcome
-from conformance.soap.attacks import VALUE, Attack, Carrier, attacks
-from conformance.soap.callback_server import Trap
+from conformance.soap.attack_runner import AttackRunner, judge_calls, outcome
+from conformance.soap.attacks import VALUE_SLOT, Attack, Template, attacks
+from conformance.soap.callback_server import CallbackServer
 from conformance.transport.client import HttpClient
 
 if TYPE_CHECKING:
@@ -48,11 +48,11 @@ def _targets(roaas: Session) -> Iterator[tuple[str, str]]:
                 yield method.upper(), path
 
 
-def _carrier(rest: HttpClient, path: str) -> Carrier:
+def _template(rest: HttpClient, path: str) -> Template:
     """What the resource itself sends as XML, with a place in its first value; else a document of no meaning."""
     exchange = rest.send("GET", path, headers=(("Accept", _XML),))
     answer = exchange.response
-    plain = Carrier(f"<message>{VALUE}</message>", "message", "1")
+    plain = Template(f"<message>{VALUE_SLOT}</message>", "message", "1")
     if not answer.ok:
         return plain
     try:
@@ -63,16 +63,16 @@ def _carrier(rest: HttpClient, path: str) -> Carrier:
     node = _node(root, value)
     written = node.written().decode()
     name = written[1:].split(">", 1)[0].split(" ", 1)[0].rstrip("/")
-    return Carrier(written, name, value[0]) if value else plain
+    return Template(written, name, value[0]) if value else plain
 
 
 def _node(element: etree._Element, value: list[str]) -> Node:
-    """An element as a node, VALUE for the first text in it, which goes into ``value``."""
+    """An element as a node, VALUE_SLOT for the first text in it, which goes into ``value``."""
     children = tuple(_node(child, value) for child in elements(element))
     text = text_of(element).strip() if not children else ""
     if text and not value:
         value.append(text)
-        text = VALUE
+        text = VALUE_SLOT
     return Node(str(element.tag), text, children)
 
 
@@ -89,18 +89,18 @@ def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
         pytest.skip(f"the robot's REST interface does not answer: {roaas.unreachable['rest']}")
     alone = roaas.publishers is None and roaas.subscribers is None
     quick = effort.factor < _HALF
-    with Trap(rest.host, rest.port) as trap:
-        sieges = []
+    with CallbackServer(rest.host, rest.port) as callbacks:
+        runners = []
         for number, (method, path) in enumerate(targets[:1] if quick else targets):
-            siege = _siege(roaas, rest, method, path, alone=alone)
-            sieges.append(siege)
-            for attack in attacks(_carrier(rest, path), trap.url, 1 if quick else _EACH, f"rest{number}"):
-                if siege.ids(attack):
-                    siege.attack(attack)
-        judge_calls(judge, trap, sieges)
+            runner = _runner(roaas, rest, method, path, alone=alone)
+            runners.append(runner)
+            for attack in attacks(_template(rest, path), callbacks.url, 1 if quick else _EACH, f"rest{number}"):
+                if runner.ids(attack):
+                    runner.attack(attack)
+        judge_calls(judge, callbacks, runners)
 
 
-def _siege(roaas: Session, rest: HttpClient, method: str, path: str, *, alone: bool) -> Siege:
+def _runner(roaas: Session, rest: HttpClient, method: str, path: str, *, alone: bool) -> AttackRunner:
     def send(attack: Attack) -> Attempt:
         apart = HttpClient(rest.base_url, rest.connection)
         headers = (("Content-Type", _XML), ("Accept", "*/*"), *attack.headers)
@@ -122,4 +122,4 @@ def _siege(roaas: Session, rest: HttpClient, method: str, path: str, *, alone: b
         return (*((own,) if alone else ()), *((_REST,) if must else ()))
 
     times = [ask().response.elapsed_ms for _ in range(5)]
-    return Siege(roaas.judge, send, ask, statistics.median(times), ids)
+    return AttackRunner(roaas.judge, send, ask, statistics.median(times), ids)

@@ -10,10 +10,10 @@ import pytest
 
 from conformance.documents.xml_names import ADDRESSING, clark
 from conformance.documents.xml_node import Node
-from conformance.soap.attack_runner import Siege, judge_calls, outcome
-from conformance.soap.attacks import ASIDE, VALUE, Attack, Carrier, attacks
+from conformance.soap.attack_runner import AttackRunner, judge_calls, outcome
+from conformance.soap.attacks import IGNORED_SLOT, VALUE_SLOT, Attack, Template, attacks
 from conformance.soap.callable_services import askable
-from conformance.soap.callback_server import Trap
+from conformance.soap.callback_server import CallbackServer
 from conformance.soap.envelope import envelope
 from conformance.soap.messages import simple_leaves, with_text
 from conformance.soap.valid_messages import example
@@ -54,7 +54,7 @@ _HALF = 0.5
 
 
 def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
-    """A message that the robot takes: as it is, with VALUE for one of its values, and that value."""
+    """A message that the robot takes: as it is, with VALUE_SLOT for one of its values, and that value."""
     found: tuple[Node, Node, str] | None = None
     for operation in service.contract.operations:
         message = example(service, operation)
@@ -64,12 +64,12 @@ def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
         leaves = simple_leaves(declared, message)
         if leaves:
             path = leaves[0][0]
-            return message, with_text(message, path, VALUE), message.at(path).text
-        found = found or (message, replace(message, text=VALUE), "")
+            return message, with_text(message, path, VALUE_SLOT), message.at(path).text
+        found = found or (message, replace(message, text=VALUE_SLOT), "")
     return found
 
 
-def _siege(judge: Judge, service: SoapService, message: Node) -> Siege:
+def _runner(judge: Judge, service: SoapService, message: Node) -> AttackRunner:
     document = envelope([message]).written()
 
     def send(attack: Attack) -> Attempt:
@@ -84,7 +84,7 @@ def _siege(judge: Judge, service: SoapService, message: Node) -> Siege:
         return service.post(document)
 
     times = [ask().response.elapsed_ms for _ in range(5)]
-    return Siege(judge, send, ask, statistics.median(times))
+    return AttackRunner(judge, send, ask, statistics.median(times))
 
 
 def _no_soap(roaas: Session) -> bool:
@@ -98,8 +98,8 @@ def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
     if _no_soap(roaas):
         return
     services = askable(roaas, *_IDS)
-    with Trap(services[0].client.host, services[0].client.port) as trap:
-        sieges = []
+    with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
+        runners = []
         for service in services:
             harmless = _harmless(service)
             if harmless is None:
@@ -107,14 +107,14 @@ def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
                     judge.skip(id_, f"the {service.name} service took none of the messages tried")
                 continue
             message, marked, value = harmless
-            aside = Node(clark("urn:example:strange", "Note"), ASIDE)
+            aside = Node(clark("urn:example:strange", "Note"), IGNORED_SLOT)
             document = envelope([marked], (aside,)).written().decode()
-            carrier = Carrier(document, document[1:].split(" ", 1)[0], value)
-            siege = _siege(judge, service, message)
-            sieges.append(siege)
-            for attack in attacks(carrier, trap.url, 1 if effort.factor < _HALF else _EACH, service.name):
-                siege.attack(attack)
-        judge_calls(judge, trap, sieges)
+            template = Template(document, document[1:].split(" ", 1)[0], value)
+            runner = _runner(judge, service, message)
+            runners.append(runner)
+            for attack in attacks(template, callbacks.url, 1 if effort.factor < _HALF else _EACH, service.name):
+                runner.attack(attack)
+        judge_calls(judge, callbacks, runners)
 
 
 @pytest.mark.requirement("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
@@ -126,38 +126,38 @@ def test_addressing(roaas: Session, judge: Judge, effort: Effort) -> None:
             judge.unclaimed(id_, "the robot has no SOAP service")
         return
     services = askable(roaas, *ids)
-    with Trap(services[0].client.host, services[0].client.port) as trap:
-        sieges = []
+    with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
+        runners = []
         for service in services:
             harmless = _harmless(service)
             if harmless is None:
                 continue
-            siege = _siege(judge, service, harmless[0])
-            sieges.append(siege)
-            spoofed = list(_spoofed(service, harmless[0], trap))
+            runner = _runner(judge, service, harmless[0])
+            runners.append(runner)
+            spoofed = list(_spoofed(service, harmless[0], callbacks))
             for attack in spoofed[: effort.cases(len(spoofed))]:
-                siege.attack(attack)
-        judge_calls(judge, trap, sieges)
+                runner.attack(attack)
+        judge_calls(judge, callbacks, runners)
 
 
-def _spoofed(service: SoapService, message: Node, trap: Trap) -> Iterator[Attack]:
+def _spoofed(service: SoapService, message: Node, callbacks: CallbackServer) -> Iterator[Attack]:
     action = next((item.input_action for item in service.contract.operations if item.request == message.tag), None)
     broken = Node(clark("urn:example:strange", "no_such_operation"))
     valid, invalid = ("a valid message", message), ("an invalid one", broken)
     # The likeliest first: a response goes to ReplyTo, a fault to FaultTo.
     for first, then in ((valid, invalid), (invalid, valid)):
         for name, (what, payload) in (("ReplyTo", first), ("FaultTo", then), ("From", first)):
-            lure = f"{service.name}-{name.lower()}-{payload.name}"
+            canary = f"{service.name}-{name.lower()}-{payload.name}"
             headers = (
                 Node(clark(ADDRESSING, "Action"), action or "urn:example:action"),
                 Node(clark(ADDRESSING, "MessageID"), "urn:uuid:0b7d3c1e-6f43-4a2e-8f57-3c1d2f6f9a01"),
                 Node(clark(ADDRESSING, "To"), service.endpoint),
-                Node(clark(ADDRESSING, name), "", (Node(clark(ADDRESSING, "Address"), trap.url(lure)),)),
+                Node(clark(ADDRESSING, name), "", (Node(clark(ADDRESSING, "Address"), callbacks.url(canary)),)),
             )
             yield Attack(
                 "addressing-spoofing",
                 f"{name} of {what}",
                 envelope([payload], headers).written(),
                 must_refuse=False,
-                lure=lure,
+                canary=canary,
             )
