@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from conformance.contract.ledger import LedgerError, Requirement, load_ledger
-from conformance.contract.sections import TEXT_NAME
+from conformance.contract.sections import TEXT_NAME, Section, cited_in, sections_of
 
 CONTRACT_DIR = Path(__file__).parent
 CONTRACT_VERSION = "1.1"
@@ -132,3 +132,20 @@ class Contract:
         except LedgerError as error:
             raise ContractError(str(error)) from error
         return {key: item for key, item in ours.items() if item.class_ in GENERIC_CLASSES and not item.own}
+
+    @cached_property
+    def cited_sections(self) -> dict[str, Section]:
+        """The sections of the contract's text that its requirements cite, by anchor.
+
+        Raises:
+            ContractError: the text cannot be read.
+        """
+        path = self.directory / TEXT_NAME
+        if not path.is_file():
+            path = CONTRACT_DIR / TEXT_NAME
+        try:
+            sections = sections_of(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise ContractError(f"{path} cannot be read: {error}") from error
+        cited = cited_in(requirement.source for requirement in self.ledger.values())
+        return {anchor: section for anchor, section in sections.items() if anchor in cited}

@@ -77,6 +77,7 @@ def result_document(
         "class_titles": {name: CLASS_TITLES[name] for name in classes},
         "class_reasons": {name: reason for name, (_, reason) in classes.items() if reason},
         "requirements": [_requirement(verdict) for verdict in verdicts],
+        "contract_sections": {anchor: section._asdict() for anchor, section in session.contract.cited_sections.items()},
         "notes": notes,
     }
 

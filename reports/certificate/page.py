@@ -193,6 +193,7 @@ def _values(result: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "certificate": certificate(result),
         "result": result,
+        "sections": result.get("contract_sections", {}),
         "words": VERDICT_WORDS,
         "shown_failures": SHOWN_FAILURES,
         "shown_body": SHOWN_BODY,

@@ -56,3 +56,11 @@ def test_the_text_agrees_with_what_judges():
     silent = DeclaredLimits().resolved()
     assert "limits of 0.7 m/s and 2.5 rad/s" in SECTIONS["statement"].text.replace("\n", " ")
     assert (silent.linear_m_s, silent.angular_rad_s, silent.settle_s) == (0.7 / 2, 2.5 / 2, 2.0)
+
+
+def test_a_result_carries_the_sections_that_its_requirements_cite(tmp_path):
+    assert set(Contract.load().cited_sections) == cited_in(item.source for item in LEDGER.values())
+    (tmp_path / "openapi.yaml").write_text("paths: {}", encoding="utf-8")
+    generic = Contract.load(tmp_path).cited_sections
+    assert "goals" not in generic
+    assert generic["http"] == SECTIONS["http"]

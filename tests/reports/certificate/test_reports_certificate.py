@@ -184,3 +184,17 @@ def test_long_list_of_untested_requirements_is_folded(result):
     result["requirements"] += [{**skipped, "id": f"rest-resources/more-{number}"} for number in range(30)]
     assert "32 requirements" in text(page(result))
     assert "and 20 more" in certificate_markdown(result)
+
+
+def test_a_source_links_to_the_section_that_it_cites(result):
+    for requirement in result["requirements"]:
+        requirement["source"] = "paper, Table 1; contract.md#goals; contract.md#nowhere"
+    result["contract_sections"] = {"goals": {"title": "Goals", "text": "- PUT: `goal` is\n  <required>."}}
+    shown = page(result)
+    links = [link for link in shown.iter("a") if link.get("href") == "#contract-goals"]
+    assert len(links) >= len(result["requirements"])
+    assert {text(link) for link in links} == {"contract, Goals"}
+    heading = shown.get_element_by_id("contract-goals")
+    assert heading.getnext().text_content() == "- PUT: `goal` is\n  <required>."
+    assert "contract.md#nowhere" in text(shown)
+    assert not [link for link in shown.iter("a") if link.get("href") == "#contract-nowhere"]
