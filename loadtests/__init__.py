@@ -1,7 +1,8 @@
 """Load tests: how fast a robot answers over SOAP and over REST, up to which load, and how sure we are.
 
-Nothing here imports the conformance suite's checks or the reference robot; the contract's files are the only
-thing shared. The modules read from bottom to top: `endpoint`, `wire` and `ordinary` talk HTTP; `payloads`
-builds what they send; `plan` and `arrivals` say when; `pacer` starts it on time; `recorder` keeps what
-happened; `resampling` and `summary` turn that into figures; `engine` runs it all on Locust.
+Of the other rooms only the contract is imported. From the ground up, none importing what stands above it: `clients`
+send requests and tell what came of them; `schedule` says when each is due and starts it then; `statistics` record what
+happened and turn it into quantiles, intervals and verdicts; `settings` say what is asked for; `measuring` carries plans
+out with Locust's users, here or on other machines; `result` makes latency.json of it; `engine` runs all this in a
+process of its own, which `cli` starts. `locustfile` and `node` are for Locust and its Kubernetes operator to call.
 """

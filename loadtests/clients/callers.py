@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import gevent
 
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, answer_error
+from loadtests.clients.failures import CallError, answer_error, is_success
 from loadtests.clients.library import LibraryRest, LibrarySoap
 from loadtests.clients.payloads import Values, variants
 from loadtests.clients.wire import Connection, Request, now_ns
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
 
 _DURATION = re.compile(rb"([\w-]+)\s*;[^,]*?dur\s*=\s*\"?([0-9.]+)")
-_OK = 200
-_REDIRECT = 300
 
 
 def server_ns(timing: bytes | None) -> int:
@@ -93,7 +91,7 @@ class Caller:
                 connects = connection.connects
                 built = now_ns()
                 answer = connection.call(request)
-                if not (_OK <= answer.status < _REDIRECT and request.expects in answer.body):
+                if not (is_success(answer.status) and request.expects in answer.body):
                     raise _judged(answer.status, answer.headers.get(b"location"), answer.body, request.expects)
                 done = now_ns()
                 received, timing = answer.received_ns, answer.headers.get(b"server-timing")

@@ -5,6 +5,7 @@ A URL may carry a base-path prefix (a robot behind a gateway), an IPv6 literal a
 
 from __future__ import annotations
 
+import re
 import ssl
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 DEFAULT_PORTS = {"http": 80, "https": 443}
+_FORBIDDEN = re.compile(r"[\x00-\x20\x7f]")  # RFC 3986 section 2: neither space nor control characters
 
 
 class EndpointError(ValueError):
@@ -54,7 +56,7 @@ class Endpoint:
             raise EndpointError(f"{url!r} names no host")
         if parts.username is not None or parts.password is not None:
             raise EndpointError(f"the URL of {parts.hostname} carries a password: give a --token-file instead")
-        if any(ord(character) <= 0x20 or ord(character) == 0x7F for character in parts.netloc + parts.path):  # noqa: PLR2004 -- RFC 3986 section 2: neither space nor control characters
+        if _FORBIDDEN.search(parts.netloc + parts.path):
             raise EndpointError(f"{url!r} holds a space or a control character")
         return cls(
             parts.scheme,

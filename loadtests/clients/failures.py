@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import socket
 import ssl
+from http import HTTPStatus
 
 
 class CallError(Exception):
@@ -47,6 +48,11 @@ def connect_error(error: OSError, where: str) -> CallError:
     return CallError("network", f"{where}: {error.strerror or error}")
 
 
+def is_success(status: int) -> bool:
+    """Whether a status is a success (RFC 9110 section 15.3)."""
+    return HTTPStatus.OK <= status < HTTPStatus.MULTIPLE_CHOICES
+
+
 def answer_error(status: int, location: str | None, body: bytes, expects: bytes) -> CallError | None:
     """Judge an answer: None when it is what was asked for.
 
@@ -56,11 +62,11 @@ def answer_error(status: int, location: str | None, body: bytes, expects: bytes)
         body: the whole body.
         expects: octets that a good body holds; empty when any 2xx will do.
     """
-    if 200 <= status < 300:  # noqa: PLR2004 -- RFC 9110 section 15.3: success
+    if is_success(status):
         if expects not in body:
             return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {shown(body)}")
         return None
-    if 300 <= status < 400:  # noqa: PLR2004 -- RFC 9110 section 15.4: redirection
+    if HTTPStatus.MULTIPLE_CHOICES <= status < HTTPStatus.BAD_REQUEST:  # RFC 9110 section 15.4: redirection
         return CallError("redirect", f"status {status} to {location!r}: give that address as the endpoint")
     if _FAULT.search(body):
         found = _FAULT_STRING.search(body)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import ssl
 import time
 from dataclasses import dataclass
+from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 
 import gevent
@@ -231,7 +232,7 @@ class Connection:
 
     def on_message_complete(self) -> None:
         """Note the end of an answer, or of an interim one (1xx), which is passed over."""
-        if self._parser.get_status_code() < 200:  # noqa: PLR2004 -- RFC 9110 section 15.2: interim
+        if self._parser.get_status_code() < HTTPStatus.OK:  # RFC 9110 section 15.2: interim
             self._headers = {}
             return
         self._complete = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ipaddress import ip_address
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit, urlunsplit
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _SOAP = "http://schemas.xmlsoap.org/wsdl/soap/"
 _MOST = 4 * 1024 * 1024
-_ELSEWHERE = frozenset({"0.0.0.0", "::", "localhost", "127.0.0.1", "::1"})  # noqa: S104 -- compared with, not bound to
 
 
 class WsdlError(ValueError):
@@ -106,7 +106,18 @@ def with_addresses(robot: Robot) -> Robot:
 def _reachable(url: str, location: str) -> str:
     """An address that names the robot's own loopback, in a WSDL fetched from elsewhere, means that elsewhere."""
     there, here = urlsplit(url), urlsplit(location)
-    if here.scheme in {"http", "https"} and there.hostname in _ELSEWHERE and here.hostname not in _ELSEWHERE:
+    if here.scheme in {"http", "https"} and _is_own(there.hostname) and not _is_own(here.hostname):
         host = f"[{here.hostname}]" if ":" in (here.hostname or "") else here.hostname
         return urlunsplit(there._replace(netloc=f"{host}:{there.port}" if there.port else str(host)))
     return url
+
+
+def _is_own(host: str | None) -> bool:
+    """Whether a host can only mean the machine that names it: its loopback, or any of its addresses."""
+    if host is None or host == "localhost":
+        return host is not None
+    try:
+        address = ip_address(host)
+    except ValueError:
+        return False
+    return address.is_loopback or address.is_unspecified

@@ -126,7 +126,7 @@ class Session:
             schedule, origin_ns, open_model=plan.open_model, interval_ns=int(_NS / ceiling) if ceiling else 0
         )
         self.pacer.done.wait()
-        with gevent.Timeout(self.robot.timeout_s + 1, False):  # noqa: FBT003 -- gevent's way to say: end silently
+        with gevent.Timeout(self.robot.timeout_s + 1, exception=False):
             while self._busy:
                 gevent.sleep(0.01)
         self.recorder.flush()

@@ -30,6 +30,7 @@ _BLOCK_S = 0.1
 _MAX_BLOCKS = 600  # bounds memory: each block keeps its own histograms
 _ARRIVALS_PER_BLOCK = 10
 _QUARTET = 4
+_TURNS, _LIBRARY_TURN, _AA_TURN = 5, 1, 3  # of five quartets the second and the fourth
 _NS = 1_000_000_000
 
 
@@ -174,7 +175,7 @@ class Plan:
         lot = np.random.default_rng([self.load.seed, 1])
         made: list[Segment] = []
         for quartet in range((self.blocks + _QUARTET - 1) // _QUARTET):
-            made += self._quartet(quartet, bool(lot.integers(2)))
+            made += self._quartet(quartet, swapped=bool(lot.integers(2)))
         origin = self.load.warmup_s
         placed = []
         for index, segment in enumerate(made[: self.blocks]):
@@ -193,12 +194,12 @@ class Plan:
             )
         return placed
 
-    def _quartet(self, number: int, swapped: bool) -> list[Segment]:  # noqa: FBT001 -- private, the lot's outcome
+    def _quartet(self, number: int, *, swapped: bool) -> list[Segment]:
         """Four blocks. Of five quartets the second goes to the library clients and the fourth to A/A."""
-        turn = number % 5
-        client = self.clients[-1] if turn == 1 else self.clients[0]
-        if turn == 3:  # noqa: PLR2004 -- the fourth of five, as said above
-            interface = self.interfaces[(number // 5) % len(self.interfaces)]
+        turn = number % _TURNS
+        client = self.clients[-1] if turn == _LIBRARY_TURN else self.clients[0]
+        if turn == _AA_TURN:
+            interface = self.interfaces[(number // _TURNS) % len(self.interfaces)]
             sides = [("aa", interface, "a"), ("aa", interface, "b")]
         else:
             sides = [("duel", interface, "") for interface in self.interfaces]

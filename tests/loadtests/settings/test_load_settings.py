@@ -10,13 +10,6 @@ from conformance.contract.exit_codes import ExitCode
 from conformance.contract.statement import Endpoints, Load, Statement
 from conformance.contract.thresholds import ThresholdsError, load_thresholds
 from loadtests.cli import load
-from loadtests.clients import wsdl
-from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.payloads import CATALOGUE, rest_request, soap_request, variants
-from loadtests.clients.robot import Robot
-from loadtests.clients.wire import Request
-from loadtests.clients.wsdl import WsdlError
-from loadtests.measuring.equivalence import request_difference, requests_difference
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.settings import Settings
 from loadtests.settings.settle import MOTION_RATE, SettingsError, settle
@@ -129,68 +122,3 @@ def test_tokens_that_no_header_may_hold(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(SettingsError, match="token"):
         settle(CliOptions.of(**REST, token_file=str(path)), Statement())
-
-
-def test_the_address_is_read_from_the_wsdl():
-    content = (CONTRACT / "publishers.wsdl").read_bytes()
-    found = wsdl.address_in(content, "publishers.wsdl", "ExecuteDeliveryRequest")
-    assert found == "http://127.0.0.1:5555/turtlesim_publisher_ws"
-    elsewhere = wsdl.address_in(
-        content, "http://robot.example:5555/turtlesim_publisher_ws?wsdl", "ExecuteDeliveryRequest"
-    )
-    assert elsewhere == "http://robot.example:5555/turtlesim_publisher_ws", "its own loopback is not ours"
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (b"<html><body>Welcome</body></html>", "is no WSDL 1.1: its root element is 'html'"),
-        (b"no xml", "is no XML"),
-        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", "holds a document type declaration"),
-        ((CONTRACT / "subscribers.wsdl").read_bytes(), "has no operation 'ExecuteDeliveryRequest'"),
-        (
-            (CONTRACT / "publishers.wsdl").read_bytes().replace(b"soap:address", b"soap:nothing"),
-            "holds no soap:address",
-        ),
-        (
-            (CONTRACT / "publishers.wsdl").read_bytes().replace(b"http://127.0.0.1:5555", b"REPLACE_ME"),
-            "cannot be used",
-        ),
-        (
-            (CONTRACT / "publishers.wsdl").read_bytes().replace(b"http://soap.turtlebot.mybot.org/", b"urn:else"),
-            "target namespace is 'urn:else'",
-        ),
-    ],
-)
-def test_wsdls_that_cannot_be_used(content, message):
-    with pytest.raises(WsdlError, match=re.escape(message)):
-        wsdl.address_in(content, "x.wsdl", "ExecuteDeliveryRequest")
-
-
-def test_a_wsdl_file_that_is_not_there():
-    with pytest.raises(WsdlError, match="No such file"):
-        wsdl.fetch("/nonexistent.wsdl", Robot(None, None, None))
-
-
-ROBOT_REST = Endpoint.parse("http://robot:7003")
-ROBOT = Robot("http://robot:7003/base", "http://robot:5555/p", "http://robot:5555/s", token="t0ken")  # noqa: S106 - made up
-
-
-@pytest.mark.parametrize("operation", sorted(CATALOGUE))
-def test_both_interfaces_carry_the_same_request(operation):
-    rest, soap = (ROBOT.requests(interface, operation, 1) for interface in ("rest", "soap"))
-    assert len(rest) == len(soap) == 64
-    assert requests_difference(operation, rest, soap) is None
-    assert all(b"Authorization: Bearer t0ken\r\n" in request.octets for request in rest + soap)
-    assert all(b" /base/robot/" in request.octets for request in rest)
-
-
-def test_requests_that_differ_are_found():
-    values = variants("delivery", 1)[0]
-    rest = rest_request(ROBOT_REST, "delivery", values, None)
-    other = soap_request(ROBOT_REST, "delivery", values | {"source_y": values["source_y"] + 1e-13}, None)
-    assert "source_y" in request_difference("delivery", rest, other)
-    code = soap_request(ROBOT_REST, "delivery", values | {"message_code": 4}, None)
-    assert request_difference("delivery", rest, code) == "message_code is 3 over REST and 4.0 over SOAP"
-    empty = Request(other.octets.replace(b"arg0", b"arg1"))
-    assert request_difference("delivery", rest, empty) == "the SOAP request carries no arg0"
