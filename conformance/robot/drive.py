@@ -1,26 +1,22 @@
-"""Driving a robot by its velocity, and judging what is measured meanwhile: one drive feeds many requirements."""
+"""Driving a robot by its velocity: what talks to the robot, and keeps a trace for drive_rules to judge."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from conformance.robot.message_shapes import TWIST, VECTOR3, read_as
+from conformance.robot import drive_rules
+from conformance.robot.drive_trace import Command, Trace, Turn
 from conformance.robot.path import judge_path
 from conformance.robot.robot import STILL, VELOCITY, Velocity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.robot.robot import Odometry, Robot
+    from conformance.robot.drive_rules import Judgement
+    from conformance.robot.robot import Robot
     from conformance.transport.exchange import Exchange
 
 # A turn of readings is not begun more often than this, s: the robot's odometry has tens of hertz.
 _PACE_S: Final = 0.02
-# What was measured for so long alike is steady: readings of two resources may be compared, s.
-_STEADY_S: Final = 0.3
-_ECHO: Final = 1e-9
 # How long a velocity is counted on to hold where the statement does not say, s.
 _COUNTED_ON_S: Final = 0.5
 _BUSY: Final = 409
@@ -30,35 +26,16 @@ class BusyError(Exception):
     """The robot follows a goal of its own, and so takes no velocity."""
 
 
-@dataclass(frozen=True)
-class _Reading:
-    """One turn's readings of the velocity resources, waiting for the odometry after them."""
-
-    at: float
-    velocity: Velocity | None
-    velocity_exchange: Exchange
-    linear: Velocity | None
-    linear_exchange: Exchange
-
-
 class Drive:
-    """One drive.
+    """One drive, which feeds many requirements.
 
     Attributes:
-        trace: the odometry along the way.
-        sent, answered: of the command given last, s of the monotonic clock.
-        full_sent: of the last command of all components: the linear part alone need not renew the angular one.
+        trace: what was commanded and seen so far.
     """
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.trace: list[Odometry] = []
-        self._measured: list[Velocity] = []
-        self.sent = self.answered = self.full_sent = time.monotonic()
-        self._fastest: Velocity | None = None
-        self._renew: Callable[[], object] = lambda: None
-        self._of_all = True
-        self._pending: _Reading | None = None
+        self.trace = Trace(time.monotonic())
         self._turn_at = 0.0
 
     def command(self, velocity: Velocity, *, integers: bool = False) -> bool:
@@ -71,50 +48,51 @@ class Drive:
         Raises:
             BusyError: a goal of the robot's own is active.
         """
-        self.sent = self.full_sent = time.monotonic()
-        self._renew, self._of_all = (lambda: self.robot.put_velocity(velocity)), True
+        sent = time.monotonic()
         if integers:
             whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
             exchange = self.robot.put(VELOCITY, whole)
         else:
             exchange = self.robot.put_velocity(velocity)
-        return self._judge_put(exchange, velocity, "velocity-integers" if integers else "velocity-put")
+        return self._commanded(Command(velocity, sent, time.monotonic(), exchange, integers=integers))
 
     def command_linear(self, velocity: Velocity) -> bool:
-        """PUT the linear part of a velocity, and judge how it is answered."""
-        self.sent = time.monotonic()
-        # Renewed as it was given: a PUT of all components would do what this one may have failed to do.
-        self._renew, self._of_all = (lambda: self.robot.put_linear(velocity)), False
-        return self._judge_put(self.robot.put_linear(velocity), velocity, "linear-put")
+        """PUT the linear part of a velocity, and judge how it is answered.
 
-    def _judge_put(self, exchange: Exchange, velocity: Velocity, name: str) -> bool:
-        self.answered = time.monotonic()
-        answer = exchange.response
-        if answer.status == _BUSY and self.robot.goal()[0] is not None:
+        Raises:
+            BusyError: a goal of the robot's own is active.
+        """
+        sent = time.monotonic()
+        exchange = self.robot.put_linear(velocity)
+        return self._commanded(Command(velocity, sent, time.monotonic(), exchange, linear_only=True))
+
+    def _commanded(self, command: Command) -> bool:
+        self.trace = self.trace.commanded(command)
+        if command.exchange.response.status == _BUSY and self.robot.goal()[0] is not None:
             raise BusyError("the robot follows a goal of its own")
-        fastest = self._fastest or Velocity()
-        self._fastest = Velocity(*(max(pair) for pair in zip(fastest, map(abs, velocity), strict=True)))
-        kind, shape = ("Vector3", VECTOR3) if name == "linear-put" else ("Twist", TWIST)
-        expected = f"200 with the accepted {kind}, or 204"
-        problem = ""
-        if answer.status not in {200, 204}:
-            problem = exchange.came
-        elif answer.status == 200:  # noqa: PLR2004 - with content
-            value, problem = read_as(answer, shape)
-            if not problem:
-                given = value if name == "linear-put" else value["linear"] | _prefixed(value["angular"])
-                asked = (
-                    velocity.linear if name == "linear-put" else velocity.linear | _prefixed(velocity.twist["angular"])
-                )
-                wrong = [axis for axis, number in asked.items() if abs(float(given[axis]) - number) > _ECHO]
-                problem = f"{wrong[0]} {given[wrong[0]]} for {asked[wrong[0]]}" if wrong else ""
-        return self.robot.judge.check(f"rest-resources/{name}", not problem, exchange, expected, found=problem)
+        return self._judge(drive_rules.answer_of(command))
+
+    def _renew(self) -> None:
+        """Give the last command again, in the same way: a PUT of all components would do what it may have failed to."""
+        last = self.trace.last_command
+        if last is None:
+            return
+        sent = time.monotonic()
+        put = self.robot.put_linear if last.linear_only else self.robot.put_velocity
+        exchange = put(last.velocity)
+        again = Command(last.velocity, sent, time.monotonic(), exchange, linear_only=last.linear_only, renewal=True)
+        self.trace = self.trace.commanded(again)
+
+    def _judge(self, one: Judgement) -> bool:
+        return self.robot.judge.check(
+            one.requirement, one.holds, one.exchange, one.expected, found=one.found, cause=one.cause
+        )
 
     @property
     def holds_until(self) -> float:
         """Until when the last command of all components certainly holds, s of the monotonic clock."""
         hold_s = self.robot.limits.hold_s
-        return self.full_sent + (_COUNTED_ON_S if hold_s is None else 0.9 * hold_s - 0.02)
+        return self.trace.full_sent + (_COUNTED_ON_S if hold_s is None else 0.9 * hold_s - 0.02)
 
     def refresh(self, velocity: Velocity) -> None:
         """Command a velocity again, and let it be reached where it had ended meanwhile."""
@@ -128,61 +106,15 @@ class Drive:
             time.sleep(wait)
         self._turn_at = time.monotonic()
         odometry = self.robot.odometry()
-        if odometry is not None:
-            self.trace.append(odometry)
-            self._judge_pending()
         at = time.monotonic()
         velocity, exchange = self.robot.velocity()
-        if odometry is not None:
-            self._measured.append(odometry.velocity if velocity is None else velocity)
-        linear, linear_exchange = self.robot.linear()
-        self._pending = _Reading(at, velocity, exchange, linear, linear_exchange)
-        if velocity is not None and self._fastest is not None and not self.robot.limits_declared:
-            self._judge_speed(velocity, self._fastest, exchange)
+        self.trace = self.trace.looked(Turn(odometry, at, velocity, exchange, *self.robot.linear()))
+        for one in drive_rules.agreement(self.trace, self.robot.limits):
+            self._judge(one)
+        fastest = None if self.robot.limits_declared else drive_rules.speed(self.trace)
+        if fastest is not None:
+            self._judge(fastest)
         return velocity, exchange
-
-    def _judge_pending(self) -> None:
-        """Compare the last turn's readings with the odometry on both sides of them, where it is steady."""
-        reading, self._pending = self._pending, None
-        if reading is None:
-            return
-        around = [one for one in self.trace if one.received > reading.at - _STEADY_S]
-        before = next((one for one in reversed(self.trace) if one.received <= reading.at - _STEADY_S), None)
-        last = self.trace[-1].velocity
-        if before is None or self.sent > reading.at - _STEADY_S:
-            return
-        if not all(self.robot.near(one.velocity, last, 0.5) for one in (before, *around)):
-            return
-        judge = self.robot.judge
-        if reading.velocity is not None:
-            judge.check(
-                "rest-resources/velocity-odometry",
-                self.robot.near(reading.velocity, last),
-                reading.velocity_exchange,
-                f"the velocity that the odometry has, {_rounded(last)}",
-                found=str(reading.velocity),
-                cause="differs",
-            )
-        if reading.linear is not None and reading.velocity is not None:
-            linear = Velocity(*reading.velocity[:3])
-            judge.check(
-                "rest-resources/linear-agrees",
-                self.robot.near(reading.linear, linear),
-                reading.linear_exchange,
-                f"the linear part of the velocity, {_rounded(linear)}",
-                found=str(reading.linear),
-                cause="differs",
-            )
-
-    def _judge_speed(self, velocity: Velocity, fastest: Velocity, exchange: Exchange) -> None:
-        """Without declared limits: the robot is not faster than it was asked to be, however it overshoots."""
-        self.robot.judge.check(
-            "safety/limits-hold",
-            all(abs(one) <= 1.5 * asked + 0.2 for one, asked in zip(velocity, fastest, strict=True)),
-            exchange,
-            f"a speed that was asked for, at most {_rounded(fastest)}",
-            found=str(velocity),
-        )
 
     def stop(self, moving: Velocity) -> bool:
         """Command a velocity once more and then zero; judge that the robot stops because of it, and not by itself."""
@@ -192,7 +124,14 @@ class Drive:
         within = max(1.1 * settle_s, 0.9 * hold_s) if hold_s is not None else self.robot.settle_s
         return self.reach(STILL, "safety/stop", within=within)
 
-    def reach(self, wanted: Velocity, *ids: str, part: slice = slice(None), within: float | None = None) -> bool:
+    def reach(
+        self,
+        wanted: Velocity,
+        *ids: str,
+        part: slice = slice(None),
+        within: float | None = None,
+        since: float | None = None,
+    ) -> bool:
         """Look until the velocity is what was wanted; judge that it comes within the settle time.
 
         Args:
@@ -200,31 +139,24 @@ class Drive:
             ids: requirements, of any class.
             part: the components that count.
             within: another time than the settle time, s.
+            since: when what brings it about was answered, s of the monotonic clock; by default the last command.
         """
-        judge, patience = self.robot.judge, min(self.robot.settle_s, within or self.robot.settle_s)
+        limits = self.robot.limits
+        patience = min(self.robot.settle_s, within or self.robot.settle_s)
+        until = (self.trace.answered if since is None else since) + patience
         # A velocity may end before it is reached, where it does not hold for as long as the robot takes to settle.
-        hold_s = self.robot.limits.hold_s
-        every = _COUNTED_ON_S if hold_s is None else 0.6 * hold_s
-        renewed = self.sent
+        every = _COUNTED_ON_S if limits.hold_s is None else 0.6 * limits.hold_s
+        renews = limits.hold_s is None or limits.hold_s < patience
         while True:
             asked = time.monotonic()
-            if asked > renewed + every and (hold_s is None or hold_s < patience):
+            if renews and asked > self.trace.sent + every:
                 self._renew()
-                renewed = self.sent = asked
-                self.full_sent = asked if self._of_all else self.full_sent
-            velocity, exchange = self.look()
-            there = velocity is not None and self.robot.near(_part(velocity, part), _part(wanted, part))
-            if there or asked > self.answered + patience:
+            self.look()
+            there = drive_rules.is_reached(self.trace, wanted, limits, part)
+            if there or asked > until:
                 break
         for id_ in ids:
-            judge.check(
-                id_,
-                there,
-                exchange,
-                f"{_rounded(wanted)} within {self.robot.limits.settle_s:g} s of the command",
-                found=str(velocity) if velocity else exchange.came,
-                cause="not reached",
-            )
+            self._judge(drive_rules.arrival(id_, self.trace, wanted, limits, part))
         return there
 
     def keep(self, seconds: float) -> None:
@@ -235,17 +167,4 @@ class Drive:
 
     def judge_motion(self) -> None:
         """Judge whether the pose moved by what the velocity said."""
-        judge_path(self.robot.judge, self.trace, self._measured)
-
-
-def _part(velocity: Velocity, part: slice) -> Velocity:
-    chosen = set(range(len(velocity))[part])
-    return Velocity(*(value if index in chosen else 0.0 for index, value in enumerate(velocity)))
-
-
-def _prefixed(angular: dict[str, float]) -> dict[str, float]:
-    return {f"angular {axis}": value for axis, value in angular.items()}
-
-
-def _rounded(velocity: Velocity) -> Velocity:
-    return Velocity(*(round(value, 4) for value in velocity))
+        judge_path(self.robot.judge, self.trace.odometry, self.trace.measured)

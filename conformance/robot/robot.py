@@ -63,6 +63,14 @@ class Velocity(NamedTuple):
 STILL: Final = Velocity()
 
 
+def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float = 1.0) -> bool:
+    """Whether each component is what was wanted, within ``factor`` times the declared tolerance."""
+    return all(
+        abs(one - other) <= factor * (limits.tolerance_abs + limits.tolerance * abs(other))
+        for one, other in zip(measured, wanted, strict=True)
+    )
+
+
 @dataclass(frozen=True)
 class Odometry:
     """One reading of the odometry.
@@ -188,10 +196,7 @@ class Robot:
 
     def near(self, measured: Velocity, wanted: Velocity, factor: float = 1.0) -> bool:
         """Whether each component is what was wanted, within ``factor`` times the tolerance."""
-        return all(
-            abs(one - other) <= factor * (self.limits.tolerance_abs + self.limits.tolerance * abs(other))
-            for one, other in zip(measured, wanted, strict=True)
-        )
+        return is_near(self.limits, measured, wanted, factor)
 
     def limit_of(self, component: int) -> float:
         """The limit of a component by its place in Velocity, declared or not, m/s or rad/s."""

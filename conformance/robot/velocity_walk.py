@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
@@ -76,7 +76,7 @@ class VelocityMachine(RuleBasedStateMachine):
     def _ahead(self, share: float, *, forward: bool) -> float:
         if not self._robot.actuated(0):
             return 0.0
-        trace: list[Any] = self._drive.trace
+        trace = self._drive.trace.odometry
         sign = 1 if forward else -1
         if trace and trace[0].pose.distance(trace[-1].pose) > _LEASH_M:
             step = trace[-1].pose.ahead(0.1 * sign)

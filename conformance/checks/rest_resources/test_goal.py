@@ -66,7 +66,7 @@ def _cancel(robot: Robot, judge: Judge) -> Exchange:
     """Cancel the active goal; judge the status, that it is gone, and that the robot stands still in time."""
     drive = Drive(robot)
     exchange = robot.delete_goal()
-    drive.answered = time.monotonic()
+    answered = time.monotonic()
     status = exchange.response.status
     none = await_none(robot)
     gone = none.response.status == 404
@@ -77,7 +77,7 @@ def _cancel(robot: Robot, judge: Judge) -> Exchange:
         "204, then 404 for GET",
         found="" if status not in CANCELLED else f"GET of the goal is answered {none.came}",
     )
-    drive.reach(STILL, "safety/cancel")
+    drive.reach(STILL, "safety/cancel", since=answered)
     return exchange
 
 

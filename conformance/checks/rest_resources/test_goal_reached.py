@@ -84,8 +84,8 @@ def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: f
     while True:
         drive.look()
         goal, exchange = robot.goal()
-        if drive.trace:
-            here = robot.in_map(drive.trace[-1].pose)
+        if drive.trace.odometry:
+            here = robot.in_map(drive.trace.odometry[-1].pose)
         now = time.monotonic()
         if here.distance(there) < nearest - 0.02 or abs(here.yaw - yaw) > 0.05:
             progress, nearest, yaw = now, min(nearest, here.distance(there)), here.yaw

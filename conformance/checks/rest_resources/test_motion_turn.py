@@ -129,7 +129,7 @@ def _renew(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started:
     drive.command(turning)
     drive.reach(turning)
     while True:
-        if time.monotonic() > drive.answered + (_RENEW_S if hold is None else 0.4 * hold):
+        if time.monotonic() > drive.trace.answered + (_RENEW_S if hold is None else 0.4 * hold):
             drive.command(turning)
         _judge_renewed(judge, turning, *drive.look())
         if time.monotonic() > until:
@@ -157,11 +157,12 @@ def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started
         drive.refresh(turning)
     if not drive.command(turning):
         return
-    full = drive.sent
+    full = drive.trace.sent
     if robot.actuated(0) and limits.hold_s is not None:
         drive.command_linear(turning)
     holds_until = full + (0.95 * limits.hold_s - 0.02 if limits.hold_s is not None else 0.0)
-    ends_by = drive.answered + (1.1 * limits.hold_s + robot.settle_s if limits.hold_s is not None else _ENDS_S)
+    answered = drive.trace.answered
+    ends_by = answered + (1.1 * limits.hold_s + robot.settle_s if limits.hold_s is not None else _ENDS_S)
     calm = 0
     if limits.hold_s is None:
         judge.note("safety/hold", "no hold time is declared: judged is only that a velocity lasts until it is reached")
@@ -169,7 +170,7 @@ def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started
         asked = time.monotonic()
         velocity, exchange = drive.look()
         there = velocity is None or robot.near(velocity, turning, 1.5)
-        if time.monotonic() < holds_until or (limits.hold_s is None and not calm and asked < drive.answered + 0.1):
+        if time.monotonic() < holds_until or (limits.hold_s is None and not calm and asked < answered + 0.1):
             judge.check(
                 "safety/hold",
                 there,
@@ -187,7 +188,7 @@ def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started
         "safety/watchdog",
         calm > 0,
         exchange,
-        f"rest within {ends_by - drive.answered:.1f} s of a command that is not renewed",
+        f"rest within {ends_by - answered:.1f} s of a command that is not renewed",
         found=str(velocity) if velocity else "",
         cause="goes on",
     )
