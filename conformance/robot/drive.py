@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from http import HTTPStatus
 from typing import TYPE_CHECKING, Final
 
 from conformance.robot import drive_rules
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 _PACE_S: Final = 0.02
 # How long a velocity is counted on to hold where the statement does not say, s.
 _COUNTED_ON_S: Final = 0.5
-_BUSY: Final = 409
 
 
 class BusyError(Exception):
@@ -68,7 +68,7 @@ class Drive:
 
     def _commanded(self, command: Command) -> bool:
         self.trace = self.trace.commanded(command)
-        if command.exchange.response.status == _BUSY and self.robot.goal()[0] is not None:
+        if command.exchange.response.status == HTTPStatus.CONFLICT and self.robot.goal()[0] is not None:
             raise BusyError("the robot follows a goal of its own")
         return self._judge(drive_rules.answer_of(command))
 

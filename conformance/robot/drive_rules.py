@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from http import HTTPStatus
 from typing import TYPE_CHECKING, Any, Final
 
 from conformance.robot.message_shapes import TWIST, VECTOR3, read_as
@@ -38,8 +39,8 @@ def answer_of(command: Command) -> Judgement:
     """Whether a command was answered as the contract wants it: 204, or 200 with what was accepted."""
     answer = command.exchange.response
     kind, shape = ("Vector3", VECTOR3) if command.linear_only else ("Twist", TWIST)
-    problem = "" if answer.status in {200, 204} else command.exchange.came
-    if answer.status == 200:  # noqa: PLR2004 - with content
+    problem = "" if answer.status in {HTTPStatus.OK, HTTPStatus.NO_CONTENT} else command.exchange.came
+    if answer.status == HTTPStatus.OK:
         value, problem = read_as(answer, shape)
         problem = problem or _other_number(command, value)
     name = "linear-put" if command.linear_only else "velocity-integers" if command.integers else "velocity-put"
@@ -63,9 +64,9 @@ def agreement(trace: Trace, limits: Limits) -> list[Judgement]:
 
     Only where the odometry was steady, and no command was sent, from a while before them on.
     """
-    if len(trace.turns) < 2 or trace.turns[-1].odometry is None:  # noqa: PLR2004 - odometry on both sides
+    turn = next(iter(trace.turns[-2:-1]), None)
+    if turn is None or trace.turns[-1].odometry is None:
         return []
-    turn = trace.turns[-2]
     since = turn.at - _STEADY_S
     around = _from_the_last_before(trace.odometry, since)
     last = trace.odometry[-1].velocity

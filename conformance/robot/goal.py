@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from http import HTTPStatus
 from typing import TYPE_CHECKING, Any, Final
 
 from conformance.documents.json_text import shown
@@ -102,7 +103,7 @@ def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
     until = time.monotonic() + (robot.settle_s if seconds is None else seconds)
     while True:
         exchange = robot.get(GOAL_PATH)
-        if exchange.response.status == 404 or time.monotonic() > until:  # noqa: PLR2004 - none
+        if exchange.response.status == HTTPStatus.NOT_FOUND or time.monotonic() > until:
             return exchange
         time.sleep(_STEP_S)
 

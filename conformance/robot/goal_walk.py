@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import TYPE_CHECKING, Any, Final
 
 from hypothesis import strategies as st
@@ -26,10 +27,9 @@ if TYPE_CHECKING:
     from conformance.robot.geometry import Pose
     from conformance.robot.robot import Robot
     from conformance.robot.walk import Walk
+    from conformance.transport.exchange import Exchange
 
 _IDS: Final = st.sampled_from((None, "a", "b", "a ", "A"))
-_NONE: Final = 404
-_CONFLICT: Final = 409
 _WHICH: Final = st.integers(0, 1)
 
 
@@ -88,18 +88,18 @@ class GoalMachine(RuleBasedStateMachine):
         self._robot.delete_goal()
         exchange = await_none(self._robot)
         self._active = None
-        return exchange.response.status == _NONE
+        return exchange.response.status == HTTPStatus.NOT_FOUND
 
     def _look(self) -> bool:
         goal, exchange = self._robot.goal()
         if self._active is None:
-            none = exchange.response.status == _NONE
-            return self._that("goal-none", none, exchange, "404 without an active goal")
+            none = exchange.response.status == HTTPStatus.NOT_FOUND
+            return self._check("goal-none", exchange, "404 without an active goal", holds=none)
         if goal is None and arrived(self._robot, self._pose):
             self._active = None
             return True
         problem = exchange.came if goal is None else difference(goal, self._active) or status_fault(goal)
-        return self._that("goal-get", not problem, exchange, "the active goal, as it was put", problem)
+        return self._check("goal-get", exchange, "the active goal, as it was put", holds=not problem, found=problem)
 
     def _put(self, id_: str | None, which: int) -> bool:
         if not self._look():
@@ -116,9 +116,11 @@ class GoalMachine(RuleBasedStateMachine):
         if arrived(self._robot, self._pose):
             return self._clear()
         if pose == self._pose:
-            well = self._that("goal-repeat", status in REPEATED, exchange, "200, 202 or 204 for the active goal")
+            well = self._check("goal-repeat", exchange, "200, 202 or 204 for the active goal", holds=status in REPEATED)
         else:
-            well = self._that("goal-conflict", status == _CONFLICT, exchange, "409 for another pose under this id")
+            well = self._check(
+                "goal-conflict", exchange, "409 for another pose under this id", holds=status == HTTPStatus.CONFLICT
+            )
         return well and self._look()
 
     def _put_new(self, body: dict[str, Any], pose: Pose) -> bool:
@@ -126,7 +128,7 @@ class GoalMachine(RuleBasedStateMachine):
         exchange = put_goal(self._robot, body)
         status = exchange.response.status
         displaces = self._active is not None
-        if not self._that("goal-put", status in NEW, exchange, "201 or 202 for a new goal"):
+        if not self._check("goal-put", exchange, "201 or 202 for a new goal", holds=status in NEW):
             return False
         self._active, self._pose = body, pose
         goal, problem, shown = await_goal(self._robot, body)
@@ -134,7 +136,7 @@ class GoalMachine(RuleBasedStateMachine):
             self._active = None
             return True
         name = "goal-preempt" if displaces else "goal-get"
-        return self._that(name, not problem, shown, "the goal that was put last", problem)
+        return self._check(name, shown, "the goal that was put last", holds=not problem, found=problem)
 
     def _cancel(self) -> bool:
         if not self._look():
@@ -142,13 +144,15 @@ class GoalMachine(RuleBasedStateMachine):
         exchange = self._robot.delete_goal()
         status = exchange.response.status
         if self._active is None:
-            return self._that("goal-delete-none-success", status in {*CANCELLED, _NONE}, exchange, "404 or 204")
+            fine = status in {*CANCELLED, HTTPStatus.NOT_FOUND}
+            return self._check("goal-delete-none-success", exchange, "404 or 204", holds=fine)
         near = arrived(self._robot, self._pose)
         self._active = None
         none = await_none(self._robot)
-        gone = none.response.status == _NONE
-        holds = (status in CANCELLED or (near and status == _NONE)) and gone
-        return self._that("goal-delete", holds, exchange, "204, then 404 for GET", exchange.came if gone else none.came)
+        gone = none.response.status == HTTPStatus.NOT_FOUND
+        holds = (status in CANCELLED or (near and status == HTTPStatus.NOT_FOUND)) and gone
+        found = exchange.came if gone else none.came
+        return self._check("goal-delete", exchange, "204, then 404 for GET", holds=holds, found=found)
 
-    def _that(self, name: str, holds: bool, exchange: Any, expected: str, found: str = "") -> bool:  # noqa: FBT001 - as judge.that
+    def _check(self, name: str, exchange: Exchange, expected: str, *, holds: bool, found: str = "") -> bool:
         return self._robot.judge.check(f"rest-resources/{name}", holds, exchange, expected, found=found)
