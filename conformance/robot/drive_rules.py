@@ -12,7 +12,7 @@ from conformance.robot.robot import Velocity, is_near
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from conformance.contract.statement import Limits
+    from conformance.contract.limits import Limits
     from conformance.robot.drive_trace import Command, Trace
     from conformance.transport.exchange import Exchange
 

@@ -14,7 +14,7 @@ from conformance.robot.observer import observe
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from conformance.contract.statement import Limits
+    from conformance.contract.limits import Limits
     from conformance.documents.json_schema import Shape
     from conformance.engine.session import Session
     from conformance.transport.exchange import Exchange

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from conformance.contract.statement import Limits
+from conformance.contract.limits import DeclaredLimits
 from conformance.robot.drive_rules import agreement, answer_of, arrival, is_reached, speed
 from conformance.robot.drive_trace import Command, Trace, Turn
 from conformance.robot.geometry import Pose
@@ -14,7 +14,7 @@ from conformance.robot.robot import STILL, Odometry, Velocity
 from conformance.transport.exchange import Exchange, Request, Response
 
 _AHEAD = Velocity(linear_x=0.3, angular_z=0.5)
-_LIMITS = Limits(settle_s=1.0, tolerance=0.05, tolerance_abs=0.02)
+_LIMITS = DeclaredLimits(settle_s=1.0, tolerance=0.05, tolerance_abs=0.02).resolved()
 
 
 def exchange(status: int = 200, value: object = None) -> Exchange:
