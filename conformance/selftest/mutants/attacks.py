@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 
-from conformance.selftest.mutants.changes import TNS, instead, plain, rewritten
+from conformance.selftest.mutants.changes import TNS, instead, plain, posted, rewritten
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.mutants.soap_processing import posted
-from conformance.selftest.mutants.soap_services import enveloped, fault
+from conformance.selftest.mutants.soap_responses import enveloped, fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The parts that mutants are made of: which exchanges, and what becomes of them."""
+"""What mutants are made of: which exchanges, and what becomes of them. What is SOAP's alone is in soap_responses."""
 
 from __future__ import annotations
 
@@ -63,6 +63,11 @@ def soap(*operations: str) -> Where:
         return request.side == "soap" and request.method == "POST" and bool(pattern.search(request.body))
 
     return where
+
+
+def posted(request: Request) -> bool:
+    """SOAP requests, whatever is in them."""
+    return request.side == "soap" and request.method == "POST"
 
 
 def wsdls(request: Request) -> bool:
@@ -153,11 +158,6 @@ def instead(where: Where, response: Callable[[Request], Response]) -> Make:
         return change
 
     return make
-
-
-def remembering(kind: Callable[[], Change]) -> Make:
-    """A change with a memory of its own in each run; ``kind`` is its class or maker."""
-    return kind
 
 
 def plain(
@@ -258,8 +258,3 @@ def named(root: Any, name: str) -> list[Any]:
 def header(name: str, value: str | None) -> Callable[[Response], object]:
     """Set a header field, or remove it."""
     return lambda response: response.drop(name) if value is None else response.put(name, value)
-
-
-def set_fields(**fields: object) -> Callable[[Any], None]:
-    """Set members of a JSON object."""
-    return lambda value: value.update(fields)

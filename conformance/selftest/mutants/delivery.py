@@ -13,7 +13,6 @@ from conformance.selftest.mutants.changes import (
     instead,
     plain,
     problem,
-    remembering,
     rewritten,
 )
 from conformance.selftest.mutants.mutant import Mutant
@@ -143,7 +142,7 @@ MUTANTS = (
         "put-body",
         instead(lambda request: deliveries(request) and bool(request.body), problem(415, "a body is not expected")),
     ),
-    _mutant("delivery-only-once", "The same delivery again is 409.", "put-repeated", remembering(_OnlyOnce)),
+    _mutant("delivery-only-once", "The same delivery again is 409.", "put-repeated", _OnlyOnce),
     _mutant(
         "delivery-text-is-zero",
         "Letters in place of a number count as 0.",

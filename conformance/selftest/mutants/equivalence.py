@@ -32,7 +32,7 @@ from conformance.selftest.mutants.distortion import (
     swapped_soap,
 )
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.mutants.soap_services import enveloped
+from conformance.selftest.mutants.soap_responses import enveloped
 
 if TYPE_CHECKING:
     from collections.abc import Callable

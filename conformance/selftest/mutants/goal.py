@@ -14,7 +14,6 @@ from conformance.selftest.mutants.changes import (
     parsed,
     plain,
     problem,
-    remembering,
     rest,
     rewritten,
     status,
@@ -155,7 +154,7 @@ MUTANTS = (
         "goal-get",
         altered(_GET, values(lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2"))),
     ),
-    _mutant("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", remembering(Previous)),
+    _mutant("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", Previous),
     _mutant(
         "goal-get-other-id",
         "GET gives the goal under another id.",
@@ -251,9 +250,9 @@ MUTANTS = (
         "goal-delete-none-success",
         lambda: _delete_conflict,
     ),
-    _mutant("goal-lingers", "A goal that has ended is still shown.", "goal-ended", remembering(Lingering)),
-    _mutant("goal-id-only-once", "The id of a goal that has ended is refused.", "goal-id-again", remembering(OnlyOnce)),
-    _mutant("goal-abandoned", "The robot gives up on its way.", "goal-drives", remembering(Abandoned)),
+    _mutant("goal-lingers", "A goal that has ended is still shown.", "goal-ended", Lingering),
+    _mutant("goal-id-only-once", "The id of a goal that has ended is refused.", "goal-id-again", OnlyOnce),
+    _mutant("goal-abandoned", "The robot gives up on its way.", "goal-drives", Abandoned),
     _mutant(
         "goal-beside",
         "The robot stops 80 cm beside the goal, and shows the goal that it was given.",
@@ -264,7 +263,7 @@ MUTANTS = (
         "goal-unreachable-forever",
         "A goal far outside the map is accepted and stays active.",
         "goal-unreachable",
-        remembering(Unreachable),
+        Unreachable,
     ),
     _mutant(
         "goal-frame-ignored",

@@ -20,7 +20,6 @@ from conformance.selftest.mutants.changes import (
     plain,
     problem,
     refusal,
-    remembering,
     rest,
     rewritten,
     status,
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
 
 _ANY, _GET, _HEAD, _OPTIONS = rest(), rest("GET"), rest("HEAD"), rest("OPTIONS")
 _INPUT = rest("PUT", *RESOURCES)
-_COMMON = {"GET", "PUT", "DELETE", "POST", "PATCH"}
 
 
 def _with_body(request: Request, forward: Forward) -> Response:
@@ -266,13 +264,13 @@ MUTANTS = (
         "http-put-once",
         "The same PUT right after itself is 409.",
         "put-idempotent",
-        remembering(lambda: _SecondTime("PUT", problem(409, "linear.x: that is so already"))),
+        (lambda: _SecondTime("PUT", problem(409, "linear.x: that is so already"))),
     ),
     _mutant(
         "http-delete-crash",
         "A second DELETE is 500.",
         "delete-idempotent",
-        remembering(lambda: _SecondTime("DELETE", problem(500, "no goal"))),
+        (lambda: _SecondTime("DELETE", problem(500, "no goal"))),
     ),
     _mutant(
         "http-no-content-type",

@@ -9,7 +9,7 @@ from lxml import etree
 
 from conformance.selftest.mutants.changes import SOAP, TNS, altered, named, rewritten, soap, xml
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.mutants.soap_profile import is_fault
+from conformance.selftest.mutants.soap_responses import is_fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable

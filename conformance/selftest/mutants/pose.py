@@ -13,7 +13,6 @@ from conformance.selftest.mutants.changes import (
     parsed,
     plain,
     problem,
-    remembering,
     rest,
     values,
 )
@@ -144,7 +143,7 @@ MUTANTS = (
         "Before the first odometry, the pose is 503 without Retry-After.",
         ("rest-resources/pose-unavailable",),
         "rest",
-        remembering(_NotYet),
+        _NotYet,
     ),
     Mutant(
         "pose-quaternion-long",
@@ -165,21 +164,21 @@ MUTANTS = (
         "The pose's header is for ever the first one's.",
         ("rest-resources/pose-stamp",),
         "rest",
-        remembering(lambda: _Frozen("header")),
+        (lambda: _Frozen("header")),
     ),
     Mutant(
         "pose-stamp-backwards",
         "Each fifth pose has a stamp a second back.",
         ("rest-resources/pose-stamp",),
         "rest",
-        remembering(_Backwards),
+        _Backwards,
     ),
     Mutant(
         "pose-stale",
         "The pose is for ever the first one, with a new stamp.",
         ("rest-resources/pose-motion", "rest-resources/pose-rotation"),
         "rest",
-        remembering(_renewed),
+        _renewed,
     ),
     Mutant(
         "pose-in-centimetres",

@@ -7,21 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
-from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, rewritten, soap, xml
+from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, posted, rewritten, soap, xml
 from conformance.selftest.mutants.mutant import Mutant
-from conformance.selftest.mutants.soap_profile import coded, is_fault
-from conformance.selftest.mutants.soap_services import enveloped, fault
+from conformance.selftest.mutants.soap_responses import coded, enveloped, fault, is_fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from conformance.selftest.change import Forward
     from conformance.selftest.messages import Request, Response
-
-
-def posted(request: Request) -> bool:
-    """SOAP requests."""
-    return request.side == "soap" and request.method == "POST"
 
 
 def _foreign(request: Request) -> bool:

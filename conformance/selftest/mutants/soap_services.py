@@ -5,15 +5,12 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from lxml import etree
-
 from conformance.selftest.messages import Response
 from conformance.selftest.mutants.changes import (
     SOAP,
     TNS,
     altered,
     instead,
-    named,
     rewritten,
     soap,
     success,
@@ -22,6 +19,15 @@ from conformance.selftest.mutants.changes import (
     wsdls,
 )
 from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.soap_responses import (
+    coffee_for_all,
+    enveloped,
+    fault,
+    other_namespace,
+    unavailable,
+    with_content,
+    without,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,36 +37,6 @@ if TYPE_CHECKING:
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _ACT, _READ = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"), soap("Get[A-Z][A-Za-z]+")
-
-
-def enveloped(content: str, status: int = 200) -> Callable[[Request], Response]:
-    """An envelope of one's own."""
-    body = f'<s:Envelope xmlns:s="{SOAP}"><s:Body>{content}</s:Body></s:Envelope>'.encode()
-    return lambda request: Response(status, [("Content-Type", "text/xml; charset=utf-8")], body, method=request.method)
-
-
-def fault(code: str, string: str) -> Callable[[Request], Response]:
-    """A well-made SOAP fault."""
-    return enveloped(f"<s:Fault><faultcode>s:{code}</faultcode><faultstring>{string}</faultstring></s:Fault>", 500)
-
-
-def _without(name: str) -> Callable[[Any], None]:
-    def edit(root: Any) -> None:
-        for node in named(root, name)[:1]:
-            node.getparent().remove(node)
-
-    return edit
-
-
-def _content(root: Any) -> None:
-    body = named(root, "Body")[0]
-    for wrapper in body:
-        etree.SubElement(wrapper, "accepted").text = "true"
-
-
-def _other_namespace(root: Any) -> None:
-    for wrapper in named(root, "Body")[0]:
-        wrapper.tag = etree.QName("http://ros-ws.org", etree.QName(wrapper).localname).text
 
 
 def _written(pattern: bytes) -> Callable[[Request], bool]:
@@ -91,15 +67,6 @@ def _no_goal_page(request: Request, forward: Forward) -> Response:
     return response
 
 
-def _coffee_for_all(root: Any) -> None:
-    for wrapper in named(root, "ExecuteDeliveryRequestResponse"):
-        wrapper.tag = f"{{{TNS}}}ExecuteCoffeeRequestResponse"
-
-
-def _unavailable(response: Response) -> None:
-    response.status, response.reason, response.body = 503, "", b""
-
-
 def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
     return Mutant(name, says, (id_,), "soap", make)
 
@@ -118,7 +85,7 @@ MUTANTS = (
         "soap-delivery-cross-answer",
         "ExecuteDeliveryRequest is answered with the coffee's response.",
         "soap-delivery/delivery",
-        altered(_DELIVERY, tree(_coffee_for_all)),
+        altered(_DELIVERY, tree(coffee_for_all)),
     ),
     _mutant(
         "soap-coffee-unknown",
@@ -130,19 +97,19 @@ MUTANTS = (
         "soap-coffee-sometimes-503",
         "One coffee in ten is refused with 503.",
         "soap-delivery/coffee",
-        altered(_COFFEE, _unavailable, nth=10),
+        altered(_COFFEE, unavailable, nth=10),
     ),
     _mutant(
         "soap-response-full",
         "The response wrapper holds a value.",
         "soap-delivery/response-valid",
-        altered(_ACT, tree(_content)),
+        altered(_ACT, tree(with_content)),
     ),
     _mutant(
         "soap-response-namespace",
         "The response is in the second listing's namespace.",
         "soap-delivery/response-valid",
-        altered(_ACT, tree(_other_namespace)),
+        altered(_ACT, tree(other_namespace)),
     ),
     _mutant(
         "soap-response-soap12",
@@ -217,19 +184,19 @@ MUTANTS = (
         "soap-pose-short",
         "GetPose has 35 covariances.",
         "soap-subscribers/pose",
-        altered(soap("GetPose"), tree(_without("covariance"))),
+        altered(soap("GetPose"), tree(without("covariance"))),
     ),
     _mutant(
         "soap-velocity-half",
         "GetVelocity has no angular part.",
         "soap-subscribers/velocity",
-        altered(soap("GetVelocity"), tree(_without("angular"))),
+        altered(soap("GetVelocity"), tree(without("angular"))),
     ),
     _mutant(
         "soap-sensors-untyped",
         "GetSensors has no types.",
         "soap-subscribers/sensors",
-        altered(soap("GetSensors"), tree(_without("type"))),
+        altered(soap("GetSensors"), tree(without("type"))),
     ),
     _mutant(
         "soap-services-fault",
@@ -241,7 +208,7 @@ MUTANTS = (
         "soap-services-unnamed",
         "GetNavigationServices lacks a name.",
         "soap-subscribers/services",
-        altered(soap("GetNavigationServices"), tree(_without("name"))),
+        altered(soap("GetNavigationServices"), tree(without("name"))),
     ),
     _mutant("soap-no-goal-page", "Without a goal, GetGoal is a page.", "soap-subscribers/goal", lambda: _no_goal_page),
     _mutant(
@@ -254,13 +221,13 @@ MUTANTS = (
         "soap-read-namespace",
         "Responses of the subscribers service are in another namespace.",
         "soap-subscribers/response-valid",
-        altered(_READ, tree(_other_namespace)),
+        altered(_READ, tree(other_namespace)),
     ),
     _mutant(
         "soap-read-extra",
         "Responses of the subscribers service hold an element of the robot's own.",
         "soap-subscribers/response-valid",
-        altered(_READ, tree(_content)),
+        altered(_READ, tree(with_content)),
     ),
     _mutant(
         "soap-read-description-misleads",

@@ -16,7 +16,6 @@ from conformance.selftest.mutants.changes import (
     parsed,
     plain,
     problem,
-    remembering,
     rest,
     secretly,
     status,
@@ -171,7 +170,7 @@ MUTANTS = (
         "GET shows the velocity that was commanded, although the robot has long stopped.",
         ("rest-resources/velocity-odometry", "safety/watchdog"),
         "rest",
-        remembering(_Commanded),
+        _Commanded,
     ),
     Mutant(
         "velocity-put-created",
@@ -220,7 +219,7 @@ MUTANTS = (
         "While a goal is active, a velocity is answered 423.",
         ("rest-resources/velocity-goal",),
         "rest",
-        remembering(_WhileGoal),
+        _WhileGoal,
     ),
     Mutant(
         "linear-without-z",

@@ -41,9 +41,6 @@ class Reply:
     fields: list[tuple[str, str]] = field(default_factory=list)
 
 
-Answerer = "Callable[[Ask], Reply]"
-
-
 class Loop:
     """An event loop in a thread of its own."""
 

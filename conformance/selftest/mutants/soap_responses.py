@@ -1,0 +1,206 @@
+"""What a mutant may do to a SOAP response: its status, its envelope, its body, its fault.
+
+Each edits a response, for ``altered``, or an XML tree in it, for ``tree`` and ``fault_tree``, or makes a response of
+its own, for ``instead``.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from lxml import etree
+
+from conformance.selftest.messages import Response
+from conformance.selftest.mutants.changes import SOAP, TNS, named, tree
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conformance.selftest.messages import Request
+
+_TRACE = (
+    "java.lang.NullPointerException\n\tat org.mybot.turtlebot.soap.Publishers.execute(Publishers.java:41)\n"
+    "\tat com.sun.xml.ws.server.InvokerTube$2.invoke(InvokerTube.java:148)"
+)
+
+
+def is_fault(response: Response) -> bool:
+    """Answers that hold a SOAP fault."""
+    return b"Fault" in response.body and b"faultstring" in response.body
+
+
+def set_status(value: int) -> Callable[[Response], None]:
+    """Another status."""
+
+    def edit(response: Response) -> None:
+        response.status, response.reason = value, ""
+
+    return edit
+
+
+def fault_tree(edit: Callable[[Any], object]) -> Callable[[Response], object]:
+    """Alter the Fault element."""
+
+    def apply(root: Any) -> None:
+        for element in named(root, "Fault"):
+            edit(element)
+
+    return tree(apply)
+
+
+def hinted(element: Any) -> None:
+    """A child of Fault that SOAP does not have."""
+    etree.SubElement(element, "hint").text = "see the manual"
+
+
+def qualified(element: Any) -> None:
+    """Fault's children in SOAP's namespace."""
+    for child in element:
+        child.tag = etree.QName(SOAP, etree.QName(child).localname).text
+
+
+def dropped(name: str) -> Callable[[Any], None]:
+    """Fault without a child."""
+
+    def edit(element: Any) -> None:
+        for child in named(element, name):
+            child.getparent().remove(child)
+
+    return edit
+
+
+def coded(code: str) -> Callable[[Response], object]:
+    """Give every fault another code, in the prefix that it has."""
+
+    def edit(element: Any) -> None:
+        for child in named(element, "faultcode"):
+            child.text = re.sub(r"\w+\s*$", code, child.text or "")
+
+    return fault_tree(edit)
+
+
+def traced(element: Any) -> None:
+    """A stack trace as faultstring."""
+    for child in named(element, "faultstring"):
+        child.text = _TRACE
+
+
+def unbound(response: Response) -> None:
+    """Faultcode with a prefix that is not bound."""
+    response.body = re.sub(rb"(<faultcode[^>]*>\s*)[\w.-]+:", rb"\1nowhere:", response.body)
+
+
+def styled(root: Any) -> None:
+    """EncodingStyle at Envelope."""
+    root.set(f"{{{SOAP}}}encodingStyle", "http://schemas.xmlsoap.org/soap/encoding/")
+
+
+def styled_child(root: Any) -> None:
+    """EncodingStyle at the child of Body."""
+    for child in named(root, "Body")[0]:
+        child.set(f"{{{SOAP}}}encodingStyle", "http://schemas.xmlsoap.org/soap/encoding/")
+
+
+def declared(response: Response) -> None:
+    """A Document Type Declaration."""
+    prolog, _, rest = (
+        response.body.rpartition(b"?>") if response.body.startswith(b"<?xml") else (b"", b"", response.body)
+    )
+    root = re.search(rb"<([\w.-]+:)?Envelope", rest)
+    name = root[0][1:] if root else b"Envelope"
+    response.body = (prolog + b"?>" if prolog else b"") + b"<!DOCTYPE " + name + b">" + rest
+
+
+def instructed(response: Response) -> None:
+    """A processing instruction."""
+    response.body = re.sub(rb"(<([\w.-]+:)?Envelope)", rb"<?robot drive?>\1", response.body, count=1)
+
+
+def trailer(root: Any) -> None:
+    """An element after Body."""
+    etree.SubElement(root, "{urn:example:trailer}signature").text = "0"
+
+
+def latin(response: Response) -> None:
+    """ISO 8859-1 in place of UTF-8."""
+    body = re.sub(rb"^\s*<\?xml.*?\?>", b"", response.body)
+    response.body = b'<?xml version="1.0" encoding="ISO-8859-1"?><!-- \xe9t\xe9 -->' + body
+    response.put("Content-Type", "text/xml; charset=iso-8859-1")
+
+
+def understood_true(root: Any) -> None:
+    """A header block whose mustUnderstand is written true."""
+    block = etree.Element(f"{{{SOAP}}}Header")
+    child = etree.SubElement(block, "{urn:example:status}battery")
+    child.set(f"{{{SOAP}}}mustUnderstand", "true")
+    root.insert(0, block)
+
+
+def unqualified(root: Any) -> None:
+    """The child of Body in no namespace."""
+    for child in named(root, "Body")[0]:
+        child.tag = etree.QName(child).localname
+
+
+def wrapper_as_asked(root: Any) -> None:
+    """The request's wrapper in place of the response's."""
+    for child in named(root, "Body")[0]:
+        child.tag = child.tag.removesuffix("Response")
+
+
+def bare_500(response: Response) -> None:
+    """A page with status 500."""
+    response.status, response.reason, response.body = 500, "", b"<html><body>Internal Server Error</body></html>"
+    response.put("Content-Type", "text/html")
+
+
+def empty(response: Response, value: int) -> None:
+    """Another status, without a body."""
+    response.status, response.reason, response.body = value, "", b""
+    response.drop("Content-Type")
+
+
+def enveloped(content: str, status: int = 200) -> Callable[[Request], Response]:
+    """An envelope of one's own."""
+    body = f'<s:Envelope xmlns:s="{SOAP}"><s:Body>{content}</s:Body></s:Envelope>'.encode()
+    return lambda request: Response(status, [("Content-Type", "text/xml; charset=utf-8")], body, method=request.method)
+
+
+def fault(code: str, string: str) -> Callable[[Request], Response]:
+    """A well-made SOAP fault."""
+    return enveloped(f"<s:Fault><faultcode>s:{code}</faultcode><faultstring>{string}</faultstring></s:Fault>", 500)
+
+
+def without(name: str) -> Callable[[Any], None]:
+    """The first element with a name is gone."""
+
+    def edit(root: Any) -> None:
+        for node in named(root, name)[:1]:
+            node.getparent().remove(node)
+
+    return edit
+
+
+def with_content(root: Any) -> None:
+    """An element in the response's wrapper."""
+    body = named(root, "Body")[0]
+    for wrapper in body:
+        etree.SubElement(wrapper, "accepted").text = "true"
+
+
+def other_namespace(root: Any) -> None:
+    """The wrapper in another namespace."""
+    for wrapper in named(root, "Body")[0]:
+        wrapper.tag = etree.QName("http://ros-ws.org", etree.QName(wrapper).localname).text
+
+
+def coffee_for_all(root: Any) -> None:
+    """The coffee's response in place of the delivery's."""
+    for wrapper in named(root, "ExecuteDeliveryRequestResponse"):
+        wrapper.tag = f"{{{TNS}}}ExecuteCoffeeRequestResponse"
+
+
+def unavailable(response: Response) -> None:
+    """503 without a body."""
+    response.status, response.reason, response.body = 503, "", b""

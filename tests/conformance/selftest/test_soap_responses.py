@@ -1,0 +1,53 @@
+"""Edits of SOAP responses do what they say, and nothing to what they do not concern."""
+
+import pytest
+from lxml import etree
+
+from conformance.selftest.messages import Request
+from conformance.selftest.mutants import soap_responses as edits
+from conformance.selftest.mutants.changes import SOAP, named, tree
+
+ASKED = Request("soap", "POST", "/")
+
+
+def refused():
+    return edits.fault("Client", "no")(ASKED)
+
+
+def test_a_fault_is_told_from_an_answer():
+    assert edits.is_fault(refused())
+    assert not edits.is_fault(edits.enveloped("<x/>")(ASKED))
+
+
+@pytest.mark.parametrize(
+    ("edit", "shown"),
+    [
+        (edits.coded("Server"), b"s:Server<"),
+        (edits.unbound, b"nowhere:Client<"),
+        (edits.declared, b"<!DOCTYPE s:Envelope>"),
+        (edits.instructed, b"<?robot drive?>"),
+        (edits.latin, b"ISO-8859-1"),
+        (edits.fault_tree(edits.traced), b"NullPointerException"),
+        (edits.fault_tree(edits.hinted), b"<hint>"),
+        (edits.bare_500, b"<html>"),
+    ],
+)
+def test_an_edit_shows(edit, shown):
+    response = refused()
+    assert shown not in response.body
+    edit(response)
+    assert shown in response.body
+
+
+def test_a_header_block_comes_before_the_body():
+    response = refused()
+    tree(edits.understood_true)(response)
+    root = etree.fromstring(response.body)
+    assert [etree.QName(child).localname for child in root] == ["Header", "Body"]
+    assert named(root, "battery")[0].get(f"{{{SOAP}}}mustUnderstand") == "true"
+
+
+def test_a_status_is_changed_with_its_reason():
+    response = refused()
+    edits.set_status(202)(response)
+    assert response.octets().startswith(b"HTTP/1.1 202 Accepted\r\n")
