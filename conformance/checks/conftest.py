@@ -6,20 +6,35 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.rest.observers import watch
-from conformance.robot.probe.client import start_probe
+from conformance.rest.observers import Observer as RestObserver
+from conformance.robot.observer import Observer as RobotObserver
+from conformance.robot.probe.client import RosProbe
+from conformance.soap.observer import PASSIVE, SoapObserver, answers_of
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from collections.abc import Iterator
+
+    from conformance.robot.interfaces import Interfaces
+    from conformance.transport.client import Connection
+    from conformance.verdict.run import Run
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _watched(roaas: Session) -> None:
-    """Have every exchange over REST judged from the first check on."""
-    watch(roaas)
+def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
+    """Have every exchange judged from the first check on. Here, and nowhere else, observers are registered."""
+    services = interfaces.soap.there.values()
+    if interfaces.rest is not None:
+        connection.listeners.append(RestObserver(interfaces.rest, [service.endpoint for service in services]))
+        connection.listeners.append(RobotObserver(interfaces.rest))
+    if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
+        answers = {service.endpoint: answers_of(service) for service in services}
+        connection.listeners.append(SoapObserver(run.judge, answers))
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _probed(roaas: Session) -> None:
-    """Start the ROS probe before it is needed."""
-    start_probe(roaas)
+def probe(run: Run) -> Iterator[RosProbe]:
+    """The ROS probe, started before it is needed where a domain is given."""
+    started = RosProbe(run.statement.ros)
+    started.start()
+    yield started
+    started.close()

@@ -1,4 +1,4 @@
-"""``roaas certify``: options to a session, a session to a verdict, a verdict to an exit code."""
+"""``roaas certify``: options to a run, a run to a verdict, a verdict to an exit code."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from conformance.verdict.effort import EFFORTS, Effort
 
 if TYPE_CHECKING:
     from conformance.engine.certification import Certification
-    from conformance.engine.session import Session
+    from conformance.verdict.run import Run
 
 _ENDPOINTS = (
     "rest",
@@ -163,10 +163,11 @@ def _init(path: Path | None, chosen: Statement, *, force: bool) -> None:
 
 def _certify(chosen: Statement, options: dict[str, Any]) -> Certification:
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
-    from conformance.engine.certification import certify as run  # noqa: PLC0415
+    from conformance.engine.certification import certify as judge  # noqa: PLC0415
     from conformance.engine.pytest_run import connection_of  # noqa: PLC0415
-    from conformance.engine.session import Session  # noqa: PLC0415
+    from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.verdict.baseline import BaselineError, load_baseline  # noqa: PLC0415
+    from conformance.verdict.run import Run  # noqa: PLC0415
 
     contract = Contract.load(options["contract"])
     try:
@@ -177,26 +178,25 @@ def _certify(chosen: Statement, options: dict[str, Any]) -> Certification:
     except (OSError, BaselineError) as error:
         raise StatementError(str(error)) from error
     claims = tuple(name for name in chosen.claimed() if any(r.class_ == name for r in contract.ledger.values()))
-    session = Session(
+    run = Run(
         statement=chosen,
         contract=contract,
         claims=claims,
         allow_motion=options["allow_motion"],
         seed=options["seed"],
         effort=Effort(options["effort"], minutes=options["minutes"]),
-        connection=connection,
     )
-    notes = _notes(session)
+    notes = _notes(run)
     for note in notes:
         click.echo(note, err=True)
     command = shlex.join(["roaas", *sys.argv[1:]])
-    return run(session, options["out"], command=command, baseline=baseline, notes=notes)
+    return judge(RobotUnderTest(run, connection), options["out"], command=command, baseline=baseline, notes=notes)
 
 
-def _notes(session: Session) -> tuple[str, ...]:
+def _notes(run: Run) -> tuple[str, ...]:
     notes = []
-    if session.statement.claims is None:
-        notes.append(f"No classes were claimed; judged are those that have an address: {', '.join(session.claims)}.")
-    if not session.allow_motion:
+    if run.statement.claims is None:
+        notes.append(f"No classes were claimed; judged are those that have an address: {', '.join(run.claims)}.")
+    if not run.allow_motion:
         notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")
     return tuple(notes)

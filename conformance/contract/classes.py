@@ -22,14 +22,6 @@ class Need(StrEnum):
     PROBE = "probe"  # a ROS probe; without one the requirement is skipped and does not hold its class back
 
 
-class Service(StrEnum):
-    """What of a robot has an address of its own."""
-
-    REST = "rest"
-    PUBLISHERS = "publishers"
-    SUBSCRIBERS = "subscribers"
-
-
 class ConformanceClass(StrEnum):
     """What a vendor can claim."""
 

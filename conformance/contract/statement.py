@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 
 from conformance.contract.classes import CLASSES, PROFILES, ConformanceClass, Profile
+from conformance.contract.interfaces import NEEDS, Interface
 from conformance.contract.limits import DeclaredLimits, Limits
 from conformance.contract.thresholds import Threshold
 from conformance.contract.toml_file import Finite, NotNegative, Positive, Text, TomlFileError, read_toml
@@ -53,6 +54,16 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def subscribers(self) -> bool:
         """Whether there is a word on where the subscribers service is."""
         return bool(self.subscribers_wsdl or self.subscribers_endpoint)
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """The interfaces that have an address."""
+        there = {
+            Interface.REST: bool(self.rest),
+            Interface.PUBLISHERS: self.publishers,
+            Interface.SUBSCRIBERS: self.subscribers,
+        }
+        return tuple(name for name, known in there.items() if known)
 
 
 class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -122,23 +133,8 @@ class Statement(msgspec.Struct, frozen=True):
         """The classes to judge: those that are claimed, else those whose interfaces have an address."""
         if self.claims is not None:
             return tuple(name for name in CLASSES if name in self.claims)
-        where = self.endpoints
-        soap = where.publishers or where.subscribers
-        there = {
-            "rest-resources": where.rest,
-            "rest-delivery": where.rest,
-            "rest-formats": where.rest,
-            "http": where.rest,
-            "safety": where.rest,
-            "soap-delivery": where.publishers,
-            "soap-subscribers": where.subscribers,
-            "soap-basic-profile": soap,
-            "strict-input": where.rest or soap,
-            "xml-security": where.rest or soap,
-            "equivalence": where.rest and where.publishers,
-            "describe": where.rest or soap,
-        }
-        return tuple(name for name in CLASSES if there[name])
+        there = self.endpoints.interfaces
+        return tuple(name for name in CLASSES if NEEDS[name].can_be_judged(there))
 
 
 class _Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -6,9 +6,11 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from conformance.contract.classes import CLASSES
+from conformance.contract.interfaces import Interface
 from conformance.engine.pytest_run import connection_of
-from conformance.engine.session import Session
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.transport.exchange import NoAnswerError
+from conformance.verdict.run import Run
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -72,20 +74,20 @@ def write_first_statement(path: Path, known: Statement) -> str:
     Raises:
         OSError: the file cannot be written.
     """
-    session = Session(statement=known, connection=connection_of(known.endpoints))
-    session.connect()
-    if not session.reached:
-        return "; ".join(f"{name}: {why}" for name, why in session.unreachable.items())
-    info = _openapi(session.rest).get("info", {}) if session.rest else {}
+    robot = RobotUnderTest(Run(statement=known), connection_of(known.endpoints))
+    robot.connect()
+    if not robot.reached:
+        return "; ".join(f"{name}: {why}" for name, why in robot.run.unreachable.items())
+    info = _openapi(robot.rest.client).get("info", {}) if robot.rest else {}
     info = info if isinstance(info, dict) else {}
-    claims, doubts = _claims(session)
+    claims, doubts = _claims(robot)
     lines = [f'  "{name}",' if name not in doubts else f'  # "{name}",  # {doubts[name]}' for name in claims]
     path.write_text(
         _TEMPLATE.format(
             file=path.name,
             name=_quoted(info.get("title", "")),
             version=_quoted(info.get("version", "")),
-            endpoints="\n".join(_endpoints(session)),
+            endpoints="\n".join(_endpoints(robot)),
             claims="".join(f"{line}\n" for line in lines),
         ),
         encoding="utf-8",
@@ -107,25 +109,30 @@ def _openapi(rest: HttpClient) -> dict[str, Any]:
     return document if isinstance(document, dict) else {}
 
 
-def _endpoints(session: Session) -> list[str]:
-    where = session.statement.endpoints
+def _endpoints(robot: RobotUnderTest) -> list[str]:
+    where = robot.run.statement.endpoints
     lines = []
-    for key in ("rest", "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint"):
-        value = getattr(where, key)
-        interface = key.split("_", 1)[0]
-        remark = f"  # did not answer: {session.unreachable[interface]}" if interface in session.unreachable else ""
+    for key, interface, value in (
+        ("rest", Interface.REST, where.rest),
+        ("publishers_wsdl", Interface.PUBLISHERS, where.publishers_wsdl),
+        ("subscribers_wsdl", Interface.SUBSCRIBERS, where.subscribers_wsdl),
+        ("publishers_endpoint", Interface.PUBLISHERS, where.publishers_endpoint),
+        ("subscribers_endpoint", Interface.SUBSCRIBERS, where.subscribers_endpoint),
+    ):
+        remark = f"  # did not answer: {robot.run.unreachable[interface]}" if interface in robot.run.unreachable else ""
         lines.append(f"{key} = {_quoted(value)}{remark}" if value else f'# {key} = ""')
     return lines
 
 
-def _claims(session: Session) -> tuple[list[str], dict[str, str]]:
+def _claims(robot: RobotUnderTest) -> tuple[list[str], dict[str, str]]:
     """All classes, and a doubt for each that the robot does not look as if it had."""
+    claimed = robot.run.statement.claimed()
     doubts: dict[str, str] = {
-        name: "no address for an interface that it needs" for name in CLASSES if name not in session.statement.claimed()
+        name: "no address for an interface that it needs" for name in CLASSES if name not in claimed
     }
-    if session.rest and "rest" not in session.unreachable and "rest-formats" not in doubts:
+    if robot.rest and Interface.REST not in robot.run.unreachable and "rest-formats" not in doubts:
         try:
-            answer = session.rest.send("GET", session.rest_path(), headers=[("Accept", "application/xml")]).response
+            answer = robot.rest.client.send("GET", robot.rest.path, headers=[("Accept", "application/xml")]).response
             xml = answer.media_type == "application/xml"
         except NoAnswerError:
             xml = False

@@ -1,4 +1,4 @@
-"""A session from pytest's own options, for ``pytest --pyargs conformance`` in somebody's project."""
+"""A robot from pytest's own options, for ``pytest --pyargs conformance`` in somebody's project."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import pytest
 
 from conformance.contract.classes import CLASSES, ConformanceClass
 from conformance.contract.statement import Statement, StatementError, load_statement
-from conformance.engine.session import Session
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.transport.client import Connection
 from conformance.verdict.effort import EFFORTS, Effort
+from conformance.verdict.run import Run
 
 if TYPE_CHECKING:
     from conformance.contract.statement import Endpoints
 
 
-def session_from_options(config: pytest.Config) -> Session:
-    """Make and connect a session.
+def robot_from_options(config: pytest.Config) -> RobotUnderTest:
+    """Make and connect a robot.
 
     Raises:
         pytest.UsageError: no robot is named, an option has a value that it cannot have, or nothing answers.
@@ -42,18 +43,18 @@ def session_from_options(config: pytest.Config) -> Session:
     effort = config.getoption("robot_effort")
     if effort not in EFFORTS:
         raise pytest.UsageError(f"--robot-effort {effort}: there are {', '.join(EFFORTS)}")
-    session = Session(
+    run = Run(
         statement=statement,
         claims=statement.claimed(),
         allow_motion=config.getoption("robot_allow_motion"),
         seed=config.getoption("robot_seed"),
         effort=Effort(effort),
-        connection=connection_of(where),
     )
-    session.connect()
-    if not session.reached:
-        raise pytest.UsageError(f"the robot cannot be reached: {session.unreachable}")
-    return session
+    robot = RobotUnderTest(run, connection_of(where))
+    robot.connect()
+    if not robot.reached:
+        raise pytest.UsageError(f"the robot cannot be reached: {run.unreachable}")
+    return robot
 
 
 def _endpoints(config: pytest.Config, declared: Endpoints) -> Endpoints:

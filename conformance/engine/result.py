@@ -15,13 +15,15 @@ from msgspec.structs import asdict
 
 from conformance.contract.classes import CLASS_TITLES
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
+from conformance.contract.interfaces import Interface
 from conformance.transport.exchange import Unanswered
 
 if TYPE_CHECKING:
     import datetime as dt
     from collections.abc import Mapping
 
-    from conformance.engine.session import Session
+    from conformance.contract.files import Contract
+    from conformance.engine.robot_under_test import RobotUnderTest
     from conformance.transport.exchange import Attempt
     from conformance.verdict.evidence import Finding
     from conformance.verdict.verdicts import Verdict
@@ -34,7 +36,7 @@ _LIBRARIES = ("schemathesis", "hypothesis", "zeep", "lxml", "xmlschema", "httpco
 
 
 def result_document(
-    session: Session,
+    robot: RobotUnderTest,
     verdicts: list[Verdict],
     classes: Mapping[str, tuple[str, str]],
     overall: str,
@@ -46,28 +48,32 @@ def result_document(
     interrupted: bool,
 ) -> dict[str, Any]:
     """Put a run together as result.json has it."""
-    statement = session.statement
+    run, statement = robot.run, robot.run.statement
     return {
         "format": RESULT_FORMAT,
         "verdict": overall,
         "interrupted": interrupted,
-        "suite": {"version": suite_version(), "contract": _contract_name(session), "digest": suite_digest(session)},
-        "target": _target(session),
+        "suite": {
+            "version": suite_version(),
+            "contract": _contract_name(run.contract),
+            "digest": suite_digest(run.contract),
+        },
+        "target": _target(robot),
         "statement": {
             "robot": statement.robot,
             "endpoints": {key: value for key, value in asdict(statement.endpoints).items() if value is not None},
-            "claims": list(session.claims),
+            "claims": list(run.claims),
             "limits": statement.limits.figures,
             "tolerances": statement.limits.tolerances,
-            "motion_allowed": session.allow_motion,
+            "motion_allowed": run.allow_motion,
         },
-        "seed": session.seed,
-        "effort": session.effort.name,
+        "seed": run.seed,
+        "effort": run.effort.name,
         "command": command,
         "started": _rfc3339(started),
         "finished": _rfc3339(finished),
         "duration_s": round((finished - started).total_seconds(), 3),
-        "requests": session.connection.sent,
+        "requests": robot.connection.sent,
         "environment": {
             "python": platform.python_version(),
             "platform": platform.platform(),
@@ -77,24 +83,27 @@ def result_document(
         "class_titles": {name: CLASS_TITLES[name] for name in classes},
         "class_reasons": {name: reason for name, (_, reason) in classes.items() if reason},
         "requirements": [_requirement(verdict) for verdict in verdicts],
-        "contract_sections": {anchor: section._asdict() for anchor, section in session.contract.cited_sections.items()},
+        "contract_sections": {anchor: section._asdict() for anchor, section in run.contract.cited_sections.items()},
         "notes": notes,
     }
 
 
-def _contract_name(session: Session) -> str:
-    directory = session.contract.directory
+def _contract_name(contract: Contract) -> str:
+    directory = contract.directory
     return CONTRACT_VERSION if directory == CONTRACT_DIR else f"own ({directory.resolve().name})"
 
 
-def _target(session: Session) -> dict[str, Any]:
-    where = session.statement.endpoints
+def _target(robot: RobotUnderTest) -> dict[str, Any]:
+    where = robot.run.statement.endpoints
     target: dict[str, Any] = {"rest": where.rest}
-    for name in ("publishers", "subscribers"):
-        service = getattr(session, name)
-        target[f"{name}_wsdl"] = getattr(where, f"{name}_wsdl")
+    for name, wsdl in (
+        (Interface.PUBLISHERS, where.publishers_wsdl),
+        (Interface.SUBSCRIBERS, where.subscribers_wsdl),
+    ):
+        service = robot.soap.there.get(name)
+        target[f"{name}_wsdl"] = wsdl
         target[f"{name}_endpoint"] = service.client.base_url + service.path if service else None
-    return {**target, "ros_domain_id": session.statement.ros.domain_id}
+    return {**target, "ros_domain_id": robot.run.statement.ros.domain_id}
 
 
 def _requirement(verdict: Verdict) -> dict[str, Any]:
@@ -179,11 +188,11 @@ def suite_version() -> str:
     return _installed("roaas")
 
 
-def suite_digest(session: Session) -> str:
+def suite_digest(contract: Contract) -> str:
     """Digest over the suite's modules and the contract's files: two runs with the same digest asked the same."""
     digest = hashlib.sha256()
     package = Path(__file__).parents[1]
-    files = [*package.rglob("*.py"), *(path for path in session.contract.directory.iterdir() if path.is_file())]
+    files = [*package.rglob("*.py"), *(path for path in contract.directory.iterdir() if path.is_file())]
     for path in sorted(set(files)):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return f"sha256:{digest.hexdigest()}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -13,7 +12,7 @@ from conformance.documents.writing import json_text, text_of, xml_bytes
 
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation, Parameter
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
 
 JSON = "application/json"
@@ -63,7 +62,7 @@ class Call:
 
     def send(
         self,
-        session: Session,
+        api: RestInterface,
         *headers: tuple[str, str],
         method: str | None = None,
         fresh: bool = False,
@@ -74,14 +73,11 @@ class Call:
         Raises:
             NoAnswerError: no HTTP response came.
         """
-        rest = session.rest
-        if rest is None:
-            raise RuntimeError("the run has no REST interface")
         fields = list(headers)
         names = {name.lower() for name, _ in fields}
         if self.media_type and "content-type" not in names:
             fields.append(("Content-Type", self.media_type))
-        return rest.send(
+        return api.client.send(
             method or self.operation.method,
             self.path,
             headers=[pair for pair in fields if pair != ("Content-Type", "")],
@@ -91,13 +87,13 @@ class Call:
         )
 
 
-def example_call(session: Session, operation: Operation, media_type: str = JSON) -> Call:
+def example_call(api: RestInterface, operation: Operation, media_type: str = JSON) -> Call:
     """A valid request for an operation, by the contract's examples.
 
     Optional query parameters are given where the contract has an example for them.
 
     Args:
-        session: the run.
+        api: the robot's REST interface.
         operation: which.
         media_type: of the body, where the operation takes one.
     """
@@ -106,19 +102,19 @@ def example_call(session: Session, operation: Operation, media_type: str = JSON)
         if item.where in {"path", "query"} and (item.required or item.examples):
             given[item.name] = example_of(item)
     if given:
-        given = _fitted(session, operation, given)
+        given = _fitted(api, operation, given)
     call = Call(operation, {name: text_of(value) for name, value in given.items()})
     if media_type not in operation.bodies:
         return call
-    value = body_value(session, operation)
+    value = body_value(api, operation)
     return replace(call, media_type=media_type, body=body_bytes(operation, media_type, value), value=value)
 
 
-def body_value(session: Session, operation: Operation) -> Any:
+def body_value(api: RestInterface, operation: Operation) -> Any:
     """A valid value for an operation's body, by the contract's JSON example."""
     body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
     plain = [item for item in body.examples if not isinstance(item, str)]
-    return _fitted(session, operation, plain[0] if plain else minimal(body.schema))
+    return _fitted(api, operation, plain[0] if plain else minimal(body.schema))
 
 
 def body_bytes(operation: Operation, media_type: str, value: Any) -> bytes:
@@ -157,12 +153,6 @@ def minimal(schema: Schema, depth: int = 0) -> Any:
     return True if kind == "boolean" else "a" * max(1, schema.get("minLength", 1))
 
 
-def _fitted(session: Session, operation: Operation, value: Any) -> Any:
+def _fitted(api: RestInterface, operation: Operation, value: Any) -> Any:
     """A value made fit for this robot: within its limits, near where it is."""
-    if not session.contract.own:
-        return value
-    try:
-        examples = importlib.import_module("conformance.robot.examples")
-    except ModuleNotFoundError:
-        return value
-    return examples.fit(session, operation.id, value)
+    return value if api.domain is None else api.domain.fit(operation.id, value)

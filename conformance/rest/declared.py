@@ -12,7 +12,7 @@ from conformance.rest.accept import quality
 if TYPE_CHECKING:
     from conformance.documents.json_schema import Schema
     from conformance.documents.openapi import Operation
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.rest.request_context import RequestContext
     from conformance.transport.exchange import Exchange, Response
 
@@ -23,13 +23,13 @@ _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
 _OK, _NO_CONTENT, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 404, 405, 406, 500
 
 
-def judge(session: Session, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+def judge(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:
     """Judge one answer to a request that is for an operation of the contract."""
     operation = context.operation
     if operation is None:
         return
     if answer.status < _SERVER_ERROR:
-        session.judge.check(
+        api.run.judge.check(
             "http/declared-status",
             _status_fits(operation, answer, context),
             exchange,
@@ -38,9 +38,9 @@ def judge(session: Session, exchange: Exchange, answer: Response, context: Reque
             cause=f"{operation.id} {answer.status}",
         )
     if answer.ok and not context.is_head:
-        _judge_body(session, exchange, answer, context)
+        _judge_body(api, exchange, answer, context)
     if answer.ok and operation.method == "GET":
-        _judge_negotiation(session, exchange, answer, context)
+        _judge_negotiation(api, exchange, answer, context)
 
 
 def _status_fits(operation: Operation, answer: Response, context: RequestContext) -> bool:
@@ -61,7 +61,7 @@ def _status_fits(operation: Operation, answer: Response, context: RequestContext
     return has_input and 400 <= status < _SERVER_ERROR and not elsewhere  # noqa: PLR2004 - RFC 9110 15.5
 
 
-def _judge_body(session: Session, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+def _judge_body(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:
     operation = context.operation
     content = operation.declared(answer.status) if operation else None
     if operation is None or not content:
@@ -69,7 +69,7 @@ def _judge_body(session: Session, exchange: Exchange, answer: Response, context:
     if not answer.body:
         # Only what was asked for has to come: a PUT may be answered without the accepted representation.
         if operation.method == "GET" and answer.status != _NO_CONTENT:
-            session.judge.check(
+            api.run.judge.check(
                 "http/declared-body",
                 holds=False,
                 exchange=exchange,
@@ -78,7 +78,7 @@ def _judge_body(session: Session, exchange: Exchange, answer: Response, context:
             )
         return
     media_type = answer.media_type
-    declared = session.judge.check(
+    declared = api.run.judge.check(
         "http/declared-body",
         media_type in content,
         exchange,
@@ -87,10 +87,12 @@ def _judge_body(session: Session, exchange: Exchange, answer: Response, context:
         cause=f"{operation.id} {media_type}",
     )
     if declared:
-        _judge_shape(session, exchange, answer, operation, content[media_type])
+        _judge_shape(api, exchange, answer, operation, content[media_type])
 
 
-def _judge_shape(session: Session, exchange: Exchange, answer: Response, operation: Operation, schema: Schema) -> None:
+def _judge_shape(
+    api: RestInterface, exchange: Exchange, answer: Response, operation: Operation, schema: Schema
+) -> None:
     media_type = answer.media_type
     if is_json(media_type):
         id_, kind = "http/declared-body", "JSON"
@@ -104,7 +106,7 @@ def _judge_shape(session: Session, exchange: Exchange, answer: Response, operati
         fault = shape_of(schema).problem(read(media_type, answer.body, schema))
     except UnreadableError as error:
         fault = str(error)
-    session.judge.check(
+    api.run.judge.check(
         id_,
         not fault,
         exchange,
@@ -114,13 +116,13 @@ def _judge_shape(session: Session, exchange: Exchange, answer: Response, operati
     )
 
 
-def _judge_negotiation(session: Session, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+def _judge_negotiation(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:
     operation = context.operation
     if operation is None or not operation.formats:
         return
     media_type = answer.media_type
     if media_type and context.usual:
-        session.judge.check(
+        api.run.judge.check(
             "http/not-acceptable",
             quality(media_type, context.accept) > 0,
             exchange,
@@ -130,7 +132,7 @@ def _judge_negotiation(session: Session, exchange: Exchange, answer: Response, c
         )
     if len(operation.formats) > 1 and not context.is_head:
         vary = (answer.header("vary") or "").lower()
-        session.judge.check(
+        api.run.judge.check(
             "rest-formats/vary",
             "*" in vary or "accept" in [name.strip() for name in vary.split(",")],
             exchange,

@@ -12,42 +12,42 @@ from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.snapshot import flatten
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
 
 _PAUSE_S = 0.01
 
 
-def reader_of(session: Session, call: Call) -> Call | None:
+def reader_of(api: RestInterface, call: Call) -> Call | None:
     """The GET of the resource that a PUT is for, with the same values in its path."""
-    for operation in operations_of(session.contract):
+    for operation in operations_of(api.run.contract):
         if operation.method == "GET" and operation.template == call.operation.template:
-            read = example_call(session, operation)
+            read = example_call(api, operation)
             return Call(operation, {**read.values, **call.values})
     return None
 
 
-def settles_at(session: Session, call: Call) -> str | None:
+def settles_at(api: RestInterface, call: Call) -> str | None:
     """Wait until GET shows what was put.
 
     Returns:
         Empty when it does; what it shows instead when the settle time is over (a quarter more than declared, and half
         a second for a loaded machine); None where nothing can be compared.
     """
-    read = reader_of(session, call)
+    read = reader_of(api, call)
     if read is None or not isinstance(call.value, dict):
         return None
-    limits = session.statement.limits
-    until = time.monotonic() + 1.25 * limits.settle_s + 0.5 + 4 * session.effort.usual_ms / 1000
+    limits = api.run.statement.limits
+    until = time.monotonic() + 1.25 * limits.settle_s + 0.5 + 4 * api.run.effort.usual_ms / 1000
     wanted = flattened(call.value)
     renew_at = time.monotonic() + 0.4 * (limits.hold_s or math.inf)
     while True:
-        shown = flatten(read.send(session, ("Accept", JSON)))
+        shown = flatten(read.send(api, ("Accept", JSON)))
         if shown["status"] == 404:  # noqa: PLR2004 - what was put has ended since: a goal that was reached
             return None
         other = [
             f"{place} is {shown.get(place, 'nothing')!r} for {value!r}"
             for place, value in wanted.items()
-            if not place.endswith("[]") and not _near(session, shown.get(place), value)
+            if not place.endswith("[]") and not _near(api, shown.get(place), value)
         ]
         if not other:
             return ""
@@ -55,13 +55,13 @@ def settles_at(session: Session, call: Call) -> str | None:
             return other[0]
         if time.monotonic() > renew_at:
             renew_at = math.inf
-            call.send(session)
+            call.send(api)
         time.sleep(_PAUSE_S)
 
 
-def _near(session: Session, shown: Any, wanted: Any) -> bool:
+def _near(api: RestInterface, shown: Any, wanted: Any) -> bool:
     numbers = [item for item in (shown, wanted) if isinstance(item, float)]
     if len(numbers) < 2:  # noqa: PLR2004 - both, or compare as they are
         return bool(shown == wanted)
-    limits = session.statement.limits
+    limits = api.run.statement.limits
     return abs(numbers[0] - numbers[1]) <= limits.tolerance_abs + limits.tolerance * abs(numbers[1])

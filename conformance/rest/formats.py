@@ -11,8 +11,8 @@ from conformance.rest.snapshot import steady
 
 if TYPE_CHECKING:
     from conformance.documents.json_schema import Schema
-    from conformance.engine.session import Session
     from conformance.rest.calls import Call
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
 
 # A robot at rest jitters; what its formats say otherwise in so many turns in a row is no jitter.
@@ -34,7 +34,7 @@ class Disagreement:
     exchange: Exchange
 
 
-def disagreements(session: Session, call: Call, media_types: list[str]) -> tuple[list[Disagreement], Exchange]:
+def disagreements(api: RestInterface, call: Call, media_types: list[str]) -> tuple[list[Disagreement], Exchange]:
     """Read a resource as JSON, in the other formats, and as JSON again, until all say the same.
 
     Only what both JSON answers say alike is compared, so that what changes between two reads blames nobody; what
@@ -47,9 +47,9 @@ def disagreements(session: Session, call: Call, media_types: list[str]) -> tuple
     suspects: dict[tuple[str, str], Disagreement] | None = None
     exchange = None
     for _ in range(_TURNS):
-        first = call.send(session, ("Accept", JSON))
-        others = [(name, call.send(session, ("Accept", name))) for name in media_types]
-        exchange = call.send(session, ("Accept", JSON))
+        first = call.send(api, ("Accept", JSON))
+        others = [(name, call.send(api, ("Accept", name))) for name in media_types]
+        exchange = call.send(api, ("Accept", JSON))
         snapshots = [_snapshot(item, JSON, schema) for item in (first, exchange)]
         if any(shown is None for shown in snapshots):
             return [], exchange  # what is wrong with that, others judge

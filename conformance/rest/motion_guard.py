@@ -14,8 +14,8 @@ from conformance.rest.validity import INVALID, VALID, Validity, validity
 
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
-    from conformance.engine.session import Session
     from conformance.rest.generated import GeneratedRequest
+    from conformance.rest.interface import RestInterface
 
 # How many valid requests of one moving operation are sent: each may start a mission.
 _ACCEPTED = 3
@@ -27,11 +27,11 @@ class MotionGuard:
     """Looks at every random request before it is sent.
 
     Args:
-        session: the run.
+        api: the robot's REST interface.
     """
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, api: RestInterface) -> None:
+        self._api = api
         self._valid: Counter[str] = Counter()
 
     def admit(self, item: GeneratedRequest) -> GeneratedRequest | None:
@@ -40,13 +40,13 @@ class MotionGuard:
         operation = said.operation
         if operation is None:
             return item if self._may_reach(item) else None
-        if not allowed(self._session, operation):
+        if not allowed(self._api, operation):
             return None
         if not operation.motion:
             return item
         if said.verdict == VALID:
             return self._fitted(item, operation)
-        if not self._session.contract.own:
+        if not self._api.run.contract.own:
             return item
         # What may be taken with whatever values are in it is not sent to a robot; what must be refused is sent slow.
         return self._slow(item) if said.verdict == INVALID else None
@@ -58,19 +58,19 @@ class MotionGuard:
             self._valid[operation.id] += 1
 
     def _validity(self, item: GeneratedRequest) -> Validity:
-        return validity(self._session.contract, item.method, item.target, item.media_type, item.body)
+        return validity(self._api.run.contract, item.method, item.target, item.media_type, item.body)
 
     def _may_reach(self, item: GeneratedRequest) -> bool:
         """Whether a request for no operation of the contract may be sent: a method that a resource has not."""
-        return self._session.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
+        return self._api.run.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
 
     def _fitted(self, item: GeneratedRequest, operation: Operation) -> GeneratedRequest | None:
         """A valid request of a moving operation with the contract's values, fit for this robot; a few of them."""
         if self._valid[operation.id] >= _ACCEPTED:
             return None
-        if not self._session.contract.own:
+        if not self._api.run.contract.own:
             return item
-        call = example_call(self._session, operation, item.media_type or JSON)
+        call = example_call(self._api, operation, item.media_type or JSON)
         return replace(item, target=call.path, body=call.body if operation.bodies else item.body)
 
     def _slow(self, item: GeneratedRequest) -> GeneratedRequest:

@@ -16,32 +16,30 @@ from conformance.rest.request_context import RequestContext
 from conformance.transport.exchange import Listener, NoAnswer
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from collections.abc import Iterable
+
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange, Request, Response, Unanswered
 
 # Methods of which a server may say that it knows none (RFC 9110 15.6.2); the others it has to know.
 KNOWN_METHODS = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS"})
 
 
-def watch(session: Session) -> None:
-    """Have every exchange with the session's REST interface judged, whoever sends it."""
-    if not any(isinstance(listener, Observer) for listener in session.connection.listeners):
-        session.connection.listeners.append(Observer(session))
-
-
 class Observer(Listener):
     """Judges exchanges.
 
     Args:
-        session: the run; its REST interface may still be to come.
+        api: the robot's REST interface.
+        elsewhere: URLs below its base URL that belong to other interfaces.
     """
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, api: RestInterface, elsewhere: Iterable[str] = ()) -> None:
+        self._api = api
+        self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
 
     def answered(self, exchange: Exchange) -> None:
         """Judge one exchange; what went to another interface is none of ours."""
-        session, answer = self._session, exchange.response
+        api, answer = self._api, exchange.response
         context = self._seen(exchange.request)
         if context is None:
             return
@@ -50,7 +48,7 @@ class Observer(Listener):
             self._judge_json(exchange, answer)
         if answer.status >= 400:  # noqa: PLR2004 - RFC 9110 15
             inside = inside_shown(answer.body)
-            session.judge.check(
+            api.run.judge.check(
                 "http/no-traceback",
                 not inside,
                 exchange,
@@ -58,32 +56,28 @@ class Observer(Listener):
                 found=f"the answer shows {inside!r}",
                 cause="traceback",
             )
-            problem.judge(session, exchange, answer, context)
+            problem.judge(api, exchange, answer, context)
         self._judge_server_error(exchange, answer, context)
         if context.operation is not None:
-            declared.judge(session, exchange, answer, context)
+            declared.judge(api, exchange, answer, context)
 
     def unanswered(self, request: Unanswered) -> None:
         """Judge an answer that is no HTTP, where the request gave no reason for it."""
         context = self._seen(request.request)
         if context is not None and context.usual and request.kind is NoAnswer.MALFORMED:
-            self._session.judge.check(
+            self._api.run.judge.check(
                 "http/framing", holds=False, exchange=request, expected="well-framed HTTP", found=request.problem
             )
 
     def _seen(self, request: Request) -> RequestContext | None:
         """The request, seen from the contract; None where it went to another interface."""
-        session = self._session
-        if session.rest is None or self._is_soap(request.url):
+        api = self._api
+        if request.url.split("?", 1)[0] in self._elsewhere:
             return None
-        return RequestContext.of(session.contract, session.rest.base_url, request)
-
-    def _is_soap(self, url: str) -> bool:
-        services = (self._session.publishers, self._session.subscribers)
-        return any(url.split("?", 1)[0] == service.endpoint.split("?", 1)[0] for service in services if service)
+        return RequestContext.of(api.run.contract, api.client.base_url, request)
 
     def _judge_fields(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
-        judge = self._session.judge
+        judge = self._api.run.judge
         judge.check("http/framing", holds=True, exchange=exchange, expected="well-framed HTTP")
         if answer.body:
             media_type = answer.media_type
@@ -101,7 +95,7 @@ class Observer(Listener):
             )
 
     def _judge_json(self, exchange: Exchange, answer: Response) -> None:
-        judge = self._session.judge
+        judge = self._api.run.judge
         text = read_json(answer.body)
         judge.check(
             "http/json-finite",
@@ -129,7 +123,7 @@ class Observer(Listener):
             or (status == 505 and context.request.raw is not None)  # noqa: PLR2004 - HTTP version not supported
         )
         retry = " without Retry-After" if status == 503 else ""  # noqa: PLR2004
-        self._session.judge.check(
+        self._api.run.judge.check(
             "http/no-server-error",
             fine,
             exchange,

@@ -9,7 +9,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.rest.request_context import RequestContext
     from conformance.transport.exchange import Exchange, Response
 
@@ -23,7 +23,7 @@ _SERVER_ERROR = 500
 _UNAVAILABLE = 503
 
 
-def judge(session: Session, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+def judge(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:
     """Judge one answer of 400 and above."""
     status = answer.status
     if status in _TRANSPORT or not context.usual or (status >= _SERVER_ERROR and status != _UNAVAILABLE):
@@ -34,7 +34,7 @@ def judge(session: Session, exchange: Exchange, answer: Response, context: Reque
         return
     media_type = answer.media_type
     allowed = [JSON, *([XML] if context.names_xml or status == _NOT_ACCEPTABLE else [])]
-    session.judge.check(
+    api.run.judge.check(
         "http/problem-type",
         media_type in allowed,
         exchange,
@@ -44,7 +44,7 @@ def judge(session: Session, exchange: Exchange, answer: Response, context: Reque
     )
     if context.likes_xml > context.likes_json and status != _NOT_ACCEPTABLE:
         fault = "" if context.is_head or media_type != XML else _xml_fault(answer)
-        session.judge.check(
+        api.run.judge.check(
             "rest-formats/problem-xml",
             media_type == XML and not fault,
             exchange,
@@ -53,7 +53,7 @@ def judge(session: Session, exchange: Exchange, answer: Response, context: Reque
             cause=fault or media_type,
         )
     if not context.is_head and media_type in {JSON, XML}:
-        _judge_status(session, exchange, answer)
+        _judge_status(api, exchange, answer)
 
 
 def _xml_fault(answer: Response) -> str:
@@ -64,13 +64,13 @@ def _xml_fault(answer: Response) -> str:
     return "" if root.tag == f"{{{_NAMESPACE}}}problem" else f"the root element is {root.tag}"
 
 
-def _judge_status(session: Session, exchange: Exchange, answer: Response) -> None:
+def _judge_status(api: RestInterface, exchange: Exchange, answer: Response) -> None:
     members = members_of(answer)
     stated = None if members is None else members.get("status")
     missing = stated is None and members is not None
     # RFC 9457 lets the member be left out; the contract of RoAAS requires it.
-    holds = (missing and not session.contract.own) or (stated == answer.status and not isinstance(stated, bool))
-    session.judge.check(
+    holds = (missing and not api.run.contract.own) or (stated == answer.status and not isinstance(stated, bool))
+    api.run.judge.check(
         "http/problem-status",
         holds,
         exchange,

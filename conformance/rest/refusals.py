@@ -10,7 +10,7 @@ from conformance.transport.exchange import NoAnswer, NoAnswerError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
 
 # These refuse the request for another reason than its content.
@@ -24,7 +24,7 @@ def refuses(status: int) -> bool:
 
 
 def judge_refusal(
-    session: Session,
+    api: RestInterface,
     send: Callable[[], Exchange],
     requirement: str,
     what: str,
@@ -38,7 +38,7 @@ def judge_refusal(
     """Send one invalid request, and judge what comes.
 
     Args:
-        session: the run.
+        api: the robot's REST interface.
         send: sends it.
         requirement: id of what asks for its refusal.
         what: what is wrong with it.
@@ -54,7 +54,7 @@ def judge_refusal(
     Raises:
         NoAnswerError: there was no answer where there had to be one.
     """
-    judge = session.judge
+    judge = api.run.judge
     try:
         exchange = send()
     except NoAnswerError as none:
@@ -62,7 +62,7 @@ def judge_refusal(
             return judge.check(
                 requirement, holds=True, exchange=none.unanswered, expected="4xx, or a closed connection"
             )
-        if none.kind not in {NoAnswer.CLOSED, NoAnswer.MALFORMED} or not session.alive():
+        if none.kind not in {NoAnswer.CLOSED, NoAnswer.MALFORMED} or not api.alive():
             raise
         return judge.check(
             requirement,
@@ -95,18 +95,18 @@ def judge_refusal(
             cause=f"{status}",
         )
     if status in {_MALFORMED, _INVALID}:
-        _judge_detail(session, exchange, what, field, shown)
+        _judge_detail(api, exchange, what, field, shown)
     return True
 
 
-def _judge_detail(session: Session, exchange: Exchange, what: str, field: str, shown: str) -> None:
+def _judge_detail(api: RestInterface, exchange: Exchange, what: str, field: str, shown: str) -> None:
     detail = problem.detail_of(exchange.response)
     for requirement, wanted, named in (
         ("http/problem-detail", f"the field {field!r}", problem.names(detail, field) if field else True),
         ("http/problem-value", f"the value {shown!r}", shown in detail),
     ):
         if field if requirement.endswith("detail") else shown:
-            session.judge.check(
+            api.run.judge.check(
                 requirement,
                 named,
                 exchange,

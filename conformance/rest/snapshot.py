@@ -12,8 +12,8 @@ from conformance.documents.representation import flattened
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from conformance.engine.session import Session
     from conformance.rest.calls import Call
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
 
 Snapshot = dict[str, Any]
@@ -44,7 +44,7 @@ def steady(snapshots: Iterable[Snapshot]) -> Snapshot:
     }
 
 
-def take_snapshots(session: Session, calls: Iterable[Call]) -> dict[str, tuple[Snapshot, Exchange]]:
+def take_snapshots(api: RestInterface, calls: Iterable[Call]) -> dict[str, tuple[Snapshot, Exchange]]:
     """What is steady over some readings of each operation, by its id, with the last reading.
 
     With a pause between the readings: a robot's sensors speak tens of times a second, and a client asks faster.
@@ -54,7 +54,7 @@ def take_snapshots(session: Session, calls: Iterable[Call]) -> dict[str, tuple[S
         if turn:
             time.sleep(_PAUSE_S)
         for call in calls:
-            exchange = call.send(session, ("Accept", "application/json"))
+            exchange = call.send(api, ("Accept", "application/json"))
             taken.setdefault(call.operation.id, []).append(exchange)
     return {id_: (steady(flatten(one) for one in exchanges), exchanges[-1]) for id_, exchanges in taken.items()}
 
@@ -66,20 +66,20 @@ def changed(before: Snapshot, after: Snapshot) -> dict[str, tuple[Any, Any]]:
     return {place: (value, after.get(place, "nothing")) for place, value in before.items() if after.get(place) != value}
 
 
-def changes_by_itself(session: Session, call: Call, place: str, seconds: float) -> bool:
+def changes_by_itself(api: RestInterface, call: Call, place: str, seconds: float) -> bool:
     """Whether one value of a resource goes on changing while nothing else is asked of the robot.
 
     What has set it going may take a while to end (a robot that was set in motion): only a value that does not come
     to rest in any of several such times changes by itself.
     """
-    return all(_changes(session, call, place, seconds) for _ in range(_WINDOWS))
+    return all(_changes(api, call, place, seconds) for _ in range(_WINDOWS))
 
 
-def _changes(session: Session, call: Call, place: str, seconds: float) -> bool:
+def _changes(api: RestInterface, call: Call, place: str, seconds: float) -> bool:
     until = time.monotonic() + seconds
-    first = flatten(call.send(session, ("Accept", "application/json")))
+    first = flatten(call.send(api, ("Accept", "application/json")))
     while time.monotonic() < until:
         time.sleep(_PAUSE_S)
-        if flatten(call.send(session, ("Accept", "application/json"))).get(place) != first.get(place):
+        if flatten(call.send(api, ("Accept", "application/json"))).get(place) != first.get(place):
             return True
     return False

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from conformance.robot.delivery import Delivery
 from conformance.robot.message_shapes import DELIVERIES as LIST
 from conformance.robot.message_shapes import read_as
-from conformance.robot.probe.client import ProbeError, probe_of
+from conformance.robot.probe.client import ProbeError
 from conformance.robot.robot import ACCEPT_JSON, DELIVERIES
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
-    from conformance.robot.probe.client import Probe
+    from conformance.rest.interface import RestInterface
+    from conformance.robot.probe.client import Probe, RosProbe
     from conformance.transport.client import HttpClient
 
 # How long messages are waited for, and how long after the last one another would still be noticed, s.
@@ -138,21 +138,19 @@ class ProbeObserver:
         return [Seen(delivery) for delivery in seen + self._probe.deliveries()]
 
 
-def observer_of(session: Session) -> DeliveryObserver:
+def observer_of(api: RestInterface, probe: RosProbe) -> DeliveryObserver:
     """The best observer that this run has.
 
     Raises:
         NoObserverError: it has none.
     """
     reason = "no ROS domain is given (--ros-domain-id)"
-    if session.statement.ros.domain_id is not None:
+    if api.run.statement.ros.domain_id is not None:
         try:
-            return ProbeObserver(probe_of(session))
+            return ProbeObserver(probe.ready())
         except ProbeError as error:
             reason = f"the ROS probe does not work: {error}"
-    if session.rest is None:
-        raise NoObserverError(reason)
-    exchange = session.rest.send("GET", DELIVERIES, headers=ACCEPT_JSON)
+    exchange = api.client.send("GET", DELIVERIES, headers=ACCEPT_JSON)
     if not exchange.response.ok:
         raise NoObserverError(f"{reason}, and the robot has no list of deliveries ({exchange.came})")
-    return ListObserver(session.rest, session.effort.usual_ms / 1000)
+    return ListObserver(api.client, api.run.effort.usual_ms / 1000)

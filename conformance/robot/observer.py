@@ -14,7 +14,7 @@ from conformance.transport.exchange import Listener
 
 if TYPE_CHECKING:
     from conformance.documents.json_schema import Shape
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
 
 _READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
@@ -33,21 +33,14 @@ _UNAVAILABLE: Final = 503
 _TOO_MANY: Final = 429
 
 
-def observe(session: Session) -> None:
-    """Let a run's readings be judged, once however often it is called."""
-    if session.rest is None or any(isinstance(one, Observer) for one in session.connection.listeners):
-        return
-    session.connection.listeners.append(Observer(session))
-
-
 class Observer(Listener):
     """Listens to the exchanges of one run."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
-        rest = session.rest
+    def __init__(self, api: RestInterface) -> None:
+        self._api = api
+        rest = api.client
         # As HttpClient writes the URLs of its requests.
-        base = f"{rest.scheme}://{rest.authority}{rest.prefix}" if rest else ""
+        base = f"{rest.scheme}://{rest.authority}{rest.prefix}"
         self._readings = {base + path: (path, *reading) for path, reading in _READINGS.items()}
         self._last_stamp: tuple[int, int] | None = None
         self._last_received = 0.0
@@ -61,7 +54,7 @@ class Observer(Listener):
         if response.status == _TOO_MANY:
             return
         path, id_, shape, expected = reading
-        judge = self._session.judge
+        judge = self._api.run.judge
         if path == "/robot/pose/":
             judge.check(
                 "rest-resources/pose-unavailable",
@@ -85,12 +78,12 @@ class Observer(Listener):
         """Whether a request is one that has nothing odd about it, and so has to be answered 200."""
         fields = {name.lower(): value for name, value in exchange.request.headers}
         # The client shows its own token by this name; a check may send another one, or none, to see it refused.
-        if fields.get("authorization") != ("Bearer $ROAAS_TOKEN" if self._session.connection.token else None):
+        if fields.get("authorization") != ("Bearer $ROAAS_TOKEN" if self._api.client.connection.token else None):
             return False
         return fields.keys() <= _PLAIN_FIELDS and fields.get("accept", "") in _PLAIN_ACCEPT and not exchange.request.raw
 
     def _odometry(self, odometry: Any, exchange: Exchange, elapsed_ms: float) -> None:
-        judge = self._session.judge
+        judge = self._api.run.judge
         length = length_of(odometry["pose"]["pose"]["orientation"])
         judge.check(
             "rest-resources/pose-quaternion",
@@ -116,7 +109,7 @@ class Observer(Listener):
 
     def _limits(self, twist: Any, exchange: Exchange) -> None:
         """The measured speed is within the declared limits at any time, also on the robot's own missions."""
-        limits = self._session.statement.limits
+        limits = self._api.run.statement.limits
         for part, limit, declared in (
             ("linear", limits.linear_m_s, limits.linear_declared),
             ("angular", limits.angular_rad_s, limits.angular_declared),
@@ -124,7 +117,7 @@ class Observer(Listener):
             if part not in twist or not declared:
                 continue
             fastest = max(abs(float(twist[part][axis])) for axis in "xyz")
-            self._session.judge.check(
+            self._api.run.judge.check(
                 "safety/limits-hold",
                 fastest <= limit * (1 + limits.tolerance) + limits.tolerance_abs,
                 exchange,

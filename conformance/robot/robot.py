@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from conformance.documents.representation import projected
 from conformance.robot.geometry import Pose, pose_of
 from conformance.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
-from conformance.robot.observer import observe
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from conformance.contract.limits import Limits
     from conformance.documents.json_schema import Shape
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
 
 POSE: Final = "/robot/pose/"
@@ -93,23 +92,17 @@ class Odometry:
 
 
 class Robot:
-    """One robot, over REST.
+    """One robot, over REST."""
 
-    Whoever makes one also sets the observers going that judge every plain reading of the run.
-    """
-
-    def __init__(self, session: Session) -> None:
-        if session.rest is None:
-            raise ValueError("a robot without a REST interface")
-        self.rest = session.rest
-        self.judge = session.judge
-        self.statement = session.statement
-        self.limits = session.statement.limits
+    def __init__(self, api: RestInterface) -> None:
+        self.rest = api.client
+        self.judge = api.run.judge
+        self.statement = api.run.statement
+        self.limits = api.run.statement.limits
         # A ceiling on the rate of requests makes a robot as slow as one that answers slowly.
-        self.usual_s = max(session.effort.usual_ms / 1000, 1 / (session.connection.request_rate or 1e9))
+        self.usual_s = max(api.run.effort.usual_ms / 1000, 1 / (api.client.connection.request_rate or 1e9))
         # How long what must not happen is watched for, in relation to standard effort.
-        self.watchfulness = 0.5 if session.effort.name == "quick" else 1.0
-        observe(session)
+        self.watchfulness = 0.5 if api.run.effort.name == "quick" else 1.0
 
     @property
     def limits_declared(self) -> bool:

@@ -12,7 +12,7 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange, Response
 
 _GOAL: Final = "/robot/navigation/action/goal/"
@@ -32,7 +32,7 @@ _LAST_TIMEOUT_S: Final = 0.7
 _LAST_S: Final = 3.0
 
 
-def bring_to_rest(session: Session) -> str:
+def bring_to_rest(api: RestInterface) -> str:
     """Cancel what the robot is doing and wait until it stands still.
 
     Sends PUT and DELETE: only for checks that may move the robot. Whatever a robot answers or not, nothing is raised.
@@ -40,33 +40,33 @@ def bring_to_rest(session: Session) -> str:
     Returns:
         Empty when the robot is at rest (as far as it can be read), else why it is not.
     """
-    if session.rest is None or not session.contract.own:
+    if not api.run.contract.own:
         return ""
-    still = _Stiller(session.rest, session.statement.limits.tolerance_abs)
-    limits = session.statement.limits
-    return still.bring(_CANCEL_S, limits.settle_s + _GRACE_S + 8 * session.effort.usual_ms / 1000)
+    still = _Stiller(api.client, api.run.statement.limits.tolerance_abs)
+    limits = api.run.statement.limits
+    return still.bring(_CANCEL_S, limits.settle_s + _GRACE_S + 8 * api.run.effort.usual_ms / 1000)
 
 
-def stop_robot(session: Session) -> None:
+def stop_robot(api: RestInterface) -> None:
     """Bring the robot to rest, where it may have been moved."""
-    if session.allow_motion:
-        bring_to_rest(session)
+    if api.run.allow_motion:
+        bring_to_rest(api)
 
 
-def leave_at_rest(session: Session) -> None:
+def leave_at_rest(api: RestInterface) -> None:
     """Stop the robot at the end of a run, also one that was interrupted, and also a robot that hardly answers.
 
     Does nothing where the robot could not have been moved. Bounded to a few seconds; raises nothing.
     """
-    if session.rest is None or not session.allow_motion or not session.contract.own:
+    if not api.run.allow_motion or not api.run.contract.own:
         return
     try:
         # A client of its own: no listener judges any more, and an endpoint that hung once is asked again all the same.
-        timeout_s = min(_LAST_TIMEOUT_S + 3 * session.effort.usual_ms / 1000, session.connection.timeout_s)
-        connection = replace(session.connection, timeout_s=timeout_s, listeners=[])
-        client = HttpClient(session.rest.base_url, connection)
+        timeout_s = min(_LAST_TIMEOUT_S + 3 * api.run.effort.usual_ms / 1000, api.client.connection.timeout_s)
+        connection = replace(api.client.connection, timeout_s=timeout_s, listeners=[])
+        client = HttpClient(api.client.base_url, connection)
         try:
-            _Stiller(client, session.statement.limits.tolerance_abs).bring(_LAST_S, _LAST_S)
+            _Stiller(client, api.run.statement.limits.tolerance_abs).bring(_LAST_S, _LAST_S)
         finally:
             client.close()
     except Exception:  # noqa: BLE001 - the run is over: what was found must be reported whatever happens here

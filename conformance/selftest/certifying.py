@@ -19,8 +19,9 @@ from conformance.contract.files import Contract
 from conformance.contract.statement import load_statement
 from conformance.engine.certification import certify
 from conformance.engine.pytest_run import connection_of
-from conformance.engine.session import Session
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection as Pipe
@@ -112,7 +113,7 @@ def _run(job: Job, pipe: Pipe) -> None:
     """Certify, in the child, and send what came of it."""
     with tempfile.TemporaryDirectory() as folder, Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(io.StringIO()):
-            certification = certify(session_of(job, Path(folder)), Path(folder), progress=None)
+            certification = certify(robot_of(job, Path(folder)), Path(folder), progress=None)
         document = certification.document
         items = document["requirements"]
         pipe.send(
@@ -125,8 +126,8 @@ def _run(job: Job, pipe: Pipe) -> None:
         )
 
 
-def session_of(job: Job, folder: Path) -> Session:
-    """The session that a job describes; ``folder`` is for its token."""
+def robot_of(job: Job, folder: Path) -> RobotUnderTest:
+    """The robot and the run that a job describes; ``folder`` is for its token."""
     statement = load_statement(job.statement)
     given = dict(job.endpoints)
     if job.token:
@@ -142,12 +143,12 @@ def session_of(job: Job, folder: Path) -> Session:
     ros = msgspec.structs.replace(statement.ros, domain_id=job.domain_id)
     claims = tuple(map(ConformanceClass, job.classes)) or statement.claims
     statement = msgspec.structs.replace(statement, endpoints=where, claims=claims, ros=ros)
-    return Session(
+    run = Run(
         statement=statement,
         contract=Contract.load(only=job.requirements),
         claims=statement.claimed(),
         allow_motion=True,
         seed=job.seed,
         effort=Effort(job.effort),
-        connection=connection_of(where),
     )
+    return RobotUnderTest(run, connection_of(where))

@@ -8,7 +8,7 @@ import pkgutil
 import conformance.checks
 import conformance.engine.certification
 import conformance.engine.pytest_run
-import conformance.engine.session
+import conformance.engine.robot_under_test
 
 __all__ = ["conformance"]
 

@@ -2,26 +2,50 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.contract.interfaces import Interface
+
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
     from conformance.soap.service import SoapService
     from conformance.verdict.effort import Effort
+    from conformance.verdict.run import Run
 
 _NO_MOTION = "the publishers service moves the robot, and --allow-motion was not given"
 
 
-def askable(roaas: Session, *ids: str) -> list[SoapService]:
+@dataclass
+class SoapServices:
+    """A robot's SOAP services in one run.
+
+    Attributes:
+        run: what is judged, and by what.
+        publishers: the service that acts, or None where it has no address.
+        subscribers: the service that only reads, or None.
+    """
+
+    run: Run
+    publishers: SoapService | None = None
+    subscribers: SoapService | None = None
+
+    @property
+    def there(self) -> dict[Interface, SoapService]:
+        """Those that have an address, the one that acts first."""
+        named = {Interface.PUBLISHERS: self.publishers, Interface.SUBSCRIBERS: self.subscribers}
+        return {name: service for name, service in named.items() if service is not None}
+
+
+def askable(soap: SoapServices, *ids: str) -> list[SoapService]:
     """The services that may be asked, the one that only reads first.
 
     What was not allowed or does not answer is put down against the requirements that need it, so that they are not
     passed on half of the evidence.
 
     Args:
-        roaas: the run.
+        soap: the robot's services.
         ids: the requirements that are judged.
 
     Raises:
@@ -29,25 +53,25 @@ def askable(roaas: Session, *ids: str) -> list[SoapService]:
     """
     found: list[SoapService] = []
     reasons: list[str] = []
-    if roaas.subscribers is not None:
-        _add(roaas, roaas.subscribers, found, reasons)
-    if roaas.publishers is not None and roaas.allow_motion:
-        _add(roaas, roaas.publishers, found, reasons)
-    elif roaas.publishers is not None:
+    if soap.subscribers is not None:
+        _add(soap, soap.subscribers, found, reasons)
+    if soap.publishers is not None and soap.run.allow_motion:
+        _add(soap, soap.publishers, found, reasons)
+    elif soap.publishers is not None:
         reasons.append(_NO_MOTION)
     if not found:
         pytest.skip("; ".join(reasons) or "no SOAP service has an address")
     for id_ in ids:
-        requirement = roaas.contract.ledger.get(id_)
+        requirement = soap.run.contract.ledger.get(id_)
         for reason in reasons:
             if requirement is not None and (reason != _NO_MOTION or "motion" in requirement.needs):
-                roaas.judge.skip(id_, reason)
+                soap.run.judge.skip(id_, reason)
     return found
 
 
-def _add(roaas: Session, service: SoapService, found: list[SoapService], reasons: list[str]) -> None:
-    if service.name in roaas.unreachable:
-        reasons.append(f"the robot's {service.name} interface does not answer: {roaas.unreachable[service.name]}")
+def _add(soap: SoapServices, service: SoapService, found: list[SoapService], reasons: list[str]) -> None:
+    if service.name in soap.run.unreachable:
+        reasons.append(f"the robot's {service.name} interface does not answer: {soap.run.unreachable[service.name]}")
     elif service.contract_wsdl_path is None:
         reasons.append(f"the contract describes no {service.name} service")
     else:

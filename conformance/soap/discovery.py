@@ -14,6 +14,7 @@ from conformance.transport.exchange import NoAnswerError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from conformance.contract.interfaces import Interface
     from conformance.soap.service import KnownMessages
     from conformance.transport.client import Connection
 
@@ -22,7 +23,7 @@ _PROBE_S = 3.0
 
 
 def open_service(
-    name: str,
+    name: Interface,
     wsdl: str | None,
     endpoint: str | None,
     connection: Connection,

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Final
 from lxml import etree
 
 from conformance.documents.traceback import inside_shown
+from conformance.documents.wsdl import DescriptionError
 from conformance.documents.xml import NotXmlError, elements, has_doctype, parse
 from conformance.documents.xml_names import ENVELOPE, clark, local, namespace
 from conformance.soap.envelope import Envelope, Fault, NotSoapError, read_root
 from conformance.transport.exchange import Listener
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Mapping
 
+    from conformance.soap.service import SoapService
     from conformance.transport.exchange import Exchange, Response
     from conformance.verdict.evidence import Judge
 
@@ -62,7 +64,7 @@ class SoapObserver(Listener):
         endpoints: URL of each service, with the tags of the elements that its responses may hold.
     """
 
-    def __init__(self, judge: Judge, endpoints: dict[str, Collection[str]]) -> None:
+    def __init__(self, judge: Judge, endpoints: Mapping[str, Collection[str]]) -> None:
         self._judge = judge
         self._endpoints = endpoints
 
@@ -223,3 +225,17 @@ def _has_instruction(root: etree._Element) -> bool:
 
 def _type(response: Response) -> str:
     return f"Content-Type {response.header('content-type')!r}"
+
+
+def answers_of(service: SoapService) -> frozenset[str]:
+    """Tags of the elements with which the operations of a service answer, by the contract and by the robot's word."""
+    described = [service.own] if service.own is not None else []
+    if service.contract_wsdl_path is not None:
+        described.append(service.contract)
+    found: set[str] = set()
+    for description in described:
+        try:
+            found |= {operation.response for operation in description.operations if operation.response}
+        except DescriptionError:
+            continue
+    return frozenset(found)

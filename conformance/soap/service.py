@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
+    from conformance.contract.interfaces import Interface
     from conformance.documents.wsdl import Operation
     from conformance.documents.xml_node import Node
     from conformance.transport.exchange import Exchange
@@ -39,7 +40,7 @@ class SoapService:
         examples: messages that the robot takes, by operation (see valid_messages).
     """
 
-    name: str
+    name: Interface
     client: HttpClient
     path: str
     published: PublishedWsdl = field(default_factory=PublishedWsdl)

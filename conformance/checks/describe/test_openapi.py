@@ -14,7 +14,7 @@ from conformance.rest.calls import Call, example_call
 from conformance.rest.description import Described, described_by_openapi, differences
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.client import HttpClient
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
@@ -43,11 +43,11 @@ def test_openapi_is_served(rest: HttpClient, judge: Judge) -> None:
 
 
 @pytest.mark.requirement("describe/openapi-operations")
-def test_openapi_has_the_operations(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_openapi_has_the_operations(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """It names the paths, methods and parameters of the contract; more is allowed, optional ones may be missing."""
     document, exchange, fault = _document(rest)
     found = [] if document is None else described_by_openapi(document, rest.base_url)
-    missing = [fault] if document is None else differences(operations_of(roaas.contract), found)
+    missing = [fault] if document is None else differences(operations_of(api.run.contract), found)
     judge.check(
         "describe/openapi-operations",
         not missing,
@@ -58,29 +58,29 @@ def test_openapi_has_the_operations(roaas: Session, rest: HttpClient, judge: Jud
 
 
 @pytest.mark.requirement("describe/openapi-behaviour")
-def test_what_is_described_is_there(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_what_is_described_is_there(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """A request made from each operation of the description, and of the contract, is not answered 404 or 405."""
-    for operation in operations_of(roaas.contract):
+    for operation in operations_of(api.run.contract):
         if not operation.optional:
-            _judge_there(roaas, judge, example_call(roaas, operation))
+            _judge_there(api, judge, example_call(api, operation))
     document, _, _ = _document(rest)
     found = [] if document is None else described_by_openapi(document, rest.base_url)
     # A robot may serve the contract's own description, with an extension in it that it does not have.
-    known = {Described(item, item.template).address for item in operations_of(roaas.contract)}
+    known = {Described(item, item.template).address for item in operations_of(api.run.contract)}
     for item in found:
         if item.address not in known and item.path == item.operation.template:
-            _judge_there(roaas, judge, example_call(roaas, item.operation))
+            _judge_there(api, judge, example_call(api, item.operation))
 
 
-def _judge_there(session: Session, judge: Judge, call: Call) -> None:
+def _judge_there(api: RestInterface, judge: Judge, call: Call) -> None:
     """Judge by the request itself where it may be sent and needs nothing, else by what OPTIONS says of its path."""
     operation = call.operation
-    asked = operation.safe and allowed(session, operation)
-    exchange = call.send(session) if asked else Call(operation, call.values).send(session, method="OPTIONS")
+    asked = operation.safe and allowed(api, operation)
+    exchange = call.send(api) if asked else Call(operation, call.values).send(api, method="OPTIONS")
     status = exchange.response.status
     if asked and status == 404 and operation.declared(404) is not None:
         # The resource may well be there with nothing in it: its methods tell.
-        exchange = call.send(session, method="OPTIONS")
+        exchange = call.send(api, method="OPTIONS")
         status = exchange.response.status
         asked = False
     there = status not in {404, 405, 501}

@@ -6,30 +6,29 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.engine.session import INTERFACES
+from conformance.contract.interfaces import NEEDS, Interface
 from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.robot.interfaces import Interfaces
     from conformance.transport.exchange import Attempt
     from conformance.verdict.evidence import Judge
+    from conformance.verdict.run import Run
 
 pytestmark = pytest.mark.phase("reach")
 _ENVELOPE = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'
 
 
 # rest-formats and describe have no such requirement of their own: theirs say what has to answer.
-@pytest.mark.requirement(
-    *(f"{class_}/reachable" for class_ in INTERFACES if class_ not in {"rest-formats", "describe"})
-)
-def test_interfaces_answer(roaas: Session, judge: Judge) -> None:
+@pytest.mark.requirement(*(f"{class_}/reachable" for class_ in NEEDS if class_ not in {"rest-formats", "describe"}))
+def test_interfaces_answer(run: Run, interfaces: Interfaces, judge: Judge) -> None:
     """Each interface that a claimed class needs has an address and answers there.
 
     A class whose prerequisite is missing fails; it is not skipped.
     """
-    found: dict[str, tuple[str, Attempt | None]] = {name: _look(roaas, name) for name in roaas.interfaces}
-    for class_ in roaas.claims:
-        needed, any_of = _needed(roaas, class_)
+    found = {name: _look(interfaces, name) for name in run.interfaces}
+    for class_ in run.claims:
+        needed, any_of = _needed(run, class_), not NEEDS[class_].each
         problems = {name: found[name] for name in needed if found[name][0]}
         missing = len(problems) == len(needed) if any_of else bool(problems)
         shown = (
@@ -46,31 +45,26 @@ def test_interfaces_answer(roaas: Session, judge: Judge) -> None:
         )
 
 
-def _needed(session: Session, class_: str) -> tuple[tuple[str, ...], bool]:
-    """The interfaces that a class needs, and whether one of them is enough."""
-    named = INTERFACES[class_]
-    there = session.interfaces
-    if session.statement.claims is None:
-        there = tuple(name for name in there if getattr(session, name) is not None)
-    if named == ("all",):
-        return there, False
-    if named == ("any",):
-        return there, True
-    if named == ("any-soap",):
-        return tuple(name for name in there if name != "rest"), True
-    return tuple(name for name in named if name in session.interfaces), False
+def _needed(run: Run, class_: str) -> tuple[Interface, ...]:
+    """The interfaces that a class needs of a robot."""
+    need = NEEDS[class_]
+    there = run.interfaces
+    if run.statement.claims is None and not need.named:
+        there = tuple(name for name in there if name in run.statement.endpoints.interfaces)
+    return tuple(name for name in need.interfaces if name in there)
 
 
-def _look(session: Session, name: str) -> tuple[str, Attempt | None]:
+def _look(interfaces: Interfaces, name: Interface) -> tuple[str, Attempt | None]:
     """Why an interface is not there, or an empty text; with the evidence."""
-    target = getattr(session, name)
-    if target is None:
-        return f"the {name} interface has no address", None
     try:
-        if name == "rest":
-            exchange = target.send("GET", session.rest_path())
-            return "", exchange
-        exchange = target.post(_ENVELOPE)
+        if name is Interface.REST:
+            if interfaces.rest is None:
+                return f"the {name} interface has no address", None
+            return "", interfaces.rest.client.send("GET", interfaces.rest.path)
+        service = interfaces.soap.there.get(name)
+        if service is None:
+            return f"the {name} interface has no address", None
+        exchange = service.post(_ENVELOPE)
     except NoAnswerError as none:
         return f"{name}: {none}", none.unanswered
     # Anything that handles POST will do here: a fault, a 4xx for the empty Body, even a server error.

@@ -11,7 +11,7 @@ from conformance.documents.representation import UnreadableError
 from conformance.rest.description import Described, described_by_wadl, differences
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.client import HttpClient
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
@@ -22,12 +22,12 @@ _IDS = ("describe/wadl", "describe/wadl-resources")
 _MEDIA_TYPES = {"application/vnd.sun.wadl+xml", "application/wadl+xml", "application/xml", "text/xml"}
 
 
-def _without(session: Session) -> bool:
+def _without(api: RestInterface) -> bool:
     """Say that nothing is asked of a robot whose contract has no WADL."""
-    if session.contract.wadl_path is not None:
+    if api.run.contract.wadl_path is not None:
         return False
     for id_ in _IDS:
-        session.judge.unclaimed(id_, "the contract has no WADL")
+        api.run.judge.unclaimed(id_, "the contract has no WADL")
     return True
 
 
@@ -46,21 +46,21 @@ def _read(rest: HttpClient) -> tuple[list[Described], Exchange, str]:
 
 
 @pytest.mark.requirement("describe/wadl")
-def test_wadl_is_served(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_wadl_is_served(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """It is there, and is a WADL application."""
-    if _without(roaas):
+    if _without(api):
         return
     _, exchange, fault = _read(rest)
     judge.check("describe/wadl", not fault, exchange, "200 with a well-formed WADL", found=fault)
 
 
 @pytest.mark.requirement("describe/wadl-resources")
-def test_wadl_has_the_resources(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_wadl_has_the_resources(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """It names the resources, methods and parameters of the contract; more is allowed."""
-    if _without(roaas):
+    if _without(api):
         return
     found, exchange, fault = _read(rest)
-    missing = [fault] if fault else differences(operations_of(roaas.contract), found)
+    missing = [fault] if fault else differences(operations_of(api.run.contract), found)
     judge.check(
         "describe/wadl-resources",
         not missing,

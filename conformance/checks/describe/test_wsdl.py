@@ -22,7 +22,7 @@ from conformance.transport.exchange import NoAnswerError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from conformance.engine.session import Session
+    from conformance.soap.callable_services import SoapServices
     from conformance.soap.service import SoapService
     from conformance.transport.exchange import Attempt, Exchange
     from conformance.verdict.effort import Effort
@@ -47,16 +47,16 @@ class _Served:
     problem: str
 
 
-def _services(roaas: Session, *ids: str) -> list[SoapService]:
+def _services(soap: SoapServices, *ids: str) -> list[SoapService]:
     """The services with a contract: descriptions are only read, so that of the one that acts is asked for as well."""
     found = []
-    for service in (roaas.publishers, roaas.subscribers):
+    for service in (soap.publishers, soap.subscribers):
         if service is None or service.contract_wsdl_path is None:
             continue
-        if service.name in roaas.unreachable:
+        if service.name in soap.run.unreachable:
             for id_ in ids:
-                roaas.judge.skip(
-                    id_, f"the {service.name} interface does not answer: {roaas.unreachable[service.name]}"
+                soap.run.judge.skip(
+                    id_, f"the {service.name} interface does not answer: {soap.run.unreachable[service.name]}"
                 )
             continue
         found.append(service)
@@ -85,9 +85,9 @@ def _served(service: SoapService) -> _Served:
 
 
 @pytest.mark.requirement("describe/wsdl")
-def test_served(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_served(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """GET ?wsdl answers with the description, and everything that it refers to can be had."""
-    for service in _services(roaas, "describe/wsdl"):
+    for service in _services(soap, "describe/wsdl"):
         for _ in range(rounds(effort, 6)):
             served = _served(service)
             judge.check(
@@ -100,10 +100,10 @@ def test_served(roaas: Session, judge: Judge, effort: Effort) -> None:
 
 
 @pytest.mark.requirement(*(f"describe/{name_}" for name_ in _COMPARED))
-def test_same_as_contract(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Names, operations, types and actions are those of the contract."""
     ids = [f"describe/{name_}" for name_ in _COMPARED]
-    for service in _services(roaas, *ids):
+    for service in _services(soap, *ids):
         for _ in range(rounds(effort, 3)):
             served = _served(service)
             broken = served.problem if served.description is None else comparison.broken(served.description)
@@ -116,9 +116,9 @@ def test_same_as_contract(roaas: Session, judge: Judge, effort: Effort) -> None:
 
 
 @pytest.mark.requirement("describe/wsdl-address")
-def test_address(roaas: Session, judge: Judge) -> None:
+def test_address(soap: SoapServices, judge: Judge) -> None:
     """The service answers at the address that the description names."""
-    for service in _services(roaas, "describe/wsdl-address"):
+    for service in _services(soap, "describe/wsdl-address"):
         served = _served(service)
         ports = served.description.all("w:service/w:port[s:address]") if served.description is not None else []
         located = [(name(port), port.find(clark(WSDL_SOAP, "address"))) for port in ports]
@@ -164,9 +164,9 @@ def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
 
 
 @pytest.mark.requirement(*(f"describe/wsdl-{rule}" for rule in RULES))
-def test_profile(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_profile(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """The description keeps the rules of the Basic Profile."""
-    for service in _services(roaas, *(f"describe/wsdl-{rule}" for rule in RULES)):
+    for service in _services(soap, *(f"describe/wsdl-{rule}" for rule in RULES)):
         for _ in range(rounds(effort, 3)):
             served = _served(service)
             for rule, check in RULES.items():

@@ -13,8 +13,9 @@ from conformance.robot.delivery import lexical_deliveries
 from conformance.robot.probe.client import ProbeError
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
-    from conformance.transport.client import HttpClient
+    from conformance.rest.interface import RestInterface
+    from conformance.robot.probe.client import RosProbe
+    from conformance.soap.service import SoapService
     from conformance.verdict.evidence import Judge
     from conformance.verdict.explorer import Explorer
 
@@ -32,12 +33,12 @@ _KINDS = ("same", "rest", "soap", "coffee")
     "equivalence/delivery-same",
     "equivalence/delivery-order",
 )
-def test_deliveries_arrive(roaas: Session, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
+def test_deliveries_arrive(
+    api: RestInterface, publishers: SoapService, probe: RosProbe, judge: Judge, explore: Explorer
+) -> None:
     """Batches of deliveries over REST and SOAP, of any values, arrive one by one, unchanged and in order."""
-    if roaas.publishers is None:
-        pytest.skip("the robot's publishers interface has no address")
     try:
-        batch = Batch(rest, roaas.publishers, observer_of(roaas), judge)
+        batch = Batch(api.client, publishers, observer_of(api, probe), judge)
         failed: list[list[Order]] = []
 
         def try_batch(orders: list[Order]) -> None:

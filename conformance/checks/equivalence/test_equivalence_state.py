@@ -22,7 +22,7 @@ from conformance.robot.stopping import bring_to_rest
 
 if TYPE_CHECKING:
     from conformance.documents.json_schema import Shape
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.robot.geometry import Pose
     from conformance.soap.service import SoapService
     from conformance.transport.exchange import Exchange
@@ -41,17 +41,9 @@ _STATES: Final[dict[str, tuple[str, str, Shape]]] = {
 
 
 @pytest.fixture
-def robot(roaas: Session) -> Robot:
+def robot(api: RestInterface) -> Robot:
     """The robot."""
-    return Robot(roaas)
-
-
-@pytest.fixture
-def subscribers(roaas: Session) -> SoapService:
-    """The robot's subscribers service."""
-    if roaas.subscribers is None:
-        pytest.skip("the robot's subscribers interface has no address")
-    return roaas.subscribers
+    return Robot(api)
 
 
 def _answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
@@ -96,9 +88,9 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge,
 @pytest.mark.phase("motion")
 @pytest.mark.motion
 @pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
-def test_pose_and_velocity_in_motion(roaas: Session, robot: Robot, subscribers: SoapService, judge: Judge) -> None:
+def test_pose_and_velocity_in_motion(api: RestInterface, robot: Robot, subscribers: SoapService, judge: Judge) -> None:
     """On an arc, where no component of the velocity that a robot has is zero."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
     make_room(robot)
@@ -206,9 +198,9 @@ def _compare_plans(
 @pytest.mark.phase("motion")
 @pytest.mark.motion
 @pytest.mark.requirement("equivalence/goal")
-def test_goal(roaas: Session, robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+def test_goal(api: RestInterface, robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """The active goal is the same one, and when there is none, both say so."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
     _compare_goals(robot, subscribers, judge)

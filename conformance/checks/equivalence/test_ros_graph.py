@@ -9,12 +9,12 @@ import pytest
 
 from conformance.robot.drive import BusyError, Drive
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
-from conformance.robot.probe.client import Probe, ProbeError, probe_of
+from conformance.robot.probe.client import Probe, ProbeError, RosProbe
 from conformance.robot.robot import SENSORS, STILL, Robot, Velocity
 from conformance.robot.stopping import bring_to_rest
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
 
@@ -28,20 +28,20 @@ _ARRIVES_S: Final = 2.0
 _DISCOVERED_S: Final = 10.0
 
 
-@pytest.fixture
-def probe(roaas: Session) -> Probe:
-    """The ROS probe."""
+@pytest.fixture(name="seeing")
+def _seeing(probe: RosProbe) -> Probe:
+    """The ROS probe, which sees the robot."""
     try:
-        return probe_of(roaas)
+        return probe.ready()
     except ProbeError as error:
         pytest.skip(str(error))
 
 
 @pytest.mark.phase("motion")
 @pytest.mark.requirement("equivalence/sensors-graph")
-def test_sensors_are_on_the_graph(roaas: Session, probe: Probe, judge: Judge) -> None:
+def test_sensors_are_on_the_graph(api: RestInterface, seeing: Probe, judge: Judge) -> None:
     """Every entry is a topic that is published, with its type; and no plain sensor is left out."""
-    entries, exchange = Robot(roaas).read(SENSORS, SENSORS_SHAPE)
+    entries, exchange = Robot(api).read(SENSORS, SENSORS_SHAPE)
     if entries is None:
         pytest.skip("the robot's list of sensors cannot be read")
     listed = {("/" + entry["topic"].lstrip("/"), entry["type"]) for entry in entries}
@@ -49,7 +49,7 @@ def test_sensors_are_on_the_graph(roaas: Session, probe: Probe, judge: Judge) ->
     until = time.monotonic() + _DISCOVERED_S
     while not listed <= there and time.monotonic() < until:
         try:
-            topics = probe.topics()
+            topics = seeing.topics()
         except ProbeError as error:
             pytest.skip(str(error))
         there = {(name, type_) for name, types in topics.items() for type_ in types}
@@ -69,15 +69,15 @@ def test_sensors_are_on_the_graph(roaas: Session, probe: Probe, judge: Judge) ->
 @pytest.mark.phase("motion")
 @pytest.mark.motion
 @pytest.mark.requirement("equivalence/velocity-message")
-def test_velocity_is_published(roaas: Session, probe: Probe, judge: Judge, effort: Effort) -> None:
+def test_velocity_is_published(api: RestInterface, seeing: Probe, judge: Judge, effort: Effort) -> None:
     """A velocity that was accepted is on the velocity topic, with all its digits."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    robot = Robot(roaas)
+    robot = Robot(api)
     drive = Drive(robot)
     try:
-        probe.velocities()
+        seeing.velocities()
         lost = 0
         for index in range(effort.cases(12)):
             share = (-1) ** index / (3 + index)
@@ -85,7 +85,7 @@ def test_velocity_is_published(roaas: Session, probe: Probe, judge: Judge, effor
                 linear_x=share * robot.limits.linear_m_s if robot.actuated(0) else 0.0,
                 angular_z=-share * robot.limits.angular_rad_s if robot.actuated(5) else 0.0,
             )
-            lost += not _judge_one(robot, probe, judge, wanted)
+            lost += not _judge_one(robot, seeing, judge, wanted)
             if lost > 1:
                 break
         drive.command(STILL)
@@ -95,14 +95,14 @@ def test_velocity_is_published(roaas: Session, probe: Probe, judge: Judge, effor
         pytest.skip(str(busy))
 
 
-def _judge_one(robot: Robot, probe: Probe, judge: Judge, wanted: Velocity) -> bool:
+def _judge_one(robot: Robot, seeing: Probe, judge: Judge, wanted: Velocity) -> bool:
     exchange = robot.put_velocity(wanted)
     if not exchange.response.ok:
         return True
     until = time.monotonic() + _ARRIVES_S
     seen: list[Velocity] = []
     while wanted not in seen and time.monotonic() < until:
-        seen += probe.velocities()
+        seen += seeing.velocities()
         time.sleep(0.005)
     return judge.check(
         "equivalence/velocity-message",

@@ -9,7 +9,7 @@ import pytest
 from conformance.rest.applicable import reads
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.client import HttpClient
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
@@ -18,10 +18,10 @@ pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 
 
 @pytest.mark.requirement("http/authentication")
-def test_requests_without_a_token(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_requests_without_a_token(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """With a token in the run, every resource asks for it; without one, none does."""
-    asked = bool(roaas.connection.token)
-    for call in reads(roaas):
+    asked = bool(api.client.connection.token)
+    for call in reads(api):
         exchanges = [rest.send("GET", call.path, authorized=False)]
         if asked:
             exchanges.append(rest.send("GET", call.path, headers=[("Authorization", "Bearer roaas-not-this-one")]))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from conformance.documents.openapi import Operation
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
 
@@ -42,31 +42,31 @@ def _accepted(exchange: Exchange) -> bool:
     return answer.ok or answer.status == 409
 
 
-def _valid(session: Session, judge: Judge, ids: tuple[str, ...]) -> Iterator[Call]:
+def _valid(api: RestInterface, judge: Judge, ids: tuple[str, ...]) -> Iterator[Call]:
     """A valid request for each operation that takes JSON and is answered as one should be."""
     tried = 0
-    for operation in applicable_operations(session, ids, _takes_json, "takes JSON"):
-        stop_robot(session)
-        call = example_call(session, operation)
-        exchange = call.send(session)
+    for operation in applicable_operations(api, ids, _takes_json, "takes JSON"):
+        stop_robot(api)
+        call = example_call(api, operation)
+        exchange = call.send(api)
         if _accepted(exchange):
             tried += 1
             yield call
         else:
             for id_ in ids:
                 judge.note(id_, f"a valid {operation.id} is answered {exchange.came}, so it was not tried")
-    stop_robot(session)
+    stop_robot(api)
 
 
 @pytest.mark.requirement("http/unsupported-media-type")
-def test_media_types_that_are_not_taken(roaas: Session, judge: Judge) -> None:
+def test_media_types_that_are_not_taken(api: RestInterface, judge: Judge) -> None:
     """A valid body under another media type, and under none at all, is not looked at."""
-    for operation in applicable_operations(roaas, ["http/unsupported-media-type"], _takes_json, "takes JSON"):
-        call = example_call(roaas, operation)
-        for media_type in roaas.effort.subsample(_OTHERS, 2):
+    for operation in applicable_operations(api, ["http/unsupported-media-type"], _takes_json, "takes JSON"):
+        call = example_call(api, operation)
+        for media_type in api.run.effort.subsample(_OTHERS, 2):
             if media_type in operation.bodies:
                 continue
-            exchange = call.send(roaas, ("Content-Type", media_type))
+            exchange = call.send(api, ("Content-Type", media_type))
             status = exchange.response.status
             judge.check(
                 "http/unsupported-media-type",
@@ -79,11 +79,11 @@ def test_media_types_that_are_not_taken(roaas: Session, judge: Judge) -> None:
 
 
 @pytest.mark.requirement("http/charset")
-def test_charset_parameter(roaas: Session, judge: Judge) -> None:
+def test_charset_parameter(api: RestInterface, judge: Judge) -> None:
     """application/json is the same with a charset parameter as without."""
-    for call in _valid(roaas, judge, ("http/charset",)):
-        for media_type in roaas.effort.subsample(_CHARSETS, 1):
-            exchange = call.send(roaas, ("Content-Type", media_type))
+    for call in _valid(api, judge, ("http/charset",)):
+        for media_type in api.run.effort.subsample(_CHARSETS, 1):
+            exchange = call.send(api, ("Content-Type", media_type))
             judge.check(
                 "http/charset",
                 _accepted(exchange),
@@ -94,23 +94,23 @@ def test_charset_parameter(roaas: Session, judge: Judge) -> None:
 
 
 @pytest.mark.requirement("http/content-too-large", "http/no-server-error")
-def test_sizes(roaas: Session, judge: Judge) -> None:
+def test_sizes(api: RestInterface, judge: Judge) -> None:
     """64 KiB are taken; more than 10 MiB are answered 413, or the connection is closed."""
     judge.at_risk = ("http/content-too-large",)
-    for call in _valid(roaas, judge, ("http/content-too-large",)):
+    for call in _valid(api, judge, ("http/content-too-large",)):
         padded = call.carrying(call.body[:1] + b" " * (_TAKEN - len(call.body)) + call.body[1:])
-        exchange = padded.send(roaas)
+        exchange = padded.send(api)
         judge.check("http/content-too-large", _accepted(exchange), exchange, "a body of 64 KiB taken")
         huge = call.carrying(call.body[:1] + b" " * (_TOO_LARGE - len(call.body)) + call.body[1:])
         for fields in ((), (("Transfer-Encoding", "chunked"),)):
-            _judge_too_large(roaas, judge, huge, fields)
-        exchange = call.send(roaas)
+            _judge_too_large(api, judge, huge, fields)
+        exchange = call.send(api)
         judge.check("http/content-too-large", _accepted(exchange), exchange, "the next valid request taken as ever")
 
 
-def _judge_too_large(session: Session, judge: Judge, call: Call, fields: tuple[tuple[str, str], ...]) -> None:
+def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple[tuple[str, str], ...]) -> None:
     try:
-        exchange = call.send(session, *fields, fresh=True)
+        exchange = call.send(api, *fields, fresh=True)
     except NoAnswerError as none:
         if none.kind is not NoAnswer.CLOSED:
             raise

@@ -11,8 +11,8 @@ from conformance.transport import raw
 from conformance.transport.exchange import Unanswered
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
     from conformance.rest.calls import Call
+    from conformance.rest.interface import RestInterface
     from conformance.transport.client import HttpClient
     from conformance.verdict.evidence import Judge
 
@@ -30,21 +30,21 @@ _GARBAGE = (
 )
 
 
-def _first(session: Session) -> Call:
+def _first(api: RestInterface) -> Call:
     """A read that every robot has, without parameters where there is one."""
-    calls = [call for call in reads(session) if not call.operation.optional] or reads(session)
+    calls = [call for call in reads(api) if not call.operation.optional] or reads(api)
     return min(calls, key=lambda call: "?" in call.path)
 
 
 @pytest.mark.phase("reading")
 @pytest.mark.requirement("http/framing")
-def test_every_octet_of_an_answer(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_every_octet_of_an_answer(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """A status line, valid fields, exactly as many octets as are said, and nothing behind them.
 
     Often enough for a robot that is wrong one time in fifty: client libraries do not see what is behind an answer.
     """
-    calls = reads(roaas)
-    turns = -(-_IN_ALL // max(1, len(calls))) if not roaas.effort.slow else 1
+    calls = reads(api)
+    turns = -(-_IN_ALL // max(1, len(calls))) if not api.run.effort.slow else 1
     for turn, call in enumerate(calls * turns):
         for method in ("GET", "OPTIONS") if turn < len(calls) else ("GET",):
             octets = raw.head(rest, method, call.path, "Accept: application/json", "Connection: close")
@@ -57,9 +57,9 @@ def test_every_octet_of_an_answer(roaas: Session, rest: HttpClient, judge: Judge
 
 @pytest.mark.phase("reading")
 @pytest.mark.requirement("http/framing", "http/head-no-body")
-def test_answers_stay_aligned(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_answers_stay_aligned(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Of two requests sent at once, the second answer begins where the first one ends; also behind HEAD."""
-    path = _first(roaas).path
+    path = _first(api).path
     for method in ("GET", "HEAD", "OPTIONS"):
         octets = raw.head(rest, method, path) + raw.head(rest, "GET", path, "Connection: close")
         came = raw.talk(rest, octets)
@@ -75,9 +75,9 @@ def test_answers_stay_aligned(roaas: Session, rest: HttpClient, judge: Judge) ->
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/host-missing", "http/host-twice", "http/content-length-conflict")
-def test_fields_that_have_to_be_refused(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_fields_that_have_to_be_refused(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """No Host, two of them, and two lengths for one body (RFC 9112 3.2, 6.3)."""
-    path = _first(roaas).path
+    path = _first(api).path
     host = f"Host: {rest.authority}"
     for id_, closing, octets in (
         ("http/host-missing", False, raw.head(rest, "GET", path, host=False)),
@@ -87,7 +87,7 @@ def test_fields_that_have_to_be_refused(roaas: Session, rest: HttpClient, judge:
         ("http/content-length-conflict", True, raw.head(rest, "GET", path, "Content-Length: 5", "Content-Length: 0")),
     ):
         judge.at_risk = (id_,)
-        came = raw.talk(rest, octets, timeout_s=_patience(roaas), answers=1)
+        came = raw.talk(rest, octets, timeout_s=_patience(api), answers=1)
         attempt, _ = raw.read_one(rest, octets, came, "GET")
         status = 0 if isinstance(attempt, Unanswered) else attempt.response.status
         judge.check(
@@ -102,11 +102,11 @@ def test_fields_that_have_to_be_refused(roaas: Session, rest: HttpClient, judge:
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/malformed-request")
-def test_octets_that_are_no_request(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_octets_that_are_no_request(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """What is no HTTP is refused or cut off, and the robot answers the next request."""
     judge.at_risk = ("http/malformed-request",)
     for octets in _GARBAGE:
-        came = raw.talk(rest, octets, timeout_s=_patience(roaas), answers=1)
+        came = raw.talk(rest, octets, timeout_s=_patience(api), answers=1)
         attempt, _ = raw.read_one(rest, octets, came, "GET")
         status = 0 if isinstance(attempt, Unanswered) else attempt.response.status
         judge.check(
@@ -117,8 +117,8 @@ def test_octets_that_are_no_request(roaas: Session, rest: HttpClient, judge: Jud
             found=f"status {status} for {octets[:40]!r}" if status else attempt.came,
             cause=f"{status} {came.closed}",
         )
-    _first(roaas).send(roaas)
+    _first(api).send(api)
 
 
-def _patience(session: Session) -> float:
-    return min(session.connection.timeout_s, _THINK_S + 4 * session.effort.usual_ms / 1000)
+def _patience(api: RestInterface) -> float:
+    return min(api.client.connection.timeout_s, _THINK_S + 4 * api.run.effort.usual_ms / 1000)

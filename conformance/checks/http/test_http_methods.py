@@ -14,7 +14,7 @@ from conformance.transport import raw
 from conformance.transport.exchange import Unanswered
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.client import HttpClient
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
@@ -25,15 +25,15 @@ _TRIED = ("GET", "PUT", "POST", "DELETE", "PATCH", "PROPFIND", "FOO")
 _ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
 
 
-def _resources(session: Session) -> list[tuple[Resource, Call]]:
+def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
     """Each resource with a valid request for it; extensions that this robot lacks are left out."""
     found = []
-    for resource in resources_of(session.contract):
-        first = example_call(session, next(iter(resource.operations.values())))
+    for resource in resources_of(api.run.contract):
+        first = example_call(api, next(iter(resource.operations.values())))
         # Only the address is used: what has a body or moves is never sent from here.
         call = Call(first.operation, first.values)
         if resource.optional:
-            answer = call.send(session, method="GET").response
+            answer = call.send(api, method="GET").response
             if answer.status == 404:
                 continue
         found.append((resource, call))
@@ -41,11 +41,11 @@ def _resources(session: Session) -> list[tuple[Resource, Call]]:
 
 
 @pytest.mark.requirement("http/method-not-allowed", "http/allow", "http/allow-agrees")
-def test_methods_that_a_resource_has_not(roaas: Session, judge: Judge) -> None:
+def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> None:
     """Each resource refuses each method that the contract does not give it with 405 and Allow."""
-    for resource, call in _resources(roaas):
-        for method in roaas.effort.subsample([name for name in _TRIED if name not in resource.methods], 2):
-            exchange = call.send(roaas, method=method)
+    for resource, call in _resources(api):
+        for method in api.run.effort.subsample([name for name in _TRIED if name not in resource.methods], 2):
+            exchange = call.send(api, method=method)
             status = exchange.response.status
             unknown = method not in KNOWN_METHODS
             judge.check(
@@ -61,10 +61,10 @@ def test_methods_that_a_resource_has_not(roaas: Session, judge: Judge) -> None:
 
 
 @pytest.mark.requirement("http/options", "http/allow-agrees")
-def test_options(roaas: Session, judge: Judge) -> None:
+def test_options(api: RestInterface, judge: Judge) -> None:
     """OPTIONS tells the methods of each resource."""
-    for resource, call in _resources(roaas):
-        exchange = call.send(roaas, method="OPTIONS")
+    for resource, call in _resources(api):
+        exchange = call.send(api, method="OPTIONS")
         status = exchange.response.status
         if judge.check("http/options", status in {200, 204}, exchange, "200 or 204 for OPTIONS"):
             _judge_allow(judge, "http/options", resource, exchange)
@@ -88,14 +88,14 @@ def _judge_allow(judge: Judge, requirement: str, resource: Resource, exchange: E
 
 
 @pytest.mark.requirement("http/head")
-def test_head_is_get_without_its_body(roaas: Session, judge: Judge) -> None:
+def test_head_is_get_without_its_body(api: RestInterface, judge: Judge) -> None:
     """HEAD has the status and the media type of GET; asked again where the resource may have changed between."""
-    for call in reads(roaas):
+    for call in reads(api):
         others = [name for name in call.operation.formats if name != "application/json"]
-        for accept in ("application/json", *(others if roaas.effort.name != "quick" else ())):
+        for accept in ("application/json", *(others if api.run.effort.name != "quick" else ())):
             for attempt in (1, 2, 3):
-                got = call.send(roaas, ("Accept", accept))
-                exchange = call.send(roaas, ("Accept", accept), method="HEAD")
+                got = call.send(api, ("Accept", accept))
+                exchange = call.send(api, ("Accept", accept), method="HEAD")
                 fault = _difference(got, exchange)
                 if not fault or attempt == 3:
                     judge.check("http/head", not fault, exchange, "HEAD as GET", found=fault, cause=call.operation.id)
@@ -115,9 +115,9 @@ def _difference(got: Exchange, exchange: Exchange) -> str:
 
 
 @pytest.mark.requirement("http/head-no-body", "http/framing")
-def test_head_has_no_body(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_head_has_no_body(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Not one octet follows the header section of an answer to HEAD: read from the socket, as clients ignore them."""
-    for call in reads(roaas):
+    for call in reads(api):
         octets = raw.head(rest, "HEAD", call.path, "Connection: close")
         attempt, surplus = raw.read_one(rest, octets, raw.talk(rest, octets), "HEAD")
         if isinstance(attempt, Unanswered):

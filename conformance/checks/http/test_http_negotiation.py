@@ -10,7 +10,7 @@ from conformance.rest.accept import quality
 from conformance.rest.applicable import answered
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
@@ -19,11 +19,11 @@ _NOTHING = ("image/png", "application/vnd.roaas-nobody-has-this", "audio/*;q=0.5
 
 
 @pytest.mark.requirement("http/not-acceptable")
-def test_no_acceptable_format(roaas: Session, judge: Judge) -> None:
+def test_no_acceptable_format(api: RestInterface, judge: Judge) -> None:
     """Where nothing that the robot has is acceptable, it says so."""
-    cases = [(call, accept) for call in answered(roaas) for accept in _NOTHING]
-    for call, accept in roaas.effort.draw(cases, 120, f"{roaas.seed}/not acceptable"):
-        exchange = call.send(roaas, ("Accept", accept))
+    cases = [(call, accept) for call in answered(api) for accept in _NOTHING]
+    for call, accept in api.run.effort.draw(cases, 120, f"{api.run.seed}/not acceptable"):
+        exchange = call.send(api, ("Accept", accept))
         status = exchange.response.status
         judge.check(
             "http/not-acceptable",
@@ -36,16 +36,16 @@ def test_no_acceptable_format(roaas: Session, judge: Judge) -> None:
 
 
 @pytest.mark.requirement("http/q-zero")
-def test_quality_zero(roaas: Session, judge: Judge) -> None:
+def test_quality_zero(api: RestInterface, judge: Judge) -> None:
     """A format with q=0 is not sent, whatever else is: another one, or 406."""
-    for call in roaas.effort.subsample(answered(roaas), 2):
+    for call in api.run.effort.subsample(answered(api), 2):
         first = call.operation.formats[0] if call.operation.formats else "application/json"
         others = [name for name in call.operation.formats if name != first]
         refused = [f"{first};q=0", f"{first};q=0.000, */*", f"{first} ; q=0"]
         refused += [f"{name};q=0, {first};q=0, */*;q=0.5" for name in others[:1]]
         refused += [f"{name};q=0" for name in others]
-        for accept in roaas.effort.draw(refused, 20, f"{roaas.seed}/{call.operation.id}"):
-            exchange = call.send(roaas, ("Accept", accept))
+        for accept in api.run.effort.draw(refused, 20, f"{api.run.seed}/{call.operation.id}"):
+            exchange = call.send(api, ("Accept", accept))
             answer = exchange.response
             sent = answer.media_type if answer.ok else ""
             judge.check(

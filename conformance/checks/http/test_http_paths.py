@@ -14,7 +14,7 @@ from conformance.rest.observers import KNOWN_METHODS
 from conformance.transport.exchange import NoAnswer, NoAnswerError
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.client import HttpClient
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
@@ -28,24 +28,24 @@ _LONG_TARGET = 9_000
 _LONG_FIELD = 128 * 1024
 
 
-def _unknown_paths(session: Session) -> list[str]:
+def _unknown_paths(api: RestInterface) -> list[str]:
     """Paths that are near to those of the contract, and match none of them."""
-    literal = [item.template for item in resources_of(session.contract) if "{" not in item.template]
+    literal = [item.template for item in resources_of(api.run.contract) if "{" not in item.template]
     near = [f"/{_STRANGE}", f"/{_STRANGE}/"]
     near += [path.rstrip("/") + f"/{_STRANGE}/" for path in literal[:4]]
     near += ["/".join([*path.strip("/").split("/")[:-1], _STRANGE]) for path in literal[:2]]
     paths = [path if path.startswith("/") else f"/{path}" for path in near]
-    return [path for path in dict.fromkeys(paths) if not known_path(session.contract, path)]
+    return [path for path in dict.fromkeys(paths) if not known_path(api.run.contract, path)]
 
 
 @pytest.mark.requirement(
     "http/not-found", "http/problem-type", "http/problem-status", "http/no-traceback", "rest-formats/problem-xml"
 )
-def test_unknown_paths(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_unknown_paths(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """An unknown path is 404 for every method, and its problem is judged by the observers."""
-    paths = _unknown_paths(roaas)
-    for path in roaas.effort.draw(paths, 10 * _FEW_PATHS, f"{roaas.seed}/unknown paths"):
-        for method in roaas.effort.subsample(_METHODS, 3):
+    paths = _unknown_paths(api)
+    for path in api.run.effort.draw(paths, 10 * _FEW_PATHS, f"{api.run.seed}/unknown paths"):
+        for method in api.run.effort.subsample(_METHODS, 3):
             exchange = rest.send(method, path)
             status = exchange.response.status
             judge.check(
@@ -60,17 +60,17 @@ def test_unknown_paths(roaas: Session, rest: HttpClient, judge: Judge) -> None:
 
 
 @pytest.mark.requirement("http/trailing-slash")
-def test_trailing_slash(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_trailing_slash(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Without its trailing slash a path is unknown, or redirected to the right one."""
-    ending = [item for item in resources_of(roaas.contract) if item.template.endswith("/") and len(item.template) > 1]
+    ending = [item for item in resources_of(api.run.contract) if item.template.endswith("/") and len(item.template) > 1]
     tried = 0
     for resource in ending:
         operation = resource.operations.get("GET")
         if operation is None or operation.optional:
             continue
-        path = example_call(roaas, operation).path.split("?", 1)[0]
+        path = example_call(api, operation).path.split("?", 1)[0]
         cut = path.rstrip("/")
-        if known_path(roaas.contract, cut):
+        if known_path(api.run.contract, cut):
             continue
         tried += 1
         exchange = rest.send("GET", cut)
@@ -95,10 +95,10 @@ def _leads_to(exchange: Exchange, path: str) -> bool:
 
 
 @pytest.mark.requirement("http/uri-too-long", "http/no-server-error")
-def test_long_targets(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_long_targets(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """A target of 9,000 octets is refused."""
     judge.at_risk = ("http/uri-too-long",)
-    for call in [call for call in reads(roaas) if not call.operation.optional]:
+    for call in [call for call in reads(api) if not call.operation.optional]:
         mark = "&" if "?" in call.path else "?"
         for path in (f"{call.path}{mark}roaas={'a' * _LONG_TARGET}",):
             exchange = rest.send("GET", path, fresh=True)
@@ -113,12 +113,12 @@ def test_long_targets(roaas: Session, rest: HttpClient, judge: Judge) -> None:
 
 
 @pytest.mark.requirement("http/header-too-large", "http/no-server-error")
-def test_large_field(roaas: Session, judge: Judge) -> None:
+def test_large_field(api: RestInterface, judge: Judge) -> None:
     """A field of 128 KiB is refused, or the connection closed, or the field ignored; never 5xx."""
     judge.at_risk = ("http/header-too-large",)
-    for call in [call for call in reads(roaas) if not call.operation.optional][:3]:
+    for call in [call for call in reads(api) if not call.operation.optional][:3]:
         try:
-            exchange = call.send(roaas, ("X-Roaas", "a" * _LONG_FIELD), fresh=True)
+            exchange = call.send(api, ("X-Roaas", "a" * _LONG_FIELD), fresh=True)
         except NoAnswerError as none:
             if none.kind is not NoAnswer.CLOSED:
                 raise

@@ -16,7 +16,7 @@ from conformance.rest.refusals import judge_refusal
 from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
@@ -26,51 +26,51 @@ _TEXT = "roaas-no-number"
 
 @pytest.mark.phase("reading")
 @pytest.mark.requirement(*_IDS, "rest-formats/problem-xml", "strict-input/query-parameter")
-def test_problem_of_a_query(roaas: Session, judge: Judge) -> None:
+def test_problem_of_a_query(api: RestInterface, judge: Judge) -> None:
     """A query parameter that is no number is named, and so is what stood there instead."""
     numbers = {"number", "integer"}
     tried = 0
-    for call in reads(roaas):
+    for call in reads(api):
         for item in call.operation.parameter("query"):
             if kind_of(item.schema) not in numbers:
                 continue
             tried += 1
             wrong = call.having(item.name, _TEXT)
             judge_refusal(
-                roaas,
-                partial(wrong.send, roaas),
+                api,
+                partial(wrong.send, api),
                 "strict-input/query-parameter",
                 f"text at {item.name}",
                 field=item.name,
                 shown=_TEXT,
                 json=False,
             )
-            wrong.send(roaas, ("Accept", "application/xml"))
-    if not tried and not any(JSON in operation.bodies for operation in operations_of(roaas.contract)):
+            wrong.send(api, ("Accept", "application/xml"))
+    if not tried and not any(JSON in operation.bodies for operation in operations_of(api.run.contract)):
         for id_ in _IDS[:2]:
             judge.unclaimed(id_, "the contract has no input in which a field could be wrong")
 
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement(*_IDS, "strict-input/json-missing", "strict-input/json-type")
-def test_problem_of_a_body(roaas: Session) -> None:
+def test_problem_of_a_body(api: RestInterface) -> None:
     """A field that is missing or of another type is named in the problem."""
-    stop_robot(roaas)
-    for operation in applicable_operations(roaas, (), lambda item: JSON in item.bodies, "takes JSON"):
-        call = example_call(roaas, operation)
+    stop_robot(api)
+    for operation in applicable_operations(api, (), lambda item: JSON in item.bodies, "takes JSON"):
+        call = example_call(api, operation)
         made = [
             item
             for item in mutations(call.value, operation.bodies[JSON].schema)
             if item.requirement in {"json-missing", "json-type"} and (item.shown or "missing" in item.name)
         ]
-        for item in roaas.effort.subsample(made[:: max(1, len(made) // 6)], 2):
+        for item in api.run.effort.subsample(made[:: max(1, len(made) // 6)], 2):
             judge_refusal(
-                roaas,
-                partial(call.carrying(item.body).send, roaas),
+                api,
+                partial(call.carrying(item.body).send, api),
                 f"strict-input/{item.requirement}",
                 item.name,
                 field=item.field,
                 shown=item.shown,
                 malformed=item.malformed,
             )
-    stop_robot(roaas)
+    stop_robot(api)

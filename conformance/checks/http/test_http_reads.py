@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from conformance.rest.applicable import reads
-from conformance.rest.observers import watch
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.effort import Effort
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
@@ -31,17 +30,16 @@ _IN_ALL = 56
     "http/json-encoding",
     "http/json-unique-names",
 )
-def test_each_resource_is_read_over_and_over(roaas: Session, effort: Effort) -> None:
+def test_each_resource_is_read_over_and_over(api: RestInterface, effort: Effort) -> None:
     """Each GET operation in turn, as JSON; the observers judge every answer.
 
     The turns take a prime number of requests more than there are operations, so that a robot which fails with every
     n-th answer does not always fail with the same one.
     """
-    watch(roaas)
-    calls = reads(roaas)
+    calls = reads(api)
     rounds = effort.cases(_EACH)
-    if calls and not roaas.effort.slow:
+    if calls and not api.run.effort.slow:
         rounds = max(rounds, math.ceil(_IN_ALL / len(calls)))
     for turn in range(rounds):
         for call in calls[turn % len(calls) :] + calls[: turn % len(calls)]:
-            call.send(roaas, *((("Accept", "application/json"),) if turn % 2 else ()))
+            call.send(api, *((("Accept", "application/json"),) if turn % 2 else ()))

@@ -14,7 +14,7 @@ from conformance.rest.snapshot import changed, changes_by_itself, flatten, take_
 from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
 
@@ -28,41 +28,41 @@ _WATCHED_S = 0.15
 
 @pytest.mark.phase("reading")
 @pytest.mark.requirement("http/safe")
-def test_reading_changes_nothing(roaas: Session, judge: Judge) -> None:
+def test_reading_changes_nothing(api: RestInterface, judge: Judge) -> None:
     """What was steady before GET, HEAD and OPTIONS of everything is the same after them."""
-    _judge_safe(roaas, judge)
+    _judge_safe(api, judge)
 
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/safe")
-def test_reading_changes_nothing_after_input(roaas: Session, judge: Judge) -> None:
+def test_reading_changes_nothing_after_input(api: RestInterface, judge: Judge) -> None:
     """The same when the robot has something to lose: a list that is not empty, a value that was set."""
-    if roaas.allow_motion:
-        stop_robot(roaas)
-        _judge_safe(roaas, judge)
+    if api.run.allow_motion:
+        stop_robot(api)
+        _judge_safe(api, judge)
 
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/safe")
-def test_reading_leaves_what_was_put(roaas: Session, judge: Judge) -> None:
+def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
     """What a PUT has made (an active goal) is still there after HEAD and OPTIONS of everything.
 
     What does not last twice as long by itself is not judged: a goal ends when it is reached.
     """
-    calls = [Call(call.operation, call.values) for call in reads(roaas)]
-    others = roaas.effort.subsample(calls, 1)
-    for operation in applicable_operations(roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts"):
-        stop_robot(roaas)
-        call = example_call(roaas, operation)
-        reader = reader_of(roaas, call)
-        if reader is None or _is_there(reader.send(roaas)):
+    calls = [Call(call.operation, call.values) for call in reads(api)]
+    others = api.run.effort.subsample(calls, 1)
+    for operation in applicable_operations(api, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts"):
+        stop_robot(api)
+        call = example_call(api, operation)
+        reader = reader_of(api, call)
+        if reader is None or _is_there(reader.send(api)):
             continue
-        kept, exchange, took = _put_and_watch(roaas, call, reader, [reader, *others], _WATCHED_S)
+        kept, exchange, took = _put_and_watch(api, call, reader, [reader, *others], _WATCHED_S)
         if not kept:
             # Does it last by itself, twice as long? Then once more with HEAD and OPTIONS.
-            if not _put_and_watch(roaas, call, reader, [], 2 * took)[0]:
+            if not _put_and_watch(api, call, reader, [], 2 * took)[0]:
                 continue
-            kept, exchange, _ = _put_and_watch(roaas, call, reader, [reader, *others], _WATCHED_S)
+            kept, exchange, _ = _put_and_watch(api, call, reader, [reader, *others], _WATCHED_S)
         judge.check(
             "http/safe",
             kept,
@@ -70,28 +70,28 @@ def test_reading_leaves_what_was_put(roaas: Session, judge: Judge) -> None:
             "what was put still there after HEAD and OPTIONS",
             found=f"{operation.template} is answered {exchange.came} after HEAD and OPTIONS, and 200 before",
         )
-    stop_robot(roaas)
+    stop_robot(api)
 
 
 def _put_and_watch(
-    session: Session, call: Call, reader: Call, asked: list[Call], seconds: float
+    api: RestInterface, call: Call, reader: Call, asked: list[Call], seconds: float
 ) -> tuple[bool, Exchange, float]:
     """PUT, ask HEAD and OPTIONS of some, and look whether what was put stays there for so long.
 
     Returns:
         Whether it does, the last reading, and how long all of it took, s.
     """
-    stop_robot(session)
-    call.send(session)
+    stop_robot(api)
+    call.send(api)
     started = time.monotonic()
-    exchange = reader.send(session)
+    exchange = reader.send(api)
     for item in asked:
         for method in ("HEAD", "OPTIONS"):
-            item.send(session, method=method)
+            item.send(api, method=method)
     until = time.monotonic() + seconds
     while _is_there(exchange) and time.monotonic() < until:
         time.sleep(0.01)
-        exchange = reader.send(session)
+        exchange = reader.send(api)
     return _is_there(exchange), exchange, time.monotonic() - started
 
 
@@ -99,23 +99,23 @@ def _is_there(exchange: Exchange) -> bool:
     return exchange.response.ok
 
 
-def _judge_safe(session: Session, judge: Judge) -> None:
+def _judge_safe(api: RestInterface, judge: Judge) -> None:
     """Compare what is steady before and after; what changes with nothing asked as well is no effect of asking.
 
     A robot that changes by itself changes in some turns; one whose safe methods have effects changes in every turn.
     """
-    calls = session.effort.subsample(reads(session), 3)
+    calls = api.run.effort.subsample(reads(api), 3)
     suspects: dict[tuple[str, str], Exchange] = {}
     for turn in range(_TURNS):
-        before = take_snapshots(session, calls)
+        before = take_snapshots(api, calls)
         for call in calls:
             for method in ("HEAD", "OPTIONS", "GET"):
-                call.send(session, method=method)
+                call.send(api, method=method)
         found: dict[tuple[str, str], Exchange] = {}
         told: dict[tuple[str, str], str] = {}
         for call in calls:
             id_ = call.operation.id
-            exchange = call.send(session, ("Accept", JSON))
+            exchange = call.send(api, ("Accept", JSON))
             for place, (old, new) in changed(before[id_][0], flatten(exchange)).items():
                 found[id_, place] = exchange
                 told[id_, place] = f"{place} of {id_} was {old!r} before, and is {new!r}"
@@ -126,7 +126,7 @@ def _judge_safe(session: Session, judge: Judge) -> None:
     guilty = {
         key: exchange
         for key, exchange in list(suspects.items())[:5]
-        if not changes_by_itself(session, by_id[key[0]], key[1], _ALONE_S)
+        if not changes_by_itself(api, by_id[key[0]], key[1], _ALONE_S)
     }
     for key, exchange in guilty.items():
         judge.check("http/safe", False, exchange, "the same after GET, HEAD and OPTIONS of everything", found=told[key])
@@ -136,17 +136,17 @@ def _judge_safe(session: Session, judge: Judge) -> None:
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/put-idempotent")
-def test_put_twice(roaas: Session, judge: Judge) -> None:
+def test_put_twice(api: RestInterface, judge: Judge) -> None:
     """The same PUT twice succeeds twice, and leaves the resource as PUT once does."""
-    wanted = applicable_operations(roaas, ["http/put-idempotent"], lambda item: item.method == "PUT", "is a PUT")
+    wanted = applicable_operations(api, ["http/put-idempotent"], lambda item: item.method == "PUT", "is a PUT")
     for operation in wanted:
-        stop_robot(roaas)
-        call = example_call(roaas, operation)
-        first, once, second = _pair(roaas, call)
+        stop_robot(api)
+        call = example_call(api, operation)
+        first, once, second = _pair(api, call)
         if second.response.status == 409:
             # A goal of the robot's own may have begun in between: once more from the start.
-            stop_robot(roaas)
-            first, once, second = _pair(roaas, call)
+            stop_robot(api)
+            first, once, second = _pair(api, call)
         if not _accepted(judge, "http/put-idempotent", operation.id, first):
             continue
         statuses = [item.response.status for item in (first, second)]
@@ -161,24 +161,24 @@ def test_put_twice(roaas: Session, judge: Judge) -> None:
         )
         # What a single PUT reaches is judged elsewhere; here, that two do not add up.
         if fine and once:
-            stop_robot(roaas)
-            call.send(roaas)
+            stop_robot(api)
+            call.send(api)
             judge.check(
                 "http/put-idempotent",
-                settles_at(roaas, call) != "",
+                settles_at(api, call) != "",
                 second,
                 "the same as after one PUT",
                 found=f"after the second {operation.id}, {once}",
                 cause=f"{operation.id} effect",
             )
-    stop_robot(roaas)
+    stop_robot(api)
 
 
-def _pair(session: Session, call: Call) -> tuple[Exchange, str | None, Exchange]:
+def _pair(api: RestInterface, call: Call) -> tuple[Exchange, str | None, Exchange]:
     """A PUT, what the resource then shows otherwise, and the same PUT again."""
-    first = call.send(session)
-    second = call.send(session)
-    return first, settles_at(session, call), second
+    first = call.send(api)
+    second = call.send(api)
+    return first, settles_at(api, call), second
 
 
 def _accepted(judge: Judge, requirement: str, id_: str, exchange: Exchange) -> bool:
@@ -192,20 +192,18 @@ def _accepted(judge: Judge, requirement: str, id_: str, exchange: Exchange) -> b
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/delete-idempotent")
-def test_delete_twice(roaas: Session, judge: Judge) -> None:
+def test_delete_twice(api: RestInterface, judge: Judge) -> None:
     """After one DELETE another one is answered 2xx or 404, and the resource stays as it is."""
-    wanted = applicable_operations(
-        roaas, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "is a DELETE"
-    )
-    by_path = {call.operation.template: call for call in reads(roaas)}
+    wanted = applicable_operations(api, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "is a DELETE")
+    by_path = {call.operation.template: call for call in reads(api)}
     for operation in wanted:
         for attempt in (1, 2):
-            stop_robot(roaas)
-            call = example_call(roaas, operation)
-            call.send(roaas)
+            stop_robot(api)
+            call = example_call(api, operation)
+            call.send(api)
             read = by_path.get(operation.template)
-            before = _after_a_while(roaas, read)
-            exchange = call.send(roaas)
+            before = _after_a_while(api, read)
+            exchange = call.send(api)
             status = exchange.response.status
             judge.check(
                 "http/delete-idempotent",
@@ -215,7 +213,7 @@ def test_delete_twice(roaas: Session, judge: Judge) -> None:
                 found=f"status {status}",
                 cause=f"{status}",
             )
-            after = _after_a_while(roaas, read)
+            after = _after_a_while(api, read)
             # A robot with a mission waiting may have begun it in between: that is no effect of the DELETE.
             if before == after or attempt == 2:
                 judge.check(
@@ -228,14 +226,14 @@ def test_delete_twice(roaas: Session, judge: Judge) -> None:
                 break
 
 
-def _after_a_while(session: Session, read: Call | None) -> int:
+def _after_a_while(api: RestInterface, read: Call | None) -> int:
     """The status of GET, once it is the same three times: a cancelled goal may take a moment to end."""
     if read is None:
         return 0
     statuses: list[int] = []
-    until = time.monotonic() + session.statement.limits.settle_s
+    until = time.monotonic() + api.run.statement.limits.settle_s
     while True:
-        answer = read.send(session).response
+        answer = read.send(api).response
         statuses.append(answer.status)
         if (len(statuses) > 2 and len(set(statuses[-3:])) == 1) or time.monotonic() > until:
             return statuses[-1]

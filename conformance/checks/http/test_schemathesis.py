@@ -18,8 +18,8 @@ from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
-    from conformance.engine.session import Session
     from conformance.rest.generated import GeneratedRequest, Target
+    from conformance.rest.interface import RestInterface
     from conformance.transport.client import HttpClient
     from conformance.verdict.evidence import Judge
     from conformance.verdict.explorer import Explorer
@@ -52,55 +52,55 @@ _FUZZED = 14
 _POSITIVE_REFUSALS = frozenset({405, 406, 408, 411, 413, 414, 415, 431})
 
 
-def _targets(session: Session, *, moving: bool) -> list[Target]:
-    if session.effort.name == "quick":
+def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
+    if api.run.effort.name == "quick":
         return []  # importing Schemathesis and reading the contract takes a tenth of the time that a quick run has
     from conformance.rest.generated import targets  # noqa: PLC0415 - half a second that an unclaimed class need not pay
 
     chosen = []
-    for target in targets(session.contract):
-        operation = _operation(session, target)
-        if operation is not None and operation.motion == moving and allowed(session, operation):
+    for target in targets(api.run.contract):
+        operation = _operation(api, target)
+        if operation is not None and operation.motion == moving and allowed(api, operation):
             chosen.append(target)
     return chosen
 
 
-def _operation(session: Session, target: Target) -> Operation | None:
+def _operation(api: RestInterface, target: Target) -> Operation | None:
     from conformance.documents.openapi import operations_of  # noqa: PLC0415 - beside the one above
 
-    return next((item for item in operations_of(session.contract) if item.label == target.label), None)
+    return next((item for item in operations_of(api.run.contract) if item.label == target.label), None)
 
 
 @pytest.mark.phase("reading")
 @pytest.mark.requirement(*_IDS, "strict-input/query-parameter", "strict-input/query-missing")
-def test_reading_operations(roaas: Session, judge: Judge, explore: Explorer) -> None:
+def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """What moves nothing."""
-    guard = MotionGuard(roaas)
-    for target in _targets(roaas, moving=False):
-        _run(roaas, judge, explore, guard, target)
+    guard = MotionGuard(api)
+    for target in _targets(api, moving=False):
+        _run(api, judge, explore, guard, target)
 
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement(*_IDS, *_STRICT)
-def test_moving_operations(roaas: Session, judge: Judge, explore: Explorer) -> None:
+def test_moving_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """What may move the robot: invalid requests, and a few valid ones made fit for it."""
-    guard = MotionGuard(roaas)
-    stop_robot(roaas)
-    for target in _targets(roaas, moving=True):
-        _run(roaas, judge, explore, guard, target)
-        stop_robot(roaas)
+    guard = MotionGuard(api)
+    stop_robot(api)
+    for target in _targets(api, moving=True):
+        _run(api, judge, explore, guard, target)
+        stop_robot(api)
 
 
-def _run(session: Session, judge: Judge, explore: Explorer, guard: MotionGuard, target: Target) -> None:
-    coverage = session.effort.draw(list(target.coverage()), _COVERAGE, f"{session.seed}/coverage {target.label}")
-    for item in session.effort.subsample([*target.examples(), *coverage], 1):
-        _judge_generated(session, judge, guard, item)
+def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard, target: Target) -> None:
+    coverage = api.run.effort.draw(list(target.coverage()), _COVERAGE, f"{api.run.seed}/coverage {target.label}")
+    for item in api.run.effort.subsample([*target.examples(), *coverage], 1):
+        _judge_generated(api, judge, guard, item)
 
     def fuzz(item: GeneratedRequest | None) -> None:
         if item is not None:
-            _judge_generated(session, judge, guard, item)
+            _judge_generated(api, judge, guard, item)
 
-    if session.effort.slow or not target.has_input:
+    if api.run.effort.slow or not target.has_input:
         return
     for negative in (True, False):
         try:
@@ -109,17 +109,17 @@ def _run(session: Session, judge: Judge, explore: Explorer, guard: MotionGuard, 
             continue  # its schemas take everything, or nothing: there is no such case
 
 
-def _judge_generated(session: Session, judge: Judge, guard: MotionGuard, item: GeneratedRequest) -> None:
+def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item: GeneratedRequest) -> None:
     """Send one request where it is harmless, and judge its answer by what it is on the wire."""
     fit = guard.admit(item)
     if fit is None:
         return
-    said = validity(session.contract, fit.method, fit.target, fit.media_type, fit.body)
+    said = validity(api.run.contract, fit.method, fit.target, fit.media_type, fit.body)
     if said.verdict == INVALID:
         body = said.requirement.startswith("json")
-        judge_refusal(session, lambda: fit.send(session), f"strict-input/{said.requirement}", said.why, json=body)
+        judge_refusal(api, lambda: fit.send(api), f"strict-input/{said.requirement}", said.why, json=body)
         return
-    exchange = fit.send(session)
+    exchange = fit.send(api)
     answer = exchange.response
     guard.count(fit, accepted=answer.ok)
     if said.verdict == VALID and said.operation is not None:
@@ -135,33 +135,33 @@ def _judge_generated(session: Session, judge: Judge, guard: MotionGuard, item: G
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/no-server-error")
-def test_walk_along_the_links(roaas: Session, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
+def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
     """A few short walks from operation to operation, as the contract's links lead."""
     judge.check("http/no-server-error", True, None, "no 5xx on the way")
-    if roaas.effort.name == "quick":
+    if api.run.effort.name == "quick":
         return
     from conformance.rest.generated import as_request, as_thesis, state_machine  # noqa: PLC0415 - as above
 
-    machine: Any = state_machine(roaas.contract.openapi)
+    machine: Any = state_machine(api.run.contract.openapi)
     if machine is None:
         judge.note("http/no-server-error", "the contract has no links to walk along")
         return
-    guard = MotionGuard(roaas)
+    guard = MotionGuard(api)
 
     class Walk(machine):  # type: ignore[misc] # made at run time
         def call(self, case: Any, **_: Any) -> Any:
             one = as_request(case)
             fit = guard.admit(one) if one is not None else None
             if fit is None:
-                exchange = rest.send("GET", roaas.rest_path())
+                exchange = rest.send("GET", api.path)
             else:
-                exchange = fit.send(roaas)
+                exchange = fit.send(api)
                 guard.count(fit, accepted=exchange.response.ok)
             return as_thesis(exchange)
 
         def validate_response(self, *_: Any, **__: Any) -> None:
             """The observers have judged it."""
 
-    stop_robot(roaas)
+    stop_robot(api)
     explore.machine(Walk, cases=4, steps=5)
-    stop_robot(roaas)
+    stop_robot(api)

@@ -10,8 +10,8 @@ from conformance.rest.accept import quality
 from conformance.rest.applicable import answered
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
     from conformance.rest.calls import Call
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
@@ -48,13 +48,13 @@ _MATRIX = (
 
 
 @pytest.mark.requirement(_DEFAULT)
-def test_default_format(roaas: Session, judge: Judge) -> None:
+def test_default_format(api: RestInterface, judge: Judge) -> None:
     """Whoever asks for nothing, or for anything, gets JSON."""
-    for call in roaas.effort.subsample(answered(roaas), 3):
+    for call in api.run.effort.subsample(answered(api), 3):
         if "application/json" not in call.operation.formats:
             continue
         for accept in ("", "*/*", "*/*;q=0.5"):
-            exchange = call.send(roaas, ("Accept", accept))
+            exchange = call.send(api, ("Accept", accept))
             media_type = exchange.response.media_type
             judge.check(
                 _DEFAULT,
@@ -66,25 +66,25 @@ def test_default_format(roaas: Session, judge: Judge) -> None:
 
 
 @pytest.mark.requirement(_Q, _SPECIFIC)
-def test_preferred_format(roaas: Session, judge: Judge) -> None:
+def test_preferred_format(api: RestInterface, judge: Judge) -> None:
     """What the client would rather have is what it gets."""
-    calls = [call for call in roaas.effort.subsample(answered(roaas), 3) if len(call.operation.formats) > 1]
+    calls = [call for call in api.run.effort.subsample(answered(api), 3) if len(call.operation.formats) > 1]
     if not calls:
         for id_ in (_Q, _SPECIFIC):
             judge.unclaimed(id_, "the contract has no answers in more than one format")
     cases = [(call, id_, text) for call in calls for id_, text in _MATRIX]
     # With little effort each line of the matrix is tried with one resource, another one for each line.
     once = [(calls[index % len(calls)], *_MATRIX[index]) for index in range(len(_MATRIX))] if calls else []
-    for call, id_, text in once + roaas.effort.draw(cases, len(cases), f"{roaas.seed}/accept"):
-        _judge_preferred(roaas, judge, call, id_, text)
+    for call, id_, text in once + api.run.effort.draw(cases, len(cases), f"{api.run.seed}/accept"):
+        _judge_preferred(api, judge, call, id_, text)
 
 
-def _judge_preferred(session: Session, judge: Judge, call: Call, id_: str, text: str) -> None:
+def _judge_preferred(api: RestInterface, judge: Judge, call: Call, id_: str, text: str) -> None:
     formats = call.operation.formats
     a, b, c = (*formats, *formats)[:3]
     accept = text.format(a=a, b=b, c=c, A=a.upper(), B=b.upper(), C=c.upper())
     best = max(quality(name, accept) for name in formats)
-    exchange = call.send(session, ("Accept", accept))
+    exchange = call.send(api, ("Accept", accept))
     answer = exchange.response
     sent = answer.media_type if answer.ok else ""
     # A robot may have further formats of its own, and send one that is liked as well.

@@ -17,7 +17,7 @@ from conformance.robot.stopping import stop_robot
 if TYPE_CHECKING:
     from lxml import etree
 
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
 
@@ -26,20 +26,20 @@ _ID = "rest-formats/xml-input"
 
 
 @pytest.mark.requirement("rest-formats/same-values", "rest-formats/xml-root")
-def test_formats_of_what_was_put(roaas: Session, judge: Judge) -> None:
+def test_formats_of_what_was_put(api: RestInterface, judge: Judge) -> None:
     """A resource that is there only when something was put (a goal) has the same values in all formats as well."""
     for operation in applicable_operations(
-        roaas, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts something"
+        api, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts something"
     ):
-        stop_robot(roaas)
-        call = example_call(roaas, operation)
-        reader = reader_of(roaas, call)
-        if reader is None or _is_there(reader.send(roaas)):
+        stop_robot(api)
+        call = example_call(api, operation)
+        reader = reader_of(api, call)
+        if reader is None or _is_there(reader.send(api)):
             continue
-        if not _is_there(call.send(roaas)):
+        if not _is_there(call.send(api)):
             continue
         others = [name for name in (XML, "text/plain") if name in reader.operation.formats]
-        found, exchange = disagreements(roaas, reader, others)
+        found, exchange = disagreements(api, reader, others)
         if not _is_there(exchange):
             continue
         first = found[0] if found else None
@@ -51,7 +51,7 @@ def test_formats_of_what_was_put(roaas: Session, judge: Judge) -> None:
             found=first.description if first else "",
             cause=reader.operation.id,
         )
-        form = _sent_form(roaas, call)
+        form = _sent_form(api, call)
         wanted = root_name(reader.operation.shape or {})
         if form is not None and wanted:
             judge.check(
@@ -61,7 +61,7 @@ def test_formats_of_what_was_put(roaas: Session, judge: Judge) -> None:
                 "a root named after the type",
                 found=f"the root element is {local_name(form)!r} and not {wanted!r}",
             )
-    stop_robot(roaas)
+    stop_robot(api)
 
 
 def _is_there(exchange: Exchange) -> bool:
@@ -69,21 +69,21 @@ def _is_there(exchange: Exchange) -> bool:
 
 
 @pytest.mark.requirement(_ID)
-def test_xml_is_taken(roaas: Session, judge: Judge) -> None:
+def test_xml_is_taken(api: RestInterface, judge: Judge) -> None:
     """A valid value as XML is accepted, and has the effect that it has as JSON."""
-    for operation in applicable_operations(roaas, [_ID], lambda item: XML in item.bodies, "takes XML"):
-        stop_robot(roaas)
-        call = example_call(roaas, operation, XML)
-        plain = example_call(roaas, operation).send(roaas)
+    for operation in applicable_operations(api, [_ID], lambda item: XML in item.bodies, "takes XML"):
+        stop_robot(api)
+        call = example_call(api, operation, XML)
+        plain = example_call(api, operation).send(api)
         if not (plain.response.ok or plain.response.status == 409):
             judge.note(_ID, f"a valid {operation.id} as JSON is answered {plain.came}, so it was not tried as XML")
             continue
-        stop_robot(roaas)
-        like = _sent_form(roaas, call)
+        stop_robot(api)
+        like = _sent_form(api, call)
         body = xml_bytes(call.value, root_name(operation.bodies[XML].schema) or "value", like)
         for accept in ("application/json", XML):
             call = call.carrying(body)
-            exchange = call.send(roaas, ("Accept", accept))
+            exchange = call.send(api, ("Accept", accept))
             status = exchange.response.status
             taken = judge.check(
                 _ID,
@@ -97,7 +97,7 @@ def test_xml_is_taken(roaas: Session, judge: Judge) -> None:
                 fault = _echo_fault(call, exchange)
                 judge.check(_ID, not fault, exchange, "the accepted value", found=fault, cause=f"{operation.id} echo")
         if taken and status != 409:
-            other = settles_at(roaas, call)
+            other = settles_at(api, call)
             if other is not None:
                 judge.check(
                     _ID,
@@ -107,15 +107,15 @@ def test_xml_is_taken(roaas: Session, judge: Judge) -> None:
                     found=other,
                     cause=f"{operation.id} effect",
                 )
-    stop_robot(roaas)
+    stop_robot(api)
 
 
-def _sent_form(session: Session, call: Call) -> etree._Element | None:
+def _sent_form(api: RestInterface, call: Call) -> etree._Element | None:
     """The resource as the robot sends it in XML; None where it has nothing to send just now."""
-    reader = reader_of(session, call)
+    reader = reader_of(api, call)
     if reader is None:
         return None
-    answer = reader.send(session, ("Accept", XML)).response
+    answer = reader.send(api, ("Accept", XML)).response
     if not answer.ok or answer.media_type != XML:
         return None
     try:

@@ -14,7 +14,7 @@ from conformance.rest.calls import root_name
 from conformance.rest.formats import disagreements
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
 
@@ -24,29 +24,29 @@ _TEXT = "text/plain"
 _IDS = {_XML: "rest-formats/xml", _TEXT: "rest-formats/text"}
 
 
-def _lacks(session: Session, media_type: str, *ids: str) -> bool:
+def _lacks(api: RestInterface, media_type: str, *ids: str) -> bool:
     """Say that requirements do not apply where no operation of the contract has the format."""
-    if any(media_type in operation.formats for operation in operations_of(session.contract)):
+    if any(media_type in operation.formats for operation in operations_of(api.run.contract)):
         return False
     for id_ in ids:
-        session.judge.unclaimed(id_, f"the contract has no answers as {media_type}")
+        api.run.judge.unclaimed(id_, f"the contract has no answers as {media_type}")
     return True
 
 
 @pytest.mark.requirement("rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/vary")
-def test_each_format_is_sent(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -> None:
     """Each resource is sent as XML and as text when that is asked for; the observers judge what is in them."""
-    _lacks(roaas, _XML, "rest-formats/xml", "rest-formats/xml-root")
-    _lacks(roaas, _TEXT, "rest-formats/text")
-    if not any(len(operation.formats) > 1 for operation in operations_of(roaas.contract)):
+    _lacks(api, _XML, "rest-formats/xml", "rest-formats/xml-root")
+    _lacks(api, _TEXT, "rest-formats/text")
+    if not any(len(operation.formats) > 1 for operation in operations_of(api.run.contract)):
         judge.unclaimed("rest-formats/vary", "the contract has no answers in more than one format")
-    calls = answered(roaas)
+    calls = answered(api)
     for turn in range(effort.cases(12) if effort.name != "quick" else 1):
         for call in calls[turn % len(calls) :] + calls[: turn % len(calls)]:
             for media_type, id_ in _IDS.items():
                 if media_type not in call.operation.formats:
                     continue
-                exchange = call.send(roaas, ("Accept", media_type))
+                exchange = call.send(api, ("Accept", media_type))
                 answer = exchange.response
                 sent = judge.check(
                     id_,
@@ -76,14 +76,14 @@ def _root_fault(operation: Operation, body: bytes) -> str:
 
 
 @pytest.mark.requirement("rest-formats/same-values")
-def test_formats_carry_the_same_values(roaas: Session, judge: Judge) -> None:
+def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None:
     """Every value of each resource is the same in all its formats."""
     compared = 0
-    for call in roaas.effort.subsample(reads(roaas), 5):
+    for call in api.run.effort.subsample(reads(api), 5):
         others = [name for name in _IDS if name in call.operation.formats]
         if not others:
             continue
-        found, exchange = disagreements(roaas, call, others)
+        found, exchange = disagreements(api, call, others)
         if not exchange.response.ok:
             continue
         compared += 1
@@ -96,5 +96,5 @@ def test_formats_carry_the_same_values(roaas: Session, judge: Judge) -> None:
             found=first.description if first else "",
             cause=call.operation.id,
         )
-    if not compared and not any(set(_IDS) & set(item.formats) for item in operations_of(roaas.contract)):
+    if not compared and not any(set(_IDS) & set(item.formats) for item in operations_of(api.run.contract)):
         judge.unclaimed("rest-formats/same-values", "the contract has one format only")

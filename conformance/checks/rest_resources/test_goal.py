@@ -26,7 +26,7 @@ from conformance.robot.stopping import bring_to_rest
 if TYPE_CHECKING:
     from typing import Any
 
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
 
@@ -37,12 +37,12 @@ _STAYS_S: Final = 1.3
 
 
 @pytest.fixture
-def robot(roaas: Session) -> Robot:
+def robot(api: RestInterface) -> Robot:
     """The robot, at rest."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    return Robot(roaas)
+    return Robot(api)
 
 
 def _judge_new(robot: Robot, judge: Judge, exchange: Exchange, body: dict[str, Any], *ids: str) -> bool:

@@ -15,7 +15,7 @@ from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.evidence import Judge
     from conformance.verdict.explorer import Explorer
 
@@ -38,12 +38,12 @@ _KNOWN: Final = (
 
 
 @pytest.mark.requirement("rest-resources/goal-id", "rest-resources/goal-preempt", "rest-resources/goal-get")
-def test_goal_ids(roaas: Session, judge: Judge, explore: Explorer) -> None:
+def test_goal_ids(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """Whatever its id, a goal is taken, becomes current and comes back under that id."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    robot = Robot(roaas)
+    robot = Robot(api)
     goals = itertools.cycle(choose_goals(robot, 1.5, 2))
     frame = robot.statement.motion.frame
     used: list[str] = []
@@ -86,12 +86,12 @@ def test_goal_ids(roaas: Session, judge: Judge, explore: Explorer) -> None:
 
 
 @pytest.mark.requirement("rest-resources/goal-get")
-def test_the_goal_shown_is_the_goal_put(roaas: Session, judge: Judge, explore: Explorer) -> None:
+def test_the_goal_shown_is_the_goal_put(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """Positions and headings come back as they were put, however long the goal is looked at."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    robot = Robot(roaas)
+    robot = Robot(api)
     goals = choose_goals(robot, 1.5, 2)
     numbers = itertools.count()
     strange: list[str] = []

@@ -15,7 +15,7 @@ from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.robot.geometry import Pose
     from conformance.verdict.evidence import Judge
 
@@ -29,12 +29,12 @@ _LONGEST_DEFAULT_S: Final = 30.0
 
 
 @pytest.fixture
-def robot(roaas: Session) -> Robot:
+def robot(api: RestInterface) -> Robot:
     """The robot, at rest."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    return Robot(roaas)
+    return Robot(api)
 
 
 @pytest.mark.requirement(
@@ -46,7 +46,7 @@ def robot(roaas: Session) -> Robot:
     "rest-resources/velocity-odometry",
     "rest-resources/pose-motion",
 )
-def test_goal_until_it_is_reached(robot: Robot, judge: Judge, roaas: Session) -> None:
+def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface) -> None:
     """A goal nearby is driven to and is then no longer current; its id can be used again."""
     here = robot.map_pose()
     if here is None:
@@ -57,7 +57,7 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, roaas: Session) ->
     status = exchange.response.status
     if not judge.check("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal"):
         return
-    if not _drive_to(robot, judge, there, here, _LONGEST_S.get(roaas.effort.name, _LONGEST_DEFAULT_S)):
+    if not _drive_to(robot, judge, there, here, _LONGEST_S.get(api.run.effort.name, _LONGEST_DEFAULT_S)):
         return
     # Away from where it was at first: a plan that always starts there is seen now.
     before = robot.map_pose()

@@ -13,7 +13,7 @@ from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
@@ -27,12 +27,12 @@ _FRAMES: Final = ("no_such_frame", "map2")
 @pytest.mark.requirement(
     "rest-resources/goal-unreachable", "rest-resources/goal-frame", "rest-resources/goal-quaternion"
 )
-def test_goals_that_cannot_be_taken(roaas: Session, judge: Judge) -> None:
+def test_goals_that_cannot_be_taken(api: RestInterface, judge: Judge) -> None:
     """Outside the map, in an unknown frame, with an orientation that is none."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    robot = Robot(roaas)
+    robot = Robot(api)
     frame = robot.statement.motion.frame
     (near,) = choose_goals(robot, 1.0, 1)
     for length in _LENGTHS:

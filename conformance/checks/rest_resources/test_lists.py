@@ -15,7 +15,7 @@ from conformance.robot.robot import SENSORS, SERVICES, Robot
 
 if TYPE_CHECKING:
     from conformance.documents.json_schema import Shape
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
@@ -29,9 +29,9 @@ pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
     "rest-resources/sensors-named-in-full",
     "rest-resources/sensors-stable",
 )
-def test_sensors(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_sensors(api: RestInterface, judge: Judge, effort: Effort) -> None:
     """Each reading is a list of {name, topic, type}, without repetition, and the same as the one before."""
-    _read_often(Robot(roaas), judge, "sensors", SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, effort.cases(100))
+    _read_often(Robot(api), judge, "sensors", SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, effort.cases(100))
 
 
 @pytest.mark.requirement(
@@ -40,9 +40,9 @@ def test_sensors(roaas: Session, judge: Judge, effort: Effort) -> None:
     "rest-resources/services-named-in-full",
     "rest-resources/services-stable",
 )
-def test_services(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_services(api: RestInterface, judge: Judge, effort: Effort) -> None:
     """Each reading is a list of {name, type}, without repetition, and the same as the one before."""
-    _read_often(Robot(roaas), judge, "services", SERVICES, SERVICES_SHAPE, SERVICE_TYPE, effort.cases(100))
+    _read_often(Robot(api), judge, "services", SERVICES, SERVICES_SHAPE, SERVICE_TYPE, effort.cases(100))
 
 
 def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, full: Shape, times: int) -> None:

@@ -12,7 +12,7 @@ from conformance.robot.robot import Robot, Velocity
 from conformance.robot.stopping import bring_to_rest
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 
@@ -26,12 +26,12 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
     "safety/stop",
     "safety/limits-hold",
 )
-def test_straight_drive(roaas: Session) -> None:
+def test_straight_drive(api: RestInterface) -> None:
     """Ahead for less than a second, and a stop."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    robot = Robot(roaas)
+    robot = Robot(api)
     if not robot.actuated(0):
         pytest.skip("the statement says that the robot cannot drive straight ahead")
     make_room(robot)

@@ -13,7 +13,7 @@ from conformance.robot.robot import STILL, Robot, Velocity
 from conformance.robot.stopping import bring_to_rest
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
 
@@ -41,12 +41,12 @@ _SLOW_S: Final = 0.05
     "safety/watchdog",
     "safety/limits-hold",
 )
-def test_turn(roaas: Session, judge: Judge) -> None:
+def test_turn(api: RestInterface, judge: Judge) -> None:
     """One turn of about three seconds; the robot ends it by itself."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    robot = Robot(roaas)
+    robot = Robot(api)
     if not robot.actuated(5):
         pytest.skip("the statement says that the robot cannot turn on the spot")
     make_room(robot)

@@ -15,7 +15,7 @@ from conformance.robot.plan import START_OFF, Plan, ask, judge_start, plan_of, q
 from conformance.robot.robot import POSE, Robot
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
     from conformance.verdict.evidence import Judge
     from conformance.verdict.explorer import Explorer
@@ -29,9 +29,9 @@ _CANDIDATES = 8
 
 
 @pytest.fixture
-def robot(roaas: Session) -> Robot:
+def robot(api: RestInterface) -> Robot:
     """The robot."""
-    return Robot(roaas)
+    return Robot(api)
 
 
 @pytest.fixture

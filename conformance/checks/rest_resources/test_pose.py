@@ -11,7 +11,7 @@ from conformance.robot.drive import Drive
 from conformance.robot.robot import POSE, Robot
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
@@ -27,9 +27,9 @@ _PATIENCE_S = 5.0
     "rest-resources/pose-quaternion",
     "rest-resources/pose-stamp",
 )
-def test_pose(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_pose(api: RestInterface, judge: Judge, effort: Effort) -> None:
     """Each reading is a whole odometry, and from one to the next time goes on; the observer judges them one by one."""
-    robot = Robot(roaas)
+    robot = Robot(api)
     stamps: set[float] = set()
     exchange: Exchange | None = None
     until = time.monotonic() + _PATIENCE_S
@@ -65,9 +65,9 @@ def test_pose(roaas: Session, judge: Judge, effort: Effort) -> None:
     "rest-resources/linear-type",
     "rest-resources/linear-agrees",
 )
-def test_velocity_and_odometry(roaas: Session, effort: Effort) -> None:
+def test_velocity_and_odometry(api: RestInterface, effort: Effort) -> None:
     """Velocity, its linear part and the odometry agree; observer and drive judge each reading."""
-    robot = Robot(roaas)
+    robot = Robot(api)
     drive = Drive(robot)
     until = time.monotonic() + 0.4 * robot.watchfulness
     readings = 0

@@ -13,7 +13,7 @@ from conformance.robot.velocity_walk import machine
 from conformance.robot.walk import Walk
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.effort import Effort
     from conformance.verdict.explorer import Explorer
 
@@ -30,12 +30,12 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
     "safety/refused-keeps",
     "safety/limits-hold",
 )
-def test_velocity_walk(roaas: Session, effort: Effort, explore: Explorer) -> None:
+def test_velocity_walk(api: RestInterface, effort: Effort, explore: Explorer) -> None:
     """Whatever is asked for, in whatever order, is what the robot does, and its pose follows."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    robot = Robot(roaas)
+    robot = Robot(api)
     make_room(robot)
     walk = Walk(robot, 0.8 * effort.budget_s)
     explore.machine(machine(walk), cases=10, steps=effort.cases(12))

@@ -17,7 +17,7 @@ from conformance.transport.exchange import NoAnswerError
 from conformance.transport.incomplete_request import PartialRequest
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
@@ -31,12 +31,12 @@ _USUAL_S: Final = 1.0
 @pytest.mark.phase("motion")
 @pytest.mark.motion
 @pytest.mark.requirement("safety/client-vanished")
-def test_client_vanished(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_client_vanished(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """A velocity of which not all octets came is none, also where those that came would make one."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    robot = Robot(roaas)
+    robot = Robot(api)
     fast = Velocity(linear_x=0.3 * robot.limits.linear_m_s, angular_z=0.5 * robot.limits.angular_rad_s)
     body, linear = body_of(fast.twist), body_of(fast.linear)
     drive = Drive(robot)
@@ -66,7 +66,7 @@ def test_client_vanished(roaas: Session, rest: HttpClient, judge: Judge) -> None
             cause="moves",
         )
         if moves:
-            bring_to_rest(roaas)
+            bring_to_rest(api)
     drive.keep(_WATCH_S / 2 * robot.watchfulness)
     velocity, exchange = drive.look()
     judge.check(
@@ -81,9 +81,9 @@ def test_client_vanished(roaas: Session, rest: HttpClient, judge: Judge) -> None
 
 @pytest.mark.phase("reading")
 @pytest.mark.requirement("safety/half-request")
-def test_half_requests(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_half_requests(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """While three clients do not come to an end of their requests, others are answered in the usual time."""
-    robot = Robot(roaas)
+    robot = Robot(api)
     patience_s = max(_USUAL_S, 20 * robot.usual_s)
     judge.at_risk = ("safety/half-request",)
     # A client of its own: what hangs here, for once, need not hang later.

@@ -14,7 +14,7 @@ from conformance.robot.stopping import bring_to_rest
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.transport.exchange import Exchange
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
@@ -28,12 +28,12 @@ _WATCH_S: Final = 0.25
 
 
 @pytest.fixture
-def robot(roaas: Session) -> Robot:
+def robot(api: RestInterface) -> Robot:
     """The robot, at rest."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    return Robot(roaas)
+    return Robot(api)
 
 
 def _only(component: int, value: float) -> Velocity:

@@ -15,7 +15,7 @@ from conformance.soap.envelope import envelope
 from conformance.soap.valid_messages import example, quiet_example
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.soap.callable_services import SoapServices
     from conformance.soap.service import SoapService
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
@@ -47,9 +47,9 @@ def _is_fault(judge: Judge, id_: str, answer: SoapResponse, code: str, what: str
 
 
 @pytest.mark.requirement("soap-basic-profile/R1015", "soap-basic-profile/version-mismatch")
-def test_other_versions(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_other_versions(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """An Envelope of another namespace is answered with a fault, VersionMismatch."""
-    for service in askable(roaas, "soap-basic-profile/R1015", "soap-basic-profile/version-mismatch"):
+    for service in askable(soap, "soap-basic-profile/R1015", "soap-basic-profile/version-mismatch"):
         messages = _messages(service)[: effort.cases(10)] or [_UNKNOWN]
         for message in messages:
             answer = send(service, envelope([message], space=_OTHER_VERSION))
@@ -74,9 +74,9 @@ def test_other_versions(roaas: Session, judge: Judge, effort: Effort) -> None:
 
 
 @pytest.mark.requirement("soap-basic-profile/R1027", "soap-basic-profile/R1028")
-def test_must_understand(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_must_understand(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """A mandatory header block that is not understood is answered with MustUnderstand, and nothing else is done."""
-    for service in askable(roaas, "soap-basic-profile/R1027", "soap-basic-profile/R1028"):
+    for service in askable(soap, "soap-basic-profile/R1027", "soap-basic-profile/R1028"):
         for message in _messages(service)[: effort.cases(10)] or [_UNKNOWN]:
             for what, headers in (
                 ("a mandatory block", (_block("1"),)),
@@ -96,9 +96,9 @@ def test_must_understand(roaas: Session, judge: Judge, effort: Effort) -> None:
 
 
 @pytest.mark.requirement("soap-basic-profile/mustunderstand-actor", "soap-basic-profile/R2739")
-def test_other_headers(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_other_headers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Mandatory blocks for somebody else, and optional ones that the description does not have, change nothing."""
-    for service in askable(roaas, "soap-basic-profile/mustunderstand-actor", "soap-basic-profile/R2739"):
+    for service in askable(soap, "soap-basic-profile/mustunderstand-actor", "soap-basic-profile/R2739"):
         for message in _messages(service)[: effort.cases(10)]:
             for id_, what, headers in (
                 ("mustunderstand-actor", "a mandatory block for another actor", (_block("1", "http://example.com/a"),)),
@@ -118,9 +118,9 @@ def test_other_headers(roaas: Session, judge: Judge, effort: Effort) -> None:
 
 
 @pytest.mark.requirement("soap-basic-profile/R2725")
-def test_order_of_faults(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_order_of_faults(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """VersionMismatch comes before MustUnderstand, and MustUnderstand before Client."""
-    for service in askable(roaas, "soap-basic-profile/R2725"):
+    for service in askable(soap, "soap-basic-profile/R2725"):
         good = quiet_example(service)
         message = good[1] if good else _UNKNOWN
         broken = replace(message, children=(*message.children, Node("no_such_element", "x")))

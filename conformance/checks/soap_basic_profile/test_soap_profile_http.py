@@ -16,7 +16,7 @@ from conformance.soap.valid_messages import quiet_example
 from conformance.transport.exchange import NoAnswer, NoAnswerError
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.soap.callable_services import SoapServices
     from conformance.soap.service import SoapService
     from conformance.transport.exchange import Exchange
     from conformance.verdict.effort import Effort
@@ -34,9 +34,9 @@ def _message(service: SoapService) -> Node:
 
 
 @pytest.mark.requirement("soap-basic-profile/R1109")
-def test_soap_action(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_soap_action(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """SOAPAction is taken in quotes, with something in them or nothing."""
-    for service in askable(roaas, "soap-basic-profile/R1109"):
+    for service in askable(soap, "soap-basic-profile/R1109"):
         good = quiet_example(service)
         if good is None:
             judge.skip("soap-basic-profile/R1109", f"the {service.name} service took none of the messages tried")
@@ -75,9 +75,9 @@ def _malformed(message: Node) -> list[tuple[str, bytes]]:
 
 
 @pytest.mark.requirement("soap-basic-profile/R1125", "soap-basic-profile/R1113")
-def test_malformed(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_malformed(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Malformed XML is answered 4xx without a fault (best 400), or 500 with one."""
-    for service in askable(roaas, "soap-basic-profile/R1125", "soap-basic-profile/R1113"):
+    for service in askable(soap, "soap-basic-profile/R1125", "soap-basic-profile/R1113"):
         cases = _malformed(_message(service))
         apart = service.apart()
         for what, body in cases[: effort.cases(len(cases))]:
@@ -132,9 +132,9 @@ def _truncated(judge: Judge, service: SoapService) -> None:
 
 
 @pytest.mark.requirement("soap-basic-profile/R1114")
-def test_methods(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_methods(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Methods other than POST are answered 405; GET may be answered with a description."""
-    for service in askable(roaas, "soap-basic-profile/R1114"):
+    for service in askable(soap, "soap-basic-profile/R1114"):
         body = envelope([_message(service)]).written()
         for method in ("PUT", "GET", "DELETE", "PATCH") * rounds(effort, 3):
             exchange = service.client.send(
@@ -163,10 +163,10 @@ def _is_description(exchange: Exchange) -> bool:
 
 
 @pytest.mark.requirement("soap-basic-profile/R1115")
-def test_media_types(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_media_types(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """A message that comes as anything but text/xml is answered 415."""
     types = ("text/plain", "application/json", "application/octet-stream", "text/html", "application/xml")
-    for service in askable(roaas, "soap-basic-profile/R1115"):
+    for service in askable(soap, "soap-basic-profile/R1115"):
         body = envelope([_message(service)]).written()
         for media_type in types * rounds(effort, 3):
             answer = send(service, body, content_type=media_type)

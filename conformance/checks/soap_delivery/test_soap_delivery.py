@@ -19,7 +19,6 @@ from conformance.soap.messages import variants, with_text
 from conformance.soap.xml_style import serialize, single_changes, xml_styles
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
     from conformance.soap.service import SoapService
     from conformance.soap.xml_style import XmlStyle
     from conformance.verdict.effort import Effort
@@ -29,14 +28,6 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("publishers"), pytest.mark.motion]
 _BOTH = ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest")
 _VALID = "soap-delivery/response-valid"
-
-
-@pytest.fixture
-def publishers(roaas: Session) -> SoapService:
-    """The robot's publishers service."""
-    if roaas.publishers is None:
-        pytest.skip("the robot's publishers service has no address")
-    return roaas.publishers
 
 
 def _answered(judge: Judge, id_: str, operation: str, answer: SoapResponse, what: str) -> bool:

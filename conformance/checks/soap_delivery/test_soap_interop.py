@@ -13,7 +13,7 @@ from conformance.soap.valid_messages import example
 from conformance.transport.exchange import NoAnswerError
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.soap.callable_services import SoapServices
     from conformance.soap.service import SoapService
     from conformance.soap.zeep_client import ZeepCaller
     from conformance.verdict.effort import Effort
@@ -79,9 +79,9 @@ def _plan(service: SoapService) -> dict[str, float]:
 @pytest.mark.needs("publishers")
 @pytest.mark.motion
 @pytest.mark.requirement("soap-delivery/interop")
-def test_publishers(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_publishers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Both operations are called."""
-    client = _client(judge, "soap-delivery/interop", roaas.publishers)
+    client = _client(judge, "soap-delivery/interop", soap.publishers)
     if client is None:
         return
     for code in (COFFEE, COURIER) * rounds(effort, 4):
@@ -98,13 +98,13 @@ def test_publishers(roaas: Session, judge: Judge, effort: Effort) -> None:
 @pytest.mark.phase("reading")
 @pytest.mark.needs("subscribers")
 @pytest.mark.requirement("soap-subscribers/interop")
-def test_subscribers(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_subscribers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """All operations are called; those that have nothing to tell may answer with a fault."""
     id_ = "soap-subscribers/interop"
-    client = _client(judge, id_, roaas.subscribers)
-    if client is None or roaas.subscribers is None:
+    client = _client(judge, id_, soap.subscribers)
+    if client is None or soap.subscribers is None:
         return
-    plan = _plan(roaas.subscribers)
+    plan = _plan(soap.subscribers)
     for _ in range(rounds(effort, 5)):
         for operation, arguments in (
             ("GetPose", {}),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.contract.interfaces import Interface
 from conformance.documents.xml_names import ENVELOPE, clark
 from conformance.documents.xml_node import Node
 from conformance.robot import delivery_messages
@@ -21,7 +22,7 @@ from conformance.soap.calls import call
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.engine.session import Session
+    from conformance.robot.interfaces import Interfaces
     from conformance.soap.service import SoapService
     from conformance.transport.client import HttpClient
     from conformance.verdict.effort import Effort
@@ -45,10 +46,10 @@ def _listed(rest: HttpClient, depot_x: float) -> int | None:
 @pytest.mark.needs("publishers")
 @pytest.mark.motion
 @pytest.mark.requirement("soap-basic-profile/R1028")
-def test_misunderstood_has_no_effect(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_misunderstood_has_no_effect(interfaces: Interfaces, judge: Judge, effort: Effort) -> None:
     """A delivery that is answered MustUnderstand is not in the robot's list of deliveries, where there is one."""
-    service, rest = roaas.publishers, roaas.rest
-    if service is None or rest is None or not roaas.contract.own or _listed(rest, 0.0) is None:
+    service, api = interfaces.soap.publishers, interfaces.rest
+    if service is None or api is None or not api.run.contract.own or _listed(api.client, 0.0) is None:
         # What the robot does cannot be seen then; that it answers nothing but the fault is judged elsewhere.
         return
     block = Node(clark("urn:example:strange", "Transaction"), "5", (), ((clark(ENVELOPE, "mustUnderstand"), "1"),))
@@ -60,10 +61,10 @@ def test_misunderstood_has_no_effect(roaas: Session, judge: Judge, effort: Effor
         # A valid delivery after it shows when the robot is through with both.
         marker = depot_x + 0.5
         call(service, delivery_messages.delivery(depot_x=repr(marker)))
-        _until(lambda marker=marker: (_listed(rest, marker) or 0) > 0, 1.0)  # type: ignore[misc] # a default argument binds the loop's value
+        _until(lambda marker=marker: (_listed(api.client, marker) or 0) > 0, 1.0)  # type: ignore[misc] # a default argument binds the loop's value
         judge.check(
             "soap-basic-profile/R1028",
-            not _listed(rest, depot_x),
+            not _listed(api.client, depot_x),
             answer.exchange,
             "a request that is answered MustUnderstand to have no effect",
             found="it is in the robot's list of deliveries",
@@ -73,20 +74,20 @@ def test_misunderstood_has_no_effect(roaas: Session, judge: Judge, effort: Effor
 @pytest.mark.phase("motion")
 @pytest.mark.needs("subscribers")
 @pytest.mark.requirement("soap-subscribers/goal")
-def test_goal_is_shown(roaas: Session, judge: Judge) -> None:
+def test_goal_is_shown(interfaces: Interfaces, judge: Judge) -> None:
     """While a goal that came over REST is active, GetGoal shows it."""
-    service = roaas.subscribers
-    if service is None or roaas.rest is None or not roaas.allow_motion or "rest" in roaas.unreachable:
+    service, api = interfaces.soap.subscribers, interfaces.rest
+    if service is None or api is None or not api.run.allow_motion or Interface.REST in api.run.unreachable:
         # Then whatever goal the robot has is judged as it comes.
         return
-    bring_to_rest(roaas)
-    robot = Robot(roaas)
+    bring_to_rest(api)
+    robot = Robot(api)
     here = robot.map_pose()
     if here is None:
         return
     id_ = "roaas-soap-goal"
     # A turn on the spot, on which the robot needs no free space.
-    put = goal_body(Pose(here.x, here.y, here.yaw + 2.5), roaas.statement.motion.frame, id_)
+    put = goal_body(Pose(here.x, here.y, here.yaw + 2.5), api.run.statement.motion.frame, id_)
     exchange = robot.put("/robot/navigation/action/goal/", put)
     if exchange.response.status not in {201, 202}:
         return
@@ -102,7 +103,7 @@ def test_goal_is_shown(roaas: Session, judge: Judge) -> None:
             f"the active goal, with goal_id.id {id_!r}",
             found=f"goal_id.id {_goal_id(service)!r}",
         )
-    bring_to_rest(roaas)
+    bring_to_rest(api)
 
 
 def _goal_id(service: SoapService) -> str | None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lxml import etree
 
     from conformance.documents.xsd_shapes import Element
-    from conformance.engine.session import Session
+    from conformance.soap.callable_services import SoapServices
     from conformance.soap.service import SoapService
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
@@ -37,14 +37,6 @@ class _Path:
 
     frames: frozenset[str]
     points: tuple[tuple[float, float], ...]
-
-
-@pytest.fixture
-def subscribers(roaas: Session) -> SoapService:
-    """The robot's subscribers service."""
-    if roaas.subscribers is None:
-        pytest.skip("the robot's subscribers service has no address")
-    return roaas.subscribers
 
 
 def _returned(service: SoapService) -> Element:
@@ -72,17 +64,17 @@ def _path(wrapper: etree._Element, expected: Element) -> tuple[_Path | None, str
     return (_Path(frozenset(frames), whole), "") if whole else (None, "a path without poses")
 
 
-def _here(roaas: Session, service: SoapService) -> Pose | None:
+def _here(soap: SoapServices, service: SoapService) -> Pose | None:
     """Where the robot is in the frame of plans."""
     position = soap_services.position(service)
     if position is None:
         return None
-    return Pose(*position, 0.0).seen_from(Pose(*roaas.statement.motion.odom_to_map))
+    return Pose(*position, 0.0).seen_from(Pose(*soap.run.statement.motion.odom_to_map))
 
 
-def _targets(roaas: Session, here: Pose) -> Iterator[Pose]:
+def _targets(soap: SoapServices, here: Pose) -> Iterator[Pose]:
     """Poses near the robot that it may reach; the last one is where it is."""
-    for goal in roaas.statement.motion.goals:
+    for goal in soap.run.statement.motion.goals:
         yield Pose(*goal)
     for reach in (1.0, 0.5):
         for turn in (0, 45, -45, 90, -90, 135, -135, 180):
@@ -91,23 +83,23 @@ def _targets(roaas: Session, here: Pose) -> Iterator[Pose]:
 
 
 @pytest.mark.requirement(_PLAN, "soap-subscribers/response-valid")
-def test_plan(roaas: Session, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """A path starts at the robot, ends at the asked position within the tolerance, and is in the asked frame."""
     expected = _returned(subscribers)
-    frame = roaas.statement.motion.frame
+    frame = soap.run.statement.motion.frame
     wanted = effort.cases(10)
     planned = 0
-    here = _here(roaas, subscribers)
+    here = _here(soap, subscribers)
     if here is None:
         judge.check(_PLAN, False, None, "a plan", found="GetPose does not say where the robot is")
         return
     answer: SoapResponse | None = None
-    for number, target in enumerate(_targets(roaas, here)):
+    for number, target in enumerate(_targets(soap, here)):
         # Frame and tolerance may be left out: then they are map and 0.1 (contract, REST).
         given = {"frame_id": frame, "tolerance": repr(_TOLERANCE)} if number % 2 or frame != "map" else {}
-        before = _here(roaas, subscribers) or here
+        before = _here(soap, subscribers) or here
         answer = call(subscribers, delivery_messages.request("GetPlan", x=target.x, y=target.y, yaw="0.0", **given))
-        after = _here(roaas, subscribers) or before
+        after = _here(soap, subscribers) or before
         if answer.fault is not None:
             continue
         planned += 1

@@ -17,21 +17,12 @@ if TYPE_CHECKING:
     from lxml import etree
 
     from conformance.documents.xsd_shapes import Element
-    from conformance.engine.session import Session
     from conformance.soap.service import SoapService
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
 _VALID = "soap-subscribers/response-valid"
-
-
-@pytest.fixture
-def subscribers(roaas: Session) -> SoapService:
-    """The robot's subscribers service."""
-    if roaas.subscribers is None:
-        pytest.skip("the robot's subscribers service has no address")
-    return roaas.subscribers
 
 
 def _returned(service: SoapService, operation: str) -> Element:

@@ -23,9 +23,10 @@ from conformance.robot.stopping import bring_to_rest
 from conformance.soap.calls import call
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
+    from conformance.robot.probe.client import RosProbe
+    from conformance.soap.callable_services import SoapServices
     from conformance.soap.service import SoapService
-    from conformance.transport.client import HttpClient
     from conformance.transport.exchange import Exchange
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
@@ -40,17 +41,17 @@ _BAD_PARTS: Final = (
 
 
 @pytest.fixture
-def robot(roaas: Session) -> Robot:
+def robot(api: RestInterface) -> Robot:
     """The robot, at rest."""
-    reason = bring_to_rest(roaas)
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
-    return Robot(roaas)
+    return Robot(api)
 
 
-def _invalid_bodies(session: Session, path: str, valid: dict[str, Any], number: str) -> list[tuple[str, str, bytes]]:
+def _invalid_bodies(api: RestInterface, path: str, valid: dict[str, Any], number: str) -> list[tuple[str, str, bytes]]:
     """Each would move the robot if it were taken: what is wrong with it, media type, body."""
-    put = next(item for item in operations_of(session.contract) if (item.method, item.template) == ("PUT", path))
+    put = next(item for item in operations_of(api.run.contract) if (item.method, item.template) == ("PUT", path))
     made = near_misses(valid, put.bodies[JSON].schema, tuple(number.split(".")))
     return [*((item.name, JSON, item.body) for item in made), ("text/plain", "text/plain", body_of(valid))]
 
@@ -61,7 +62,7 @@ def _put(robot: Robot, path: str, media_type: str, body: bytes) -> Exchange:
 
 @pytest.mark.phase("motion")
 @pytest.mark.requirement("strict-input/velocity-refused")
-def test_an_invalid_velocity_moves_nothing(roaas: Session, robot: Robot, judge: Judge) -> None:
+def test_an_invalid_velocity_moves_nothing(api: RestInterface, robot: Robot, judge: Judge) -> None:
     """A robot at rest stays there, whatever is wrong with what it is sent."""
     fast = Velocity(
         linear_x=0.4 * robot.limits.linear_m_s if robot.actuated(0) else 0.0,
@@ -70,11 +71,11 @@ def test_an_invalid_velocity_moves_nothing(roaas: Session, robot: Robot, judge: 
     drive = Drive(robot)
     sent: list[tuple[str, Exchange]] = []
     for path, valid, number in ((VELOCITY, fast.twist, "linear.x"), (LINEAR, fast.linear, "x")):
-        for what, media_type, body in roaas.effort.subsample(_invalid_bodies(roaas, path, valid, number), 8):
+        for what, media_type, body in api.run.effort.subsample(_invalid_bodies(api, path, valid, number), 8):
             sent.append((f"{path} with {what}", _put(robot, path, media_type, body)))
             velocity, _ = robot.velocity()
             if not _judge_still(robot, judge, velocity, sent):
-                bring_to_rest(roaas)
+                bring_to_rest(api)
                 sent.clear()
     drive.keep(_WATCH_S * robot.watchfulness)
     velocity, _ = drive.look()
@@ -99,12 +100,12 @@ def _judge_still(robot: Robot, judge: Judge, velocity: Velocity | None, sent: li
 
 @pytest.mark.phase("motion")
 @pytest.mark.requirement("strict-input/goal-refused")
-def test_an_invalid_goal_is_not_followed(roaas: Session, robot: Robot, judge: Judge, effort: Effort) -> None:
+def test_an_invalid_goal_is_not_followed(api: RestInterface, robot: Robot, judge: Judge, effort: Effort) -> None:
     """Neither where there is no goal, nor in place of one."""
     frame = robot.statement.motion.frame
     near, other = choose_goals(robot, 1.5, 2)
     number = "goal.target_pose.pose.position.x"
-    bodies = _invalid_bodies(roaas, GOAL_PATH, goal_body(near, frame, "not to be followed"), number)
+    bodies = _invalid_bodies(api, GOAL_PATH, goal_body(near, frame, "not to be followed"), number)
     bodies += [(what, JSON, body_of(body)) for what, body in _invalid_goals(near, frame)]
     bodies = effort.subsample(bodies, 8)
     for what, media_type, body in bodies:
@@ -157,22 +158,25 @@ def _invalid_goals(near: Any, frame: str) -> list[tuple[str, dict[str, Any]]]:
 
 @pytest.mark.phase("delivery")
 @pytest.mark.requirement("strict-input/delivery-refused")
-def test_an_invalid_delivery_reaches_nobody(roaas: Session, rest: HttpClient, judge: Judge) -> None:
+def test_an_invalid_delivery_reaches_nobody(
+    api: RestInterface, soap: SoapServices, probe: RosProbe, judge: Judge
+) -> None:
     """All are refused, and of a batch with a valid one at its end, only that one arrives."""
+    rest = api.client
     observer: DeliveryObserver | None = None
     try:
-        observer = observer_of(roaas)
+        observer = observer_of(api, probe)
         observer.mark()
     except (NoObserverError, ProbeError) as nobody:
         observer = None
         judge.note("strict-input/delivery-refused", f"judged by the answers alone: {nobody}")
     exchanges = []
-    for place, text in roaas.effort.subsample(_BAD_PARTS, 8):
+    for place, text in api.run.effort.subsample(_BAD_PARTS, 8):
         values = list(_CORRECT)
         values[place] = text
         exchanges.append(rest.send("PUT", path_of(*values), fresh=True))
-    if roaas.publishers is not None:
-        exchanges += _invalid_soap(roaas.publishers)
+    if soap.publishers is not None:
+        exchanges += _invalid_soap(soap.publishers)
     for exchange in exchanges:
         status = exchange.response.status
         judge.check("strict-input/delivery-refused", status >= 400, exchange, "a refusal of an invalid delivery")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from conformance.documents.wsdl import Operation
     from conformance.documents.xml_node import Node
     from conformance.documents.xsd_shapes import Element
-    from conformance.engine.session import Session
+    from conformance.soap.callable_services import SoapServices
     from conformance.soap.service import SoapService
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
@@ -66,11 +66,11 @@ def _judged(judge: Judge, mutant: Mutation, answer: SoapResponse) -> bool:
 
 
 @pytest.mark.requirement(*_IDS)
-def test_single_mutations(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_single_mutations(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Every single mutation of a message that the robot takes is refused with a fault."""
-    chance = random.Random(roaas.seed)  # noqa: S311 - choice of cases, not of secrets
+    chance = random.Random(soap.run.seed)  # noqa: S311 - choice of cases, not of secrets
     asked: dict[str, int] = dict.fromkeys(_KINDS, 0)
-    services = askable(roaas, *_IDS)
+    services = askable(soap, *_IDS)
     for service in services:
         found = [
             (declared, mutant) for _, declared, message in _targets(service) for mutant in mutations(declared, message)
@@ -93,9 +93,9 @@ def _nothing(services: list[SoapService], kind: str) -> str:
 
 
 @pytest.mark.requirement(*_IDS)
-def test_mutations_of_any_message(roaas: Session, judge: Judge, explore: Explorer) -> None:
+def test_mutations_of_any_message(soap: SoapServices, judge: Judge, explore: Explorer) -> None:
     """Mutations are refused whatever the other values of the message are."""
-    for service in askable(roaas, *_IDS):
+    for service in askable(soap, *_IDS):
         targets = [
             (declared, _fullest(declared, message)) for _, declared, message in _targets(service) if message.children
         ]

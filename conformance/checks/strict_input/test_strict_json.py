@@ -15,8 +15,8 @@ from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
-    from conformance.engine.session import Session
     from conformance.rest.calls import Call
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
 
@@ -44,24 +44,24 @@ _EACH = 50
 
 
 @pytest.mark.requirement(*_IDS, *_STATUSES, "http/problem-detail", "http/problem-value", "http/no-server-error")
-def test_mutations_are_refused(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort) -> None:
     """Each named mutation of a valid body is refused with 4xx, and the next valid one is taken as before."""
     possible: set[str] = set()
-    for operation in applicable_operations(roaas, (*_IDS, *_STATUSES), lambda item: JSON in item.bodies, "takes JSON"):
-        stop_robot(roaas)
-        call = example_call(roaas, operation)
+    for operation in applicable_operations(api, (*_IDS, *_STATUSES), lambda item: JSON in item.bodies, "takes JSON"):
+        stop_robot(api)
+        call = example_call(api, operation)
         by_name = _by_requirement(call, operation)
         possible |= {name for name, made in by_name.items() if made}
-        first = call.send(roaas)
+        first = call.send(api)
         if not _accepted(first.response.status):
             _say_unjudged(judge, operation, first.came)
             continue
         for name, made in by_name.items():
-            drawn = effort.draw(made, _count(effort, name), f"{roaas.seed}/{operation.id} {name}")
+            drawn = effort.draw(made, _count(effort, name), f"{api.run.seed}/{operation.id} {name}")
             for item in effort.subsample(drawn, 1):
-                _try(roaas, judge, call, item)
-        stop_robot(roaas)
-        again = call.send(roaas)
+                _try(api, judge, call, item)
+        stop_robot(api)
+        again = call.send(api)
         judge.check(
             "http/no-server-error",
             _accepted(again.response.status),
@@ -69,7 +69,7 @@ def test_mutations_are_refused(roaas: Session, judge: Judge, effort: Effort) -> 
             f"a valid {operation.id} taken after all that was refused",
             found=again.came,
         )
-    stop_robot(roaas)
+    stop_robot(api)
     for name in _NAMES if possible else ():
         if name not in possible:
             judge.unclaimed(f"strict-input/{name}", "no body of the contract can be wrong in this way")
@@ -98,12 +98,12 @@ def _by_requirement(call: Call, operation: Operation) -> dict[str, list[Mutation
     return by_name
 
 
-def _try(session: Session, judge: Judge, call: Call, item: Mutation) -> None:
+def _try(api: RestInterface, judge: Judge, call: Call, item: Mutation) -> None:
     requirement = f"strict-input/{item.requirement}"
     judge.at_risk = (requirement,)
     refused = judge_refusal(
-        session,
-        partial(call.carrying(item.body).send, session, fresh=requirement in _HOSTILE),
+        api,
+        partial(call.carrying(item.body).send, api, fresh=requirement in _HOSTILE),
         requirement,
         f"{item.name}",
         field=item.field,
@@ -112,4 +112,4 @@ def _try(session: Session, judge: Judge, call: Call, item: Mutation) -> None:
         closing=item.requirement == "json-depth",
     )
     if not refused:
-        stop_robot(session)
+        stop_robot(api)

@@ -14,7 +14,7 @@ from conformance.rest.xml_mutations import xml_mutations
 from conformance.robot.stopping import stop_robot
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from conformance.rest.interface import RestInterface
     from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
@@ -23,14 +23,14 @@ _EACH = 80
 
 
 @pytest.mark.requirement(_ID, "http/no-server-error")
-def test_xml_mutations_are_refused(roaas: Session, judge: Judge) -> None:
+def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
     """Each named mutation of a valid XML body is refused with 4xx."""
     taken = 0
-    operations = applicable_operations(roaas, [_ID], lambda item: XML in item.bodies, "takes XML")
+    operations = applicable_operations(api, [_ID], lambda item: XML in item.bodies, "takes XML")
     for operation in operations:
-        stop_robot(roaas)
-        call = example_call(roaas, operation, XML)
-        exchange = call.send(roaas)
+        stop_robot(api)
+        call = example_call(api, operation, XML)
+        exchange = call.send(api)
         answer = exchange.response
         if not (answer.ok or answer.status == 409):
             judge.note(_ID, f"a valid {operation.id} as XML is answered {exchange.came}, so nothing was made of it")
@@ -38,10 +38,12 @@ def test_xml_mutations_are_refused(roaas: Session, judge: Judge) -> None:
         taken += 1
         schema = operation.bodies[XML].schema
         made = xml_mutations(call.value, schema, root_name(schema) or "value")
-        for name, body in roaas.effort.subsample(roaas.effort.draw(made, _EACH, f"{roaas.seed}/{operation.id}"), 3):
+        for name, body in api.run.effort.subsample(
+            api.run.effort.draw(made, _EACH, f"{api.run.seed}/{operation.id}"), 3
+        ):
             wrong = call.carrying(body)
-            if not judge_refusal(roaas, partial(wrong.send, roaas), _ID, name, json=False):
-                stop_robot(roaas)
-    stop_robot(roaas)
-    if not taken and "rest-formats" not in roaas.claims:
+            if not judge_refusal(api, partial(wrong.send, api), _ID, name, json=False):
+                stop_robot(api)
+    stop_robot(api)
+    if not taken and "rest-formats" not in api.run.claims:
         judge.unclaimed(_ID, "the robot takes no XML")

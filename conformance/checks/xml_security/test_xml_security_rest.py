@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.contract.interfaces import Interface
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
 from conformance.documents.xml_node import Node
 from conformance.soap.attack_runner import AttackRunner, judge_calls, outcome
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
 
     from lxml import etree
 
-    from conformance.engine.session import Session
+    from conformance.contract.files import Contract
+    from conformance.rest.interface import RestInterface
+    from conformance.robot.interfaces import Interfaces
     from conformance.transport.exchange import Attempt, Exchange
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
@@ -37,9 +40,9 @@ _HALF = 0.5
 _NOT_HERE = frozenset({"no-callback"})
 
 
-def _targets(roaas: Session) -> Iterator[tuple[str, str]]:
+def _targets(contract: Contract) -> Iterator[tuple[str, str]]:
     """Method and path of each operation that takes XML, as far as its path needs no values."""
-    for path, operations in roaas.contract.openapi.get("paths", {}).items():
+    for path, operations in contract.openapi.get("paths", {}).items():
         if "{" in path or not isinstance(operations, dict):
             continue
         for method in _BODIES:
@@ -78,21 +81,21 @@ def _node(element: etree._Element, value: list[str]) -> Node:
 
 @pytest.mark.motion
 @pytest.mark.requirement(_REST, "xml-security/responsive", "xml-security/no-callback")
-def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_attacks(interfaces: Interfaces, judge: Judge, effort: Effort) -> None:
     """Each attack in the body of each operation that takes XML; a robot that takes none refuses them all."""
-    rest = roaas.rest
-    targets = list(_targets(roaas))
-    if rest is None or not targets:
+    api, soap = interfaces.rest, interfaces.soap
+    targets = list(_targets(soap.run.contract))
+    if api is None or not targets:
         judge.unclaimed(_REST, "there is no REST interface that takes XML")
         return
-    if "rest" in roaas.unreachable:
-        pytest.skip(f"the robot's REST interface does not answer: {roaas.unreachable['rest']}")
-    alone = roaas.publishers is None and roaas.subscribers is None
+    if Interface.REST in api.run.unreachable:
+        pytest.skip(f"the robot's REST interface does not answer: {api.run.unreachable[Interface.REST]}")
+    rest, alone = api.client, not soap.there
     quick = effort.factor < _HALF
     with CallbackServer(rest.host, rest.port) as callbacks:
         runners = []
         for number, (method, path) in enumerate(targets[:1] if quick else targets):
-            runner = _runner(roaas, rest, method, path, alone=alone)
+            runner = _runner(api, method, path, alone=alone)
             runners.append(runner)
             for attack in attacks(_template(rest, path), callbacks.url, 1 if quick else _EACH, f"rest{number}"):
                 if runner.ids(attack):
@@ -100,7 +103,9 @@ def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
         judge_calls(judge, callbacks, runners)
 
 
-def _runner(roaas: Session, rest: HttpClient, method: str, path: str, *, alone: bool) -> AttackRunner:
+def _runner(api: RestInterface, method: str, path: str, *, alone: bool) -> AttackRunner:
+    rest = api.client
+
     def send(attack: Attack) -> Attempt:
         apart = HttpClient(rest.base_url, rest.connection)
         headers = (("Content-Type", _XML), ("Accept", "*/*"), *attack.headers)
@@ -117,9 +122,9 @@ def _runner(roaas: Session, rest: HttpClient, method: str, path: str, *, alone: 
 
     def ids(attack: Attack) -> tuple[str, ...]:
         own = f"xml-security/{attack.name}"
-        ledger = roaas.contract.ledger
+        ledger = api.run.contract.ledger
         must = own in ledger and ledger[own].level == "MUST" and attack.name not in _NOT_HERE
         return (*((own,) if alone else ()), *((_REST,) if must else ()))
 
     times = [ask().response.elapsed_ms for _ in range(5)]
-    return AttackRunner(roaas.judge, send, ask, statistics.median(times), ids)
+    return AttackRunner(api.run.judge, send, ask, statistics.median(times), ids)

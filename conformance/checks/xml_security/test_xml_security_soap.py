@@ -21,7 +21,7 @@ from conformance.soap.valid_messages import example
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from conformance.engine.session import Session
+    from conformance.soap.callable_services import SoapServices
     from conformance.soap.service import SoapService
     from conformance.transport.exchange import Attempt, Exchange
     from conformance.verdict.effort import Effort
@@ -87,17 +87,17 @@ def _runner(judge: Judge, service: SoapService, message: Node) -> AttackRunner:
     return AttackRunner(judge, send, ask, statistics.median(times))
 
 
-def _no_soap(roaas: Session) -> bool:
+def _no_soap(soap: SoapServices) -> bool:
     """Whether the robot has no SOAP service at all: then the class is judged over REST alone."""
-    return roaas.publishers is None and roaas.subscribers is None
+    return not soap.there
 
 
 @pytest.mark.requirement(*_IDS)
-def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Each attack in a message that the robot would take without it, in the Body and in a Header block."""
-    if _no_soap(roaas):
+    if _no_soap(soap):
         return
-    services = askable(roaas, *_IDS)
+    services = askable(soap, *_IDS)
     with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
         runners = []
         for service in services:
@@ -118,14 +118,14 @@ def test_attacks(roaas: Session, judge: Judge, effort: Effort) -> None:
 
 
 @pytest.mark.requirement("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
-def test_addressing(roaas: Session, judge: Judge, effort: Effort) -> None:
+def test_addressing(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Addresses in WS-Addressing headers are not called, whichever header names them."""
     ids = ("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
-    if _no_soap(roaas):
+    if _no_soap(soap):
         for id_ in (ids[0], "xml-security/soapaction-spoofing"):
             judge.unclaimed(id_, "the robot has no SOAP service")
         return
-    services = askable(roaas, *ids)
+    services = askable(soap, *ids)
     with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
         runners = []
         for service in services:

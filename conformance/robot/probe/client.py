@@ -17,7 +17,6 @@ from conformance.robot.robot import Velocity
 
 if TYPE_CHECKING:
     from conformance.contract.statement import Ros
-    from conformance.engine.session import Session
 
 # Importing rclpy and finding the robot on the graph takes seconds on a small machine, s.
 _START_S: Final = 20.0
@@ -138,38 +137,49 @@ class Probe:
         return answer
 
 
-# One probe for each run, by the identity of its session, which is kept with it; or why it cannot be used.
-_PROBES: dict[int, tuple[Session, Probe | ProbeError]] = {}
-_SEEING: set[int] = set()
+class RosProbe:
+    """The probe of one run: started before it is needed, as finding a robot may take seconds, and waited for then.
 
-
-def start_probe(session: Session) -> None:
-    """Start the run's probe, where a domain is given, without waiting for it: finding a robot may take seconds."""
-    if session.statement.ros.domain_id is None or id(session) in _PROBES:
-        return
-    try:
-        _PROBES[id(session)] = (session, Probe(session.statement.ros))
-    except ProbeError as error:
-        _PROBES[id(session)] = (session, error)
-
-
-def probe_of(session: Session) -> Probe:
-    """The run's probe.
-
-    Raises:
-        ProbeError: no domain is given, or it cannot be used.
+    Args:
+        ros: the robot's ROS side, which may have no domain.
     """
-    if session.statement.ros.domain_id is None:
-        raise ProbeError("no ROS domain is given (--ros-domain-id)")
-    start_probe(session)
-    _, probe = _PROBES[id(session)]
-    if isinstance(probe, ProbeError):
-        raise probe
-    if id(session) not in _SEEING:
+
+    def __init__(self, ros: Ros) -> None:
+        self._ros = ros
+        self._probe: Probe | None = None
+        self._problem: ProbeError | None = None
+        self._sees_robot = False
+
+    def start(self) -> None:
+        """Start it, where a domain is given, without waiting for it."""
+        if self._ros.domain_id is None or self._probe is not None or self._problem is not None:
+            return
         try:
-            probe.await_robot()
+            self._probe = Probe(self._ros)
         except ProbeError as error:
-            _PROBES[id(session)] = (session, error)
-            raise
-        _SEEING.add(id(session))
-    return probe
+            self._problem = error
+
+    def ready(self) -> Probe:
+        """The probe, once it sees the robot.
+
+        Raises:
+            ProbeError: no domain is given, or it cannot be used.
+        """
+        self.start()
+        if self._problem is not None:
+            raise self._problem
+        if self._probe is None:
+            raise ProbeError("no ROS domain is given (--ros-domain-id)")
+        if not self._sees_robot:
+            try:
+                self._probe.await_robot()
+            except ProbeError as error:
+                self._problem = error
+                raise
+            self._sees_robot = True
+        return self._probe
+
+    def close(self) -> None:
+        """End it."""
+        if self._probe is not None:
+            self._probe.close()

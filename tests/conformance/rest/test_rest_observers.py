@@ -6,10 +6,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from conformance.engine.session import Session
-from conformance.rest.observers import Observer, watch
-from conformance.transport.client import HttpClient
+from conformance.rest.interface import RestInterface
+from conformance.rest.observers import Observer
+from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
+from conformance.verdict.run import Run
 
 BASE = "http://robot:7003/r2"
 TWIST = {part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")}
@@ -21,15 +22,14 @@ PROBLEM = ("Content-Type", "application/problem+json")
 
 def seen(method, path, status, headers=(), body=b"", *, sent=(("Accept", "*/*"),), content=b"", raw=None, problem=""):
     """Requirements that an observer finds not met in one exchange."""
-    session = Session()
-    session.rest = HttpClient(BASE, session.connection)
+    api = RestInterface(Run(), HttpClient(BASE, Connection()))
     request = Request(method, BASE + path, (("Host", "robot:7003"), *sent), content, raw)
     if status is None:
         kind = NoAnswer.CLOSED if "closed" in problem else NoAnswer.MALFORMED
-        Observer(session).unanswered(Unanswered(request, problem, kind))
+        Observer(api).unanswered(Unanswered(request, problem, kind))
     else:
-        Observer(session).answered(Exchange(request, Response(status, tuple(headers), body, 1.0)))
-    return set(session.judge.refuted())
+        Observer(api).answered(Exchange(request, Response(status, tuple(headers), body, 1.0)))
+    return set(api.run.judge.refuted())
 
 
 def test_good_answers_raise_no_alarm():
@@ -49,10 +49,9 @@ def test_good_answers_raise_no_alarm():
 
 
 def test_what_went_elsewhere_is_nobody_s_affair():
-    session = Session()
-    session.rest = HttpClient(BASE, session.connection)
-    Observer(session).answered(Exchange(Request("GET", "http://robot:7003/r2d2/x"), Response(500, (), b"", 1.0)))
-    assert not session.judge.refuted()
+    api = RestInterface(Run(), HttpClient(BASE, Connection()))
+    Observer(api).answered(Exchange(Request("GET", "http://robot:7003/r2d2/x"), Response(500, (), b"", 1.0)))
+    assert not api.run.judge.refuted()
 
 
 @pytest.mark.parametrize(
@@ -122,13 +121,6 @@ def test_formats_are_read_as_what_they_say_they_are():
 def test_garbage_is_bad_framing():
     found = seen("GET", "/robot/pose/", None, problem="the answer is no HTTP: illegal status line")
     assert found == {"http/framing"}
-
-
-def test_watching_twice_is_watching_once():
-    session = Session()
-    watch(session)
-    watch(session)
-    assert len(session.connection.listeners) == 1
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))

@@ -7,10 +7,11 @@ import pytest
 
 from conformance.contract.limits import DeclaredLimits
 from conformance.contract.statement import Statement
-from conformance.engine.session import Session
-from conformance.robot.observer import observe
-from conformance.transport.client import HttpClient
+from conformance.rest.interface import RestInterface
+from conformance.robot.observer import Observer
+from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003/r2d2"
 _ZERO = dict.fromkeys("xyz", 0.0)
@@ -28,39 +29,37 @@ def odometry(second: int = 1, **orientation: float) -> dict:
     }
 
 
+def opened(statement: Statement) -> RestInterface:
+    api = RestInterface(Run(statement=statement), HttpClient(_BASE + "/", Connection()))
+    api.client.connection.listeners.append(Observer(api))
+    return api
+
+
 @pytest.fixture
-def session() -> Session:
-    made = Session(statement=Statement(declared=DeclaredLimits(linear_m_s=0.5, angular_rad_s=2.0)))
-    made.rest = HttpClient(_BASE + "/", made.connection)
-    observe(made)
-    observe(made)
-    return made
+def api() -> RestInterface:
+    return opened(Statement(declared=DeclaredLimits(linear_m_s=0.5, angular_rad_s=2.0)))
 
 
-def see(session: Session, path: str, value: object, *, status: int = 200, headers=(("Accept", "*/*"),), method="GET"):
+def see(api: RestInterface, path: str, value: object, *, status: int = 200, headers=(("Accept", "*/*"),), method="GET"):
     body = value if isinstance(value, bytes) else json.dumps(value).encode()
     request = Request(method, _BASE + path, (("Host", "robot:7003"), *headers))
     exchange = Exchange(request, Response(status, (("Content-Type", "application/json"),), body, 0.0))
-    for listener in session.connection.listeners:
+    for listener in api.client.connection.listeners:
         listener.answered(exchange)
 
 
-def found(session: Session) -> set[str]:
-    return set(session.judge.refuted())
+def found(api: RestInterface) -> set[str]:
+    return set(api.run.judge.refuted())
 
 
-def test_a_run_has_one_observer(session):
-    assert len(session.connection.listeners) == 1
-
-
-def test_good_readings_are_cases(session):
+def test_good_readings_are_cases(api):
     for second in (1, 1, 2):
-        see(session, "/robot/pose/", odometry(second))
-    see(session, "/robot/velocity/", {"linear": _ZERO, "angular": _ZERO, "unit": "m/s"})
-    see(session, "/robot/velocity/linear/", _ZERO)
-    assert not found(session)
-    assert session.judge.evidence["rest-resources/pose-type"].cases == 3
-    assert session.judge.evidence["rest-resources/linear-type"].cases == 1
+        see(api, "/robot/pose/", odometry(second))
+    see(api, "/robot/velocity/", {"linear": _ZERO, "angular": _ZERO, "unit": "m/s"})
+    see(api, "/robot/velocity/linear/", _ZERO)
+    assert not found(api)
+    assert api.run.judge.evidence["rest-resources/pose-type"].cases == 3
+    assert api.run.judge.evidence["rest-resources/linear-type"].cases == 1
 
 
 @pytest.mark.parametrize(
@@ -78,20 +77,20 @@ def test_good_readings_are_cases(session):
         ("/robot/velocity/linear/", _ZERO | {"y": 1.0}, "safety/limits-hold"),
     ],
 )
-def test_one_bad_reading_among_good_ones_is_found(session, path, value, requirement):
-    see(session, "/robot/pose/", odometry(5))
-    see(session, path, value)
-    assert found(session) == {requirement}
+def test_one_bad_reading_among_good_ones_is_found(api, path, value, requirement):
+    see(api, "/robot/pose/", odometry(5))
+    see(api, path, value)
+    assert found(api) == {requirement}
 
 
-def test_an_error_is_no_reading(session):
-    see(session, "/robot/velocity/", {}, status=500)
-    assert found(session) == {"rest-resources/velocity-type"}
+def test_an_error_is_no_reading(api):
+    see(api, "/robot/velocity/", {}, status=500)
+    assert found(api) == {"rest-resources/velocity-type"}
 
 
-def test_before_the_first_odometry_retry_after_is_asked_for(session):
-    see(session, "/robot/pose/", {}, status=503)
-    assert found(session) == {"rest-resources/pose-unavailable"}
+def test_before_the_first_odometry_retry_after_is_asked_for(api):
+    see(api, "/robot/pose/", {}, status=503)
+    assert found(api) == {"rest-resources/pose-unavailable"}
 
 
 @pytest.mark.parametrize(
@@ -103,29 +102,27 @@ def test_before_the_first_odometry_retry_after_is_asked_for(session):
         {"status": 429},
     ],
 )
-def test_odd_requests_are_left_to_others(session, odd):
-    see(session, "/robot/pose/", b"", **odd)
-    assert not found(session)
+def test_odd_requests_are_left_to_others(api, odd):
+    see(api, "/robot/pose/", b"", **odd)
+    assert not found(api)
 
 
-def test_without_the_token_nothing_is_judged(session):
-    session.connection = replace(session.connection, token="secret")  # noqa: S106 - no secret
-    see(session, "/robot/pose/", b"", status=401)
-    assert not found(session)
+def test_without_the_token_nothing_is_judged(api):
+    api.client.connection = replace(api.client.connection, token="secret")  # noqa: S106 - no secret
+    see(api, "/robot/pose/", b"", status=401)
+    assert not found(api)
 
 
 def test_undeclared_limits_are_not_known():
-    session = Session()
-    session.rest = HttpClient(_BASE, session.connection)
-    observe(session)
-    see(session, "/robot/velocity/", {"linear": _ZERO | {"x": 3.0}, "angular": _ZERO})
-    assert not found(session)
+    api = opened(Statement())
+    see(api, "/robot/velocity/", {"linear": _ZERO | {"x": 3.0}, "angular": _ZERO})
+    assert not found(api)
 
 
-def test_a_limit_declared_as_high_as_one_that_nobody_declared_is_judged(session):
+def test_a_limit_declared_as_high_as_one_that_nobody_declared_is_judged(api):
     undeclared = Statement().limits
     declared = DeclaredLimits(linear_m_s=undeclared.linear_m_s)
-    session.statement = Statement(declared=declared)
+    api.run.statement = Statement(declared=declared)
     fast = _ZERO | {"x": 2 * undeclared.linear_m_s}
-    see(session, "/robot/velocity/", {"linear": fast, "angular": _ZERO | {"z": 9.0}})
-    assert found(session) == {"safety/limits-hold"}
+    see(api, "/robot/velocity/", {"linear": fast, "angular": _ZERO | {"z": 9.0}})
+    assert found(api) == {"safety/limits-hold"}

@@ -8,10 +8,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from conformance.engine.session import Session
+from conformance.rest.interface import RestInterface
 from conformance.robot.stopping import bring_to_rest, leave_at_rest
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Listener
+from conformance.verdict.run import Run
 
 _STILL = {part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")}
 
@@ -78,40 +79,38 @@ def serving(body: Body):
     server.server_close()
 
 
-def session(url: str, *, motion: bool = True, timeout_s: float = 10.0) -> Session:
-    made = Session(allow_motion=motion, connection=Connection(timeout_s=timeout_s))
-    made.rest = HttpClient(url, made.connection)
-    return made
+def api(url: str, *, motion: bool = True, timeout_s: float = 10.0) -> RestInterface:
+    return RestInterface(Run(allow_motion=motion), HttpClient(url, Connection(timeout_s=timeout_s)))
 
 
 @pytest.mark.parametrize(("goals", "speed"), [(0, 0.0), (1, 0.3), (5, 0.3)])
 def test_a_robot_is_cancelled_until_it_has_no_goal_and_stands(goals, speed):
     body = Body(goals, speed)
     with serving(body) as url:
-        assert bring_to_rest(session(url)) == ""
+        assert bring_to_rest(api(url)) == ""
     assert (body.goals, body.speed) == (0, 0.0)
 
 
 def test_a_robot_that_does_not_cancel_is_not_at_rest():
     with serving(Body(1, 0.3, obeys=False)) as url:
-        assert bring_to_rest(session(url)).startswith("its goal is still active")
+        assert bring_to_rest(api(url)).startswith("its goal is still active")
 
 
 def test_a_robot_that_does_not_stop_is_not_at_rest():
     with serving(Body(0, 0.3, obeys=False)) as url:
-        made = session(url)
+        made = api(url)
         assert bring_to_rest(made) == "it still moves with 0.3 m/s or rad/s"
 
 
 def test_a_robot_that_is_not_there_raises_nothing(closed_port):
     started = time.monotonic()
-    assert "its velocity cannot be read" in bring_to_rest(session(closed_port))
-    leave_at_rest(session(closed_port))
+    assert "its velocity cannot be read" in bring_to_rest(api(closed_port))
+    leave_at_rest(api(closed_port))
     assert time.monotonic() - started < 5
 
 
 def test_leaving_a_robot_that_hangs_takes_a_few_seconds(listening):
-    made = session(listening(lambda connection: connection.recv(1) and time.sleep(30)), timeout_s=60)
+    made = api(listening(lambda connection: connection.recv(1) and time.sleep(30)), timeout_s=60)
     started = time.monotonic()
     leave_at_rest(made)
     assert time.monotonic() - started < 10
@@ -120,15 +119,15 @@ def test_leaving_a_robot_that_hangs_takes_a_few_seconds(listening):
 def test_a_robot_that_may_not_be_moved_is_sent_nothing():
     body = Body(1, 0.3)
     with serving(body) as url:
-        leave_at_rest(session(url, motion=False))
+        leave_at_rest(api(url, motion=False))
     assert body.asked == []
 
 
 def test_leaving_judges_nothing_and_stops_the_robot():
     body = Body(2, 0.3)
     with serving(body) as url:
-        made = session(url)
+        made = api(url)
         heard = Heard()
-        made.connection.listeners.append(heard)
+        made.client.connection.listeners.append(heard)
         leave_at_rest(made)
     assert (body.goals, body.speed, heard.exchanges) == (0, 0.0, [])

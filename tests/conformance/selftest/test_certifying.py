@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from conformance.contract.files import Contract, ContractError
-from conformance.selftest.certifying import Job, Outcome, run_job, session_of
+from conformance.selftest.certifying import Job, Outcome, robot_of, run_job
 from conformance.selftest.robots import statement_of
 
 
@@ -14,20 +14,20 @@ def job(rest="http://127.0.0.1:9", **more):
 
 
 def test_a_job_says_where_the_robot_is_and_what_is_claimed(tmp_path):
-    session = session_of(job(classes=("http",), token=tmp_path.name, endpoints={"request_rate": 5.0}, seed=7), tmp_path)
-    where = session.statement.endpoints
+    robot = robot_of(job(classes=("http",), token=tmp_path.name, endpoints={"request_rate": 5.0}, seed=7), tmp_path)
+    where = robot.run.statement.endpoints
     assert (where.rest, where.publishers_wsdl, where.request_rate) == (
         "http://127.0.0.1:9",
         "http://127.0.0.1:9/p?wsdl",
         5.0,
     )
     assert Path(where.token_file).read_text() == tmp_path.name
-    assert (session.claims, session.seed, session.statement.ros.domain_id) == (("http",), 7, None)
+    assert (robot.run.claims, robot.run.seed, robot.run.statement.ros.domain_id) == (("http",), 7, None)
 
 
 def test_a_job_judges_by_its_requirements_alone(tmp_path):
-    assert list(session_of(job(requirements=("http/date",)), tmp_path).contract.ledger) == ["http/date"]
-    assert len(session_of(job(), tmp_path).contract.ledger) > 200
+    assert list(robot_of(job(requirements=("http/date",)), tmp_path).run.contract.ledger) == ["http/date"]
+    assert len(robot_of(job(), tmp_path).run.contract.ledger) > 200
 
 
 def test_a_requirement_that_is_not_there_is_an_error():

@@ -9,52 +9,57 @@ from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.evidence import RefutedError
 
 if TYPE_CHECKING:
-    from conformance.engine.session import Session
+    from collections.abc import Callable
+
+    from conformance.verdict.run import Run
 
 
-def settle(session: Session, ids: tuple[str, ...], judged: dict[str, int], error: Exception) -> None:
+def record_exception(
+    run: Run, alive: Callable[[], bool], ids: tuple[str, ...], judged: dict[str, int], error: Exception
+) -> None:
     """Put down what an exception that ended a check says of the requirements that it was to judge.
 
     Args:
-        session: the run.
+        run: the run.
+        alive: whether the robot answers at all, asked anew.
         ids: the check's requirements.
         judged: how many cases each of them had before the check.
         error: what ended it.
     """
     if isinstance(error, RefutedError):
         return
-    known = [id_ for id_ in ids if id_ in session.judge.evidence]
-    now = session.judge.counts(known)
+    known = [id_ for id_ in ids if id_ in run.judge.evidence]
+    now = run.judge.counts(known)
     # Those that the check had not come to; when it had come to all, the one that it is named for.
     open_ids = [id_ for id_ in known if now[id_] == judged[id_]] or known[:1]
     if isinstance(error, NoAnswerError):
-        _no_answer(session, known, open_ids, error)
+        _no_answer(run, alive, known, open_ids, error)
         return
     where = traceback.extract_tb(error.__traceback__)[-1]
     for id_ in open_ids:
-        session.judge.error(
+        run.judge.error(
             id_, f"the suite could not judge this: {type(error).__name__}: {error} ({where.name}, line {where.lineno})"
         )
 
 
-def _no_answer(session: Session, known: list[str], open_ids: list[str], error: NoAnswerError) -> None:
-    if session.alive():
+def _no_answer(
+    run: Run, alive: Callable[[], bool], known: list[str], open_ids: list[str], error: NoAnswerError
+) -> None:
+    if alive():
         for id_ in open_ids:
-            session.judge.check(id_, False, error.unanswered, "an answer")  # noqa: FBT003 - the condition of check()
+            run.judge.check(id_, False, error.unanswered, "an answer")  # noqa: FBT003 - the condition of check()
         return
     request = error.unanswered.request
-    risked = [id_ for id_ in known if id_ in session.judge.at_risk]
+    risked = [id_ for id_ in known if id_ in run.judge.at_risk]
     for id_ in risked:
-        session.judge.check(
+        run.judge.check(
             id_,
             False,  # noqa: FBT003 - the condition of check()
             error.unanswered,
             "a robot that still answers after this request",
             found=f"{error.unanswered.problem}, and no answer to anything since",
         )
-    session.aborted = (
-        f"the robot stopped answering ({error.unanswered.problem}, at {request.method} {request.url[:200]})"
-    )
+    run.aborted = f"the robot stopped answering ({error.unanswered.problem}, at {request.method} {request.url[:200]})"
     for id_ in open_ids:
         if id_ not in risked:
-            session.judge.error(id_, session.aborted)
+            run.judge.error(id_, run.aborted)

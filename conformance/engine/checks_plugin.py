@@ -1,0 +1,218 @@
+"""How pytest runs the checks on one robot: which of them, in which order, with which fixtures, and what comes of each.
+
+One object, given to pytest, is all that connects a run with its checks.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from conformance.contract.interfaces import Interface
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+
+    from conformance.contract.statement import Statement
+    from conformance.engine.robot_under_test import RobotUnderTest
+    from conformance.rest.interface import RestInterface
+    from conformance.robot.interfaces import Interfaces
+    from conformance.soap.callable_services import SoapServices
+    from conformance.soap.service import SoapService
+    from conformance.transport.client import Connection, HttpClient
+    from conformance.verdict.effort import Effort
+    from conformance.verdict.evidence import Judge
+    from conformance.verdict.explorer import Explorer
+    from conformance.verdict.run import Run
+
+# Reading first; then what needs a robot at rest; deliveries late, because a robot drives long after them; attacks last.
+PHASES = ("reach", "reading", "describe", "motion", "input", "delivery", "attack")
+
+
+def ids_of(item: pytest.Item) -> tuple[str, ...]:
+    """The requirements that a check judges; empty for a test that is no check."""
+    return tuple(id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
+
+
+def _turn(item: pytest.Item) -> tuple[int, str]:
+    """When a check's turn comes: by its phase, then by its module's name, whichever folder that is in."""
+    mark = item.get_closest_marker("phase")
+    return PHASES.index(mark.args[0]) if mark else 0, item.path.name
+
+
+class ChecksPlugin:
+    """A pytest plugin for one run.
+
+    Args:
+        connect: gives the robot, connected; called once, and only when there is a check to run.
+    """
+
+    def __init__(self, connect: Callable[[], RobotUnderTest]) -> None:
+        self._connect = connect
+        self._connected: RobotUnderTest | None = None
+
+    def _robot(self) -> RobotUnderTest:
+        if self._connected is None:
+            self._connected = self._connect()
+        return self._connected
+
+    def pytest_configure(self, config: pytest.Config) -> None:
+        """Register the markers."""
+        config.addinivalue_line("markers", "requirement(*ids): the requirements that a check judges")
+        config.addinivalue_line("markers", "phase(name): when in a run a check's turn comes")
+        config.addinivalue_line("markers", "motion: the check moves the robot")
+        config.addinivalue_line("markers", "needs(*interfaces): rest, publishers, subscribers")
+
+    def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
+        """Keep the checks that judge something claimed, in the order of their phases."""
+        if not any(ids_of(item) for item in items):
+            return
+        run = self._robot().run
+        ledger = run.contract.ledger
+        kept: list[pytest.Item] = []
+        dropped: list[pytest.Item] = []
+        for item in items:
+            ids = ids_of(item)
+            wanted = not ids or any(id_ in ledger and ledger[id_].class_ in run.claims for id_ in ids)
+            (kept if wanted else dropped).append(item)
+        config.hook.pytest_deselected(items=dropped)
+        items[:] = sorted(kept, key=_turn)
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup(self, item: pytest.Item) -> None:
+        """Skip what cannot be judged in this run; the reason goes into the verdict."""
+        if not ids_of(item):
+            return
+        run = self._robot().run
+        run.judge.check_name = item.nodeid.rsplit("/", 1)[-1]
+        run.judge.at_risk = ()
+        if run.aborted:
+            pytest.skip(run.aborted)
+        if item.get_closest_marker("motion") and not run.allow_motion:
+            pytest.skip("it moves the robot, and --allow-motion was not given")
+        for mark in item.iter_markers("needs"):
+            for name in mark.args:
+                self._need(Interface(name), ids_of(item))
+
+    def _need(self, name: Interface, ids: tuple[str, ...]) -> None:
+        """Skip for want of an interface; a vendor who named no classes has not claimed what needs it."""
+        run = self._robot().run
+        if not self._robot().has(name):
+            reason = f"the robot's {name} interface has no address"
+            for id_ in ids if run.statement.claims is None else ():
+                run.judge.unclaimed(id_, reason)
+            pytest.skip(reason)
+        if name in run.unreachable:
+            pytest.skip(f"the robot's {name} interface does not answer: {run.unreachable[name]}")
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Generator[None, object, object]:
+        """Run a check, and turn what it raises into evidence."""
+        ids = ids_of(item)
+        if not ids:
+            return (yield)
+        # Imported late: the plugin is loaded in every pytest run where the suite is installed.
+        from conformance.engine.record_exception import record_exception  # noqa: PLC0415
+
+        robot = self._robot()
+        judge = robot.run.judge
+        refuted, judged = judge.refuted(), judge.counts(ids)
+        try:
+            result: object = yield
+        except Exception as error:  # noqa: BLE001 - whatever a robot makes of a check has to become a verdict
+            record_exception(robot.run, robot.alive, ids, judged, error)
+            result = None
+        ours = {id_: count for id_, count in judge.refuted().items() if count > refuted.get(id_, 0)}
+        musts = [id_ for id_ in ours if robot.run.contract.ledger[id_].level == "MUST"]
+        if musts:
+            pytest.fail("\n".join(judge.told(id_) for id_ in musts), pytrace=False)
+        return result
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
+        """Put a skip's reason down as evidence."""
+        report: pytest.TestReport = yield
+        ids = ids_of(item)
+        if ids and report.skipped and call.excinfo is not None:
+            run = self._robot().run
+            reason = str(getattr(call.excinfo.value, "msg", call.excinfo.value))
+            say = run.judge.error if run.aborted else run.judge.skip
+            for id_ in ids:
+                say(id_, reason)
+        return report
+
+    def pytest_sessionfinish(self) -> None:
+        """Leave the robot at rest, whatever happened, Ctrl-C included."""
+        if self._connected is not None and self._connected.rest is not None:
+            from conformance.robot.stopping import leave_at_rest  # noqa: PLC0415 - as above
+
+            leave_at_rest(self._connected.rest)
+
+    @pytest.fixture(scope="session")
+    def run(self) -> Run:
+        """What is judged, by what, and what has been found."""
+        return self._robot().run
+
+    @pytest.fixture(scope="session")
+    def connection(self) -> Connection:
+        """What all clients of the run share."""
+        return self._robot().connection
+
+    @pytest.fixture(scope="session")
+    def interfaces(self) -> Interfaces:
+        """All of the robot's interfaces, each of which may be missing."""
+        return self._robot().interfaces
+
+    @pytest.fixture
+    def judge(self, run: Run) -> Judge:
+        """Takes what a check sees."""
+        return run.judge
+
+    @pytest.fixture
+    def statement(self, run: Run) -> Statement:
+        """What the vendor says of the robot."""
+        return run.statement
+
+    @pytest.fixture
+    def effort(self, run: Run) -> Effort:
+        """How much to try."""
+        return run.effort
+
+    @pytest.fixture
+    def api(self, interfaces: Interfaces) -> RestInterface:
+        """The robot's REST interface, with the run that it is judged in."""
+        if interfaces.rest is None:
+            pytest.skip("the robot's rest interface has no address")
+        return interfaces.rest
+
+    @pytest.fixture
+    def rest(self, api: RestInterface) -> HttpClient:
+        """The client of the robot's REST interface."""
+        return api.client
+
+    @pytest.fixture
+    def soap(self, interfaces: Interfaces) -> SoapServices:
+        """The robot's SOAP services, each of which may be missing."""
+        return interfaces.soap
+
+    @pytest.fixture
+    def publishers(self, soap: SoapServices) -> SoapService:
+        """The SOAP service that acts."""
+        if soap.publishers is None:
+            pytest.skip("the robot's publishers interface has no address")
+        return soap.publishers
+
+    @pytest.fixture
+    def subscribers(self, soap: SoapServices) -> SoapService:
+        """The SOAP service that only reads."""
+        if soap.subscribers is None:
+            pytest.skip("the robot's subscribers interface has no address")
+        return soap.subscribers
+
+    @pytest.fixture
+    def explore(self, request: pytest.FixtureRequest, run: Run) -> Explorer:
+        """Hypothesis, seeded by the run's seed and the check's name."""
+        from conformance.verdict.explorer import Explorer  # noqa: PLC0415 - as above
+
+        return Explorer(run.seed, request.node.nodeid.rsplit("/", 1)[-1], run.effort)

@@ -1,0 +1,62 @@
+"""Progress of a run, line by line, for who waits for it."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, TextIO
+
+import pytest
+
+from conformance.engine.checks_plugin import PHASES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conformance.engine.robot_under_test import RobotUnderTest
+
+# A line at least this often, s.
+_OFTEN_S = 2.0
+
+
+class Progress:
+    """A pytest plugin that says where a run is.
+
+    Args:
+        robot: that is judged.
+        out: where to write; None for nowhere.
+    """
+
+    def __init__(self, robot: RobotUnderTest, out: TextIO | None) -> None:
+        self._robot, self._out = robot, out
+        self._started = self._told = time.monotonic()
+        self._phase = ""
+        self._done = self._total = 0
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        """Take the number of checks."""
+        self._total = len(session.items)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        """Say where the run is, when a phase begins and when there was nothing to read for a while."""
+        mark = item.get_closest_marker("phase")
+        phase = mark.args[0] if mark else PHASES[0]
+        now = time.monotonic()
+        if phase != self._phase or now - self._told > _OFTEN_S:
+            self._phase, self._told = phase, now
+            self.tell(f"{phase}: {item.name.removeprefix('test_').replace('_', ' ')}")
+        result = yield
+        self._done += 1
+        return result
+
+    def tell(self, text: str) -> None:
+        """Write one line."""
+        if self._out is None:
+            return
+        findings = len(self._robot.run.judge.refuted())
+        found = f", {findings} requirement{'s' if findings != 1 else ''} not met" if findings else ""
+        self._out.write(
+            f"[{time.monotonic() - self._started:5.1f} s] {self._done:3d}/{self._total} checks, "
+            f"{self._robot.connection.sent} requests{found} | {text}\n"
+        )
+        self._out.flush()

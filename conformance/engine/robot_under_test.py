@@ -1,0 +1,154 @@
+"""The robot that a run is about: opening its interfaces, and looking whether they answer."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from conformance.contract.interfaces import Interface
+from conformance.rest.interface import RestInterface, plain_path
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import NoAnswer, NoAnswerError
+from conformance.verdict.effort import Effort
+
+if TYPE_CHECKING:
+    from conformance.robot.interfaces import Interfaces
+    from conformance.soap.callable_services import SoapServices
+    from conformance.verdict.run import Run
+
+# How long a robot that stopped answering is given to come back before the rest of the run is called off, s.
+_GRACE_S = 3.0
+# How many answers tell how fast a robot usually is.
+_LOOKS = 3
+
+
+@dataclass
+class RobotUnderTest:
+    """A robot and its connections.
+
+    Attributes:
+        run: what is judged, and by what.
+        connection: deadline, credentials and listeners of all clients.
+        rest: its REST interface, or None; ``connect`` looks for it, and for the services.
+    """
+
+    run: Run
+    connection: Connection = field(default_factory=Connection)
+    rest: RestInterface | None = None
+    _services: SoapServices | None = None
+
+    @property
+    def soap(self) -> SoapServices:
+        """Its SOAP services, each of which may be missing."""
+        # Imported late: zeep, lxml and xmlschema cost a third of a second that --help need not pay.
+        from conformance.soap.callable_services import SoapServices  # noqa: PLC0415
+
+        if self._services is None:
+            self._services = SoapServices(self.run)
+        return self._services
+
+    @property
+    def interfaces(self) -> Interfaces:
+        """All interfaces that have an address."""
+        from conformance.robot.interfaces import Interfaces  # noqa: PLC0415 - as above
+
+        return Interfaces(self.rest, self.soap)
+
+    def connect(self) -> None:
+        """Look for each interface that has an address; what is not there is put down in ``run.unreachable``.
+
+        Raises:
+            OSError: the CA file cannot be used.
+        """
+        self._connect_rest()
+        self._connect_soap()
+
+    def _connect_rest(self) -> None:
+        where, contract = self.run.statement.endpoints, self.run.contract
+        if not where.rest:
+            return
+        from conformance.robot.examples import RobotDomain  # noqa: PLC0415 - as above
+
+        self.rest = RestInterface(self.run, HttpClient(where.rest, self.connection), self.alive)
+        if contract.own:
+            self.rest.domain = RobotDomain(self.rest)
+        self._look(Interface.REST, self.rest.client, self.rest.path)
+
+    def _connect_soap(self) -> None:
+        from conformance.robot.soap_services import known_messages  # noqa: PLC0415 - as above
+        from conformance.soap.callable_services import SoapServices  # noqa: PLC0415 - as above
+        from conformance.soap.discovery import open_service  # noqa: PLC0415 - as above
+
+        where, contract = self.run.statement.endpoints, self.run.contract
+        services = {}
+        for name, wsdl, endpoint, path in (
+            (Interface.PUBLISHERS, where.publishers_wsdl, where.publishers_endpoint, contract.publishers_path),
+            (Interface.SUBSCRIBERS, where.subscribers_wsdl, where.subscribers_endpoint, contract.subscribers_path),
+        ):
+            if wsdl or endpoint:
+                services[name] = open_service(name, wsdl, endpoint, self.connection, path, known_messages)
+                self._look(name, services[name].client, services[name].path)
+        self._services = SoapServices(self.run, services.get(Interface.PUBLISHERS), services.get(Interface.SUBSCRIBERS))
+
+    def _look(self, name: Interface, client: HttpClient, path: str) -> None:
+        """Put an interface down as unreachable unless it answers something, and see how fast it answers."""
+        run, times = self.run, []
+        # Should the resource hang, another one may not: that is one broken resource, not a robot that is not there.
+        for method, target in (("GET", path), ("GET", path), ("GET", path), ("OPTIONS", path), ("GET", "/")):
+            try:
+                answer = client.send(method, target).response
+            except NoAnswerError as none:
+                run.unreachable[name] = str(none)
+                if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS}:
+                    return
+                continue
+            run.unreachable.pop(name, None)
+            times.append(answer.elapsed_ms)
+            if len(times) == _LOOKS:
+                break
+        if times:
+            run.unreachable.pop(name, None)
+            usual = max(run.effort.usual_ms, statistics.median(times))
+            run.effort = Effort(run.effort.name, usual, run.effort.minutes)
+
+    def has(self, name: Interface) -> bool:
+        """Whether an interface has an address."""
+        return self.rest is not None if name is Interface.REST else name in self.soap.there
+
+    @property
+    def reached(self) -> bool:
+        """Whether any interface answered at the start."""
+        return any(self.has(name) and name not in self.run.unreachable for name in Interface)
+
+    def alive(self) -> bool:
+        """Whether the robot answers HTTP at all, on any interface that it answered at the start."""
+        until = time.monotonic() + _GRACE_S
+        clients = self._answering()
+        while True:
+            for client, path in clients:
+                # Several targets, so that an endpoint known to hang is no reason to call the robot dead.
+                for method, target in (("GET", path), ("OPTIONS", path), ("GET", "/")):
+                    try:
+                        client.send(method, target, fresh=True, timeout_s=min(_GRACE_S, self.connection.timeout_s))
+                    except NoAnswerError as none:
+                        if none.kind is NoAnswer.REFUSED:
+                            break
+                        continue
+                    return True
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.1)
+
+    def _answering(self) -> list[tuple[HttpClient, str]]:
+        """A client and a path for each interface that answered at the start."""
+        found: list[tuple[HttpClient, str]] = []
+        if self.rest is not None and Interface.REST not in self.run.unreachable:
+            found.append((self.rest.client, plain_path(self.run.contract)))
+        found += [
+            (service.client, service.path)
+            for name, service in self.soap.there.items()
+            if name not in self.run.unreachable
+        ]
+        return found

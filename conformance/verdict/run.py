@@ -1,0 +1,56 @@
+"""What one run knows: what is claimed of a robot, what may be done to it, and what has been found so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from conformance.contract.files import Contract
+from conformance.contract.interfaces import Interface
+from conformance.contract.statement import Statement
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+
+@dataclass
+class Run:
+    """One run: data only, whoever is connected to what.
+
+    Attributes:
+        statement: what the vendor says, options applied.
+        contract: what the robot is judged by.
+        claims: the classes that are judged.
+        allow_motion: whether the robot may be moved.
+        seed: of everything random.
+        effort: how much is tried; lessened once it is known how slowly the robot answers.
+        judge: what has been found.
+        aborted: why the robot cannot be asked any more, or empty.
+        unreachable: why an interface was not reached at the start.
+    """
+
+    statement: Statement = field(default_factory=Statement)
+    contract: Contract = field(default_factory=Contract.load)
+    claims: tuple[str, ...] = ()
+    allow_motion: bool = False
+    seed: int = 0
+    effort: Effort = field(default_factory=Effort)
+    judge: Judge = field(init=False)
+    aborted: str = ""
+    unreachable: dict[Interface, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.judge = Judge(set(self.contract.ledger))
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """The interfaces that the contract describes."""
+        described: Mapping[Interface, Path | None] = {
+            Interface.REST: self.contract.openapi_path,
+            Interface.PUBLISHERS: self.contract.publishers_path,
+            Interface.SUBSCRIBERS: self.contract.subscribers_path,
+        }
+        return tuple(name for name, path in described.items() if path)
