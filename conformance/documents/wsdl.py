@@ -71,7 +71,7 @@ class Description:
         found: list[etree._Element] = []
         for root in self.definitions:
             result = root.xpath(path, namespaces=spaces)
-            found += [item for item in result if isinstance(item, etree._Element)] if isinstance(result, list) else []  # noqa: SLF001 - lxml's only name for it
+            found += [item for item in result if etree.iselement(item)] if isinstance(result, list) else []
         return found
 
     @property

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 ENVELOPE: Final = "http://schemas.xmlsoap.org/soap/envelope/"
-ENCODING: Final = "http://schemas.xmlsoap.org/soap/encoding/"
 WSDL: Final = "http://schemas.xmlsoap.org/wsdl/"
 WSDL_SOAP: Final = "http://schemas.xmlsoap.org/wsdl/soap/"
 XSD: Final = "http://www.w3.org/2001/XMLSchema"
@@ -14,7 +13,6 @@ WSAM: Final = "http://www.w3.org/2007/05/addressing/metadata"
 # Forms of the action attribute that came before the metadata namespace, and that tools still write.
 WSAW: Final = "http://www.w3.org/2006/05/addressing/wsdl"
 ADDRESSING: Final = "http://www.w3.org/2005/08/addressing"
-XML: Final = "http://www.w3.org/XML/1998/namespace"
 # SOAP 1.1, 4.2.2: the actor that stands for whoever receives the message first.
 NEXT_ACTOR: Final = "http://schemas.xmlsoap.org/soap/actor/next"
 

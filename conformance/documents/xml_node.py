@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
 from conformance.documents.xml_names import ADDRESSING, ENVELOPE, XSI, local, namespace
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 
 _USUAL: Final = {ENVELOPE: "soap", XSI: "xsi", ADDRESSING: "wsa"}
 
@@ -48,12 +44,19 @@ class Node:
         """The descendant at a path of child positions."""
         return self.children[path[0]].at(path[1:]) if path else self
 
-    def changed(self, path: tuple[int, ...], change: Callable[[Node], tuple[Node, ...]]) -> Node:
-        """A copy in which the descendant at ``path`` (not empty) is replaced by what ``change`` makes of it."""
+    def replaced(self, path: tuple[int, ...], *new: Node) -> Node:
+        """A copy in which others stand for the descendant at ``path``: none, one or more.
+
+        Args:
+            path: of child positions; empty for the node itself, which one other can stand for.
+            new: what stands there.
+        """
+        if not path:
+            (whole,) = new
+            return whole
         index, rest = path[0], path[1:]
-        child = self.children[index]
-        new = (child.changed(rest, change),) if rest else change(child)
-        return replace(self, children=(*self.children[:index], *new, *self.children[index + 1 :]))
+        inside = (self.children[index].replaced(rest, *new),) if rest else new
+        return replace(self, children=(*self.children[:index], *inside, *self.children[index + 1 :]))
 
     def paths(self) -> list[tuple[int, ...]]:
         """Paths of all descendants, parents before their children."""
@@ -65,24 +68,26 @@ class Node:
 
     def written(self) -> bytes:
         """The document in plain UTF-8, each namespace bound to a prefix at the root."""
-        spaces = sorted(self._namespaces())
+        spaces = sorted(_namespaces(self))
         # The usual prefixes where there are any: findings are read by people.
         prefixes = {space: _USUAL.get(space, f"n{number}") for number, space in enumerate(spaces)}
         bindings = "".join(f" xmlns:{prefix}={quoteattr(space)}" for space, prefix in prefixes.items())
-        return self._text(prefixes, bindings).encode()
+        return _text(self, prefixes, bindings).encode()
 
-    def _namespaces(self) -> set[str]:
-        found = {namespace(self.tag)} | {namespace(name) for name, _ in self.attributes}
-        for child in self.children:
-            found |= child._namespaces()  # noqa: SLF001 - of the same class
-        return found - {""}
 
-    def _text(self, prefixes: dict[str, str], bindings: str = "") -> str:
-        def named(tag: str) -> str:
-            space = namespace(tag)
-            return f"{prefixes[space]}:{local(tag)}" if space else tag
+def _namespaces(node: Node) -> set[str]:
+    found = {namespace(node.tag)} | {namespace(name) for name, _ in node.attributes}
+    for child in node.children:
+        found |= _namespaces(child)
+    return found - {""}
 
-        attributes = "".join(f" {named(name)}={quoteattr(value)}" for name, value in self.attributes)
-        inside = escape(self.text) + "".join(child._text(prefixes) for child in self.children)  # noqa: SLF001
-        tag = named(self.tag)
-        return f"<{tag}{bindings}{attributes}>{inside}</{tag}>" if inside else f"<{tag}{bindings}{attributes}/>"
+
+def _text(node: Node, prefixes: dict[str, str], bindings: str = "") -> str:
+    def named(tag: str) -> str:
+        space = namespace(tag)
+        return f"{prefixes[space]}:{local(tag)}" if space else tag
+
+    attributes = "".join(f" {named(name)}={quoteattr(value)}" for name, value in node.attributes)
+    inside = escape(node.text) + "".join(_text(child, prefixes) for child in node.children)
+    tag = named(node.tag)
+    return f"<{tag}{bindings}{attributes}>{inside}</{tag}>" if inside else f"<{tag}{bindings}{attributes}/>"

@@ -32,7 +32,6 @@ INTEGERS: Final = frozenset(
 )
 # 3.2.4 and 3.2.5: those that know INF and NaN.
 FLOATS: Final = frozenset({"double", "float"})
-NUMBERS: Final = INTEGERS | FLOATS | {"decimal"}
 STRINGS: Final = frozenset({"string", "normalizedString", "token"})
 # Where an integer has no bounds of its own, values stay within what a robot can be asked to hold.
 _WIDEST: Final = 2**31 - 1

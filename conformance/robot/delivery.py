@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from hypothesis import strategies as st
 
 from conformance.robot.robot import DELIVERIES
+from conformance.soap.forms import EXTREMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,25 +18,7 @@ COURIER: Final = 3
 COFFEE: Final = 4
 SEGMENTS: Final = ("depot_x", "depot_y", "dest_x", "dest_y", "source_x", "source_y")
 # Both ends of a double, of its subnormals and of what an integer holds exactly; the paper's own example.
-_KNOWN: Final = (
-    0.0,
-    -0.0,
-    76.02,
-    41.35,
-    60.633,
-    5e-324,
-    -5e-324,
-    2.2250738585072009e-308,
-    2.2250738585072014e-308,
-    1.7976931348623157e308,
-    -1.7976931348623157e308,
-    0.1,
-    1 / 3,
-    9007199254740993.0,
-    1e22,
-    1e23,
-    123456789.12345678,
-)
+_KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-308)
 
 
 class Delivery(NamedTuple):

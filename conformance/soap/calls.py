@@ -49,7 +49,7 @@ class SoapResponse:
     @property
     def succeeded(self) -> bool:
         """Whether the answer says that all is well: 2xx, and no fault."""
-        return 200 <= self.status < 300 and self.fault is None  # noqa: PLR2004 - RFC 9110 15.3
+        return self.exchange.response.ok and self.fault is None
 
     @property
     def accepted(self) -> bool:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _SPACES: Final = ("", " ", "\n\t ", "  ")
 # Zeros of both signs, the smallest and greatest of all and of the normal ones, and those that are known to be
 # misread: 2.2250738585072011e-308 hung Java and PHP, 2**53 + 1 is no double, 1e23 is printed as 1e+23 or 9.99...e22.
-_EXTREMES: Final[dict[str, tuple[float, ...]]] = {
+EXTREMES: Final[dict[str, tuple[float, ...]]] = {
     "double": (
         0.0,
         -0.0,
@@ -77,9 +77,7 @@ def _floats(simple: Simple) -> SearchStrategy[float]:
     high = float(simple.maximum) if simple.maximum is not None else None
     drawn = st.floats(low, high, allow_nan=False, allow_infinity=False, width=64 if simple.builtin == "double" else 32)
     fitting = [
-        value
-        for value in _EXTREMES[simple.builtin]
-        if (low is None or value >= low) and (high is None or value <= high)
+        value for value in EXTREMES[simple.builtin] if (low is None or value >= low) and (high is None or value <= high)
     ]
     return st.one_of(st.sampled_from(fitting), drawn) if fitting else drawn
 

@@ -87,7 +87,7 @@ def variants(element: Element, base: Node, fixed: frozenset[tuple[int, ...]] = f
 
 def with_text(node: Node, path: tuple[int, ...], text: str) -> Node:
     """A copy of a message with another text at a path."""
-    return node.changed(path, lambda leaf: (replace(leaf, text=text),)) if path else replace(node, text=text)
+    return node.replaced(path, replace(node.at(path), text=text))
 
 
 def declarations(element: Element, node: Node) -> list[tuple[tuple[int, ...], Element]]:

@@ -66,7 +66,7 @@ def mutations(element: Element, base: Node) -> Iterator[Mutation]:
 def _missing(element: Element, base: Node) -> Iterator[Mutation]:
     for path, declared in declarations(element, base):
         if declared.minimum > 0:
-            yield Mutation("missing", f"{local(declared.tag)} dropped", (base.changed(path, lambda _: ()),))
+            yield Mutation("missing", f"{local(declared.tag)} dropped", (base.replaced(path),))
 
 
 def _unknown(element: Element, base: Node) -> Iterator[Mutation]:
@@ -77,7 +77,7 @@ def _unknown(element: Element, base: Node) -> Iterator[Mutation]:
                 extra = Node(clark(space, _NOBODY), "1")
                 children = (*parent.children[:position], extra, *parent.children[position:])
                 changed = replace(parent, children=children)
-                made = base.changed(path, lambda _, new=changed: (new,)) if path else changed  # type: ignore[misc] # a default argument binds the loop's value
+                made = base.replaced(path, changed)
                 yield Mutation("unknown", f"{extra.tag} {where} in {parent.name}", (made,))
 
 
@@ -87,7 +87,7 @@ def _duplicate(element: Element, base: Node) -> Iterator[Mutation]:
             yield Mutation(
                 "duplicate",
                 f"{local(declared.tag)} twice",
-                (base.changed(path, lambda node: (node, node)),),
+                (base.replaced(path, base.at(path), base.at(path)),),
             )
 
 
@@ -107,7 +107,7 @@ def _order(element: Element, base: Node) -> Iterator[Mutation]:
             if [child.tag for child in order] == [child.tag for child in children]:
                 continue
             changed = replace(parent, children=tuple(order))
-            made = base.changed(path, lambda _, new=changed: (new,)) if path else changed  # type: ignore[misc] # as above
+            made = base.replaced(path, changed)
             yield Mutation("order", f"children of {parent.name}: {what}", (made,))
 
 
@@ -124,7 +124,7 @@ def _namespace(element: Element, base: Node) -> Iterator[Mutation]:
                 yield Mutation(
                     "namespace",
                     f"{local(declared.tag)} in {space or 'no'} namespace",
-                    (base.changed(path, lambda node, new=tag: (replace(node, tag=new),)),),  # type: ignore[misc] # as above
+                    (base.replaced(path, replace(base.at(path), tag=tag)),),
                 )
 
 
@@ -148,7 +148,7 @@ def _nil(element: Element, base: Node) -> Iterator[Mutation]:
             yield Mutation(
                 "nil",
                 f"{local(declared.tag)} is xsi:nil",
-                (base.changed(path, lambda _, new=empty: (new,)),),  # type: ignore[misc] # as above
+                (base.replaced(path, empty),),
             )
 
 

@@ -128,7 +128,7 @@ class SoapObserver(Listener):
             message = read_root(root)
         except NotSoapError as error:
             problem = str(error)
-            that("R2712", False, exchange, "a SOAP 1.1 message", lambda: problem)  # noqa: FBT003 - the condition
+            that("R2712", holds=False, exchange=exchange, expected="a SOAP 1.1 message", found=lambda: problem)
             return
         after = elements(root)[elements(root).index(message.body) + 1 :]
         that("R1011", not after, exchange, "nothing after Body", lambda: f"{after[0].tag} after it")

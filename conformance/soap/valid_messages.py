@@ -95,9 +95,9 @@ def typed(message: Node, declared: Element, payload: Node) -> bytes:
     """A message in which each value of the payload says its type by xsi:type, as RPC-encoded SOAP did."""
     made = payload
     for path, simple in simple_leaves(declared, payload):
-        attribute = (clark(XSI, "type"), f"xs:{simple.builtin}")
         if path:
-            made = made.changed(path, lambda leaf, new=attribute: (replace(leaf, attributes=(new,)),))  # type: ignore[misc] # a default argument binds the loop's value
+            attribute = (clark(XSI, "type"), f"xs:{simple.builtin}")
+            made = made.replaced(path, replace(made.at(path), attributes=(attribute,)))
     if made == payload:
         made = replace(payload, attributes=((clark(XSI, "type"), f"tns:{payload.name}"),))
     body = message.children[-1]

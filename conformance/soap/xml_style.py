@@ -1,19 +1,18 @@
-"""One message in many spellings: what XML and its namespaces let a writer choose, and a reader must not care about."""
+"""One message in many styles: what XML and its namespaces let a writer choose, and a reader must not care about."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 from xml.sax.saxutils import escape
 
 from hypothesis import strategies as st
 
-from conformance.documents.xml_names import ENVELOPE, XSI, local, namespace
+from conformance.documents.xml_names import ENVELOPE, XSI, clark, local, namespace
+from conformance.documents.xml_node import Node
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
-
-    from conformance.documents.xml_node import Node
 
 DECLARATIONS: Final = (
     "",
@@ -57,7 +56,7 @@ class XmlStyle:
 
 
 def single_changes() -> tuple[tuple[str, XmlStyle], ...]:
-    """Spellings that differ from the plain one in one choice each, with a name for the choice."""
+    """Styles that differ from the plain one in one choice each, with a name for the choice."""
     return (
         ("plain", XmlStyle()),
         ("other prefixes", XmlStyle(envelope_prefix="S", payload_prefix="a")),
@@ -120,7 +119,7 @@ class _Writer:
         ]
         start = " ".join([name, *attributes])
         line = "\n" + "  " * depth if self.style.indent else ""
-        note = "<!-- <a> & -- -->".replace(" -- ", " - ") if self.style.comments else ""
+        note = "<!-- <a> & - -->" if self.style.comments else ""
         inside = "".join(f"{line}  {note}" + self.element(child, scope, depth + 1) for child in node.children)
         inside += f"{note}{line}" if node.children else self._text(node.text)
         if not inside and self.style.empty_tags:
@@ -189,14 +188,10 @@ def _all_namespaces(node: Node) -> set[str]:
 
 
 def serialize(message: Node, style: XmlStyle) -> str:
-    """Write a message (an Envelope) in one of its spellings."""
+    """Write a message (an Envelope) in a style."""
     if style.header and not any(child.name == "Header" for child in message.children):
-        message = type(message)(
-            message.tag,
-            message.text,
-            (type(message)(f"{{{namespace(message.tag)}}}Header"), *message.children),
-            message.attributes,
-        )
+        header = Node(clark(namespace(message.tag), "Header"))
+        message = replace(message, children=(header, *message.children))
     before = "<!-- before -->" if style.comments else ""
     after = "<!-- after -->" if style.comments else ""
     return style.declaration + before + _Writer(style).element(message, {}, 0, root=True) + after

@@ -1,4 +1,4 @@
-"""Messages made from a schema: valid to both validators, or invalid to both, and the same however they are spelled."""
+"""Messages made from a schema: valid to both validators, or invalid to both, and the same however they are written."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def canonical(document: str) -> bytes:
 
 
 @pytest.mark.parametrize("style", [style for _, style in single_changes()], ids=[name for name, _ in single_changes()])
-def test_single_spellings_say_the_same(style):
+def test_single_changes_of_style_say_the_same(style):
     message = envelope([ordinary(REQUEST)])
     assert canonical(serialize(message, style)) == canonical(serialize(message, XmlStyle()))
     assert DELIVERY.types.valid(read(serialize(message, style).encode()).first)
@@ -131,7 +131,7 @@ def test_single_spellings_say_the_same(style):
 
 @settings(max_examples=200, database=None, deadline=None)
 @given(xml_styles())
-def test_any_spelling_says_the_same(style):
+def test_any_style_says_the_same(style):
     message = envelope([ordinary(REQUEST)])
     assert canonical(serialize(message, style)) == canonical(serialize(message, XmlStyle()))
     assert DELIVERY.types.valid(read(serialize(message, style).encode()).first)
