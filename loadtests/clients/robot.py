@@ -33,11 +33,6 @@ class Robot:
     token: str | None = None
     timeout_s: float = 10.0
 
-    @classmethod
-    def from_message(cls, message: dict[str, Any]) -> Robot:
-        """Read what `dataclasses.asdict` wrote."""
-        return cls(**message)
-
     def at(self, *, publishers: str | None = None, subscribers: str | None = None) -> Robot:
         """The same robot with the SOAP services' addresses, as far as they are given."""
         return replace(self, publishers=publishers or self.publishers, subscribers=subscribers or self.subscribers)

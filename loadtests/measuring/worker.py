@@ -50,7 +50,7 @@ class Worker:
         job = msg.data
         error = ""
         try:
-            robot = Robot.from_message(job["robot"] | {"token": self.token})
+            robot = Robot(**job["robot"] | {"token": self.token})
             self.session = Session(environment, robot, tuple(job["operations"]), job["seed"], library=job["library"])
             self.session.after_segment = self._pack
             environment.roaas_session = self.session
