@@ -16,6 +16,21 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 Path = tuple[str | int, ...]
+# Names in class strict-input of what may ask for the refusal of a mutation.
+MUTATED = (
+    "json-malformed",
+    "json-missing",
+    "json-unknown",
+    "json-duplicate",
+    "json-type",
+    "json-non-finite",
+    "json-root",
+    "json-depth",
+    "json-huge-number",
+    "json-encoding",
+    "json-empty",
+    "json-bounds",
+)
 # What nobody names a field or a value by chance.
 STRANGE_NAME = "roaas_unknown"
 STRANGE_TEXT = "roaas-no-number"

@@ -22,6 +22,8 @@ _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 # What no reader takes for a number: nothing, or a letter where none can be.
 _NO_NUMBER = re.compile(r"|.*[A-DF-Za-df-z].*|[eE].*", re.DOTALL)
+# Digits of an integer.
+_BEYOND_EVERY_BOUND = 40
 _RULES = {
     "required": "json-missing",
     "additionalProperties": "json-unknown",
@@ -115,7 +117,7 @@ def _of_text(parameter: Parameter, text: str, requirement: str) -> _Said:
         value = float(text)
         if not math.isfinite(value):
             return INVALID, requirement, why
-        value = int(text) if kind == "integer" and len(text) < 40 else value  # noqa: PLR2004 - beyond every bound
+        value = int(text) if kind == "integer" and len(text) < _BEYOND_EVERY_BOUND else value
     elif kind != "string" or not text:
         return UNCLEAR, "", ""
     return (INVALID, requirement, why) if shape_of(schema).problem(value) else (VALID, "", "")

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 # Less than this is no drive to judge: m and rad.
 _SHORTEST: Final = 0.08
 _LEAST_TURN: Final = 0.2
+# Readings; a sum over one step says nothing.
+_FEWEST: Final = 3
 # What may be between the sum of a sampled velocity and the way: relative, and absolute in m and rad.
 _SHARE: Final = 0.1
 _OFF: Final = 0.03
@@ -77,7 +79,7 @@ def judge_path(judge: Judge, trace: Sequence[Odometry], measured: Sequence[Veloc
         trace: readings of the odometry, in their order.
         measured: a reading of GET /robot/velocity/ for each of them.
     """
-    if len(trace) < 3:  # noqa: PLR2004 - a sum over one step says nothing
+    if len(trace) < _FEWEST:
         return
     sources = ([one.velocity for one in trace], measured)
     sums = [_summed(trace, source, by_stamp=by_stamp) for source in sources for by_stamp in (True, False)]

@@ -9,7 +9,7 @@ import pytest
 
 from conformance.rest.applicable import applicable_operations
 from conformance.rest.calls import JSON, example_call
-from conformance.rest.mutations import Mutation, mutations
+from conformance.rest.mutations import MUTATED, Mutation, mutations
 from conformance.rest.refusals import judge_refusal
 from conformance.robot.stopping import stop_robot
 
@@ -21,21 +21,7 @@ if TYPE_CHECKING:
     from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
-_NAMES = (
-    "json-malformed",
-    "json-missing",
-    "json-unknown",
-    "json-duplicate",
-    "json-type",
-    "json-non-finite",
-    "json-root",
-    "json-depth",
-    "json-huge-number",
-    "json-encoding",
-    "json-empty",
-    "json-bounds",
-)
-_IDS = tuple(f"strict-input/{name}" for name in _NAMES)
+_IDS = tuple(f"strict-input/{name}" for name in MUTATED)
 _STATUSES = ("strict-input/status-malformed", "strict-input/status-invalid")
 # What a robot may be killed by: judged before it is sent.
 _HOSTILE = ("strict-input/json-depth", "strict-input/json-huge-number")
@@ -70,7 +56,7 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
             found=again.came,
         )
     stop_robot(api)
-    for name in _NAMES if possible else ():
+    for name in MUTATED if possible else ():
         if name not in possible:
             judge.unclaimed(f"strict-input/{name}", "no body of the contract can be wrong in this way")
 
@@ -92,7 +78,7 @@ def _count(effort: Effort, name: str) -> int:
 
 
 def _by_requirement(call: Call, operation: Operation) -> dict[str, list[Mutation]]:
-    by_name: dict[str, list[Mutation]] = {name: [] for name in _NAMES}
+    by_name: dict[str, list[Mutation]] = {name: [] for name in MUTATED}
     for item in mutations(call.value, operation.bodies[JSON].schema):
         by_name[item.requirement].append(item)
     return by_name
