@@ -14,7 +14,7 @@ class Level(StrEnum):
     MAY = "MAY"
 
 
-class Need(StrEnum):
+class Prerequisite(StrEnum):
     """What a run must have to judge a requirement, beside the interface."""
 
     MOTION = "motion"  # permission to move the robot

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from conformance.contract.classes import CLASSES, ConformanceClass, Level, Need
+from conformance.contract.classes import CLASSES, ConformanceClass, Level, Prerequisite
 from conformance.contract.toml_file import Text, TomlFileError, fit, read_tables
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Requirement:
     level: Level
     text: str
     source: str
-    needs: tuple[Need, ...] = ()
+    needs: tuple[Prerequisite, ...] = ()
     own: bool = False
     untestable: str | None = None
 
@@ -50,7 +50,7 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     level: Level
     text: Text
     source: Text
-    needs: tuple[Need, ...] = ()
+    needs: tuple[Prerequisite, ...] = ()
     own: bool = False
     untestable: Text | None = None
 

@@ -6,7 +6,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from conformance.robot.delivery import COFFEE, path_of
+from conformance.contract.delivery import COFFEE
+from conformance.robot.delivery import path_of
 from conformance.robot.soap_services import send_delivery
 
 if TYPE_CHECKING:

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from hypothesis import strategies as st
 
+from conformance.contract.delivery import COFFEE, COURIER, PATH_NAMES
 from conformance.robot.robot import DELIVERIES
 from conformance.soap.forms import EXTREMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-COURIER: Final = 3
-COFFEE: Final = 4
-SEGMENTS: Final = ("depot_x", "depot_y", "dest_x", "dest_y", "source_x", "source_y")
 # Both ends of a double, of its subnormals and of what an integer holds exactly; the paper's own example.
 _KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-308)
 
@@ -50,7 +48,7 @@ class Delivery(NamedTuple):
 
 def path_of(code: str, *coordinates: str) -> str:
     """The target of a delivery PUT with values as they are written: code, depot, destination, source."""
-    pairs = "".join(f"/{name}/{value}" for name, value in zip(SEGMENTS, coordinates, strict=True))
+    pairs = "".join(f"/{name}/{value}" for name, value in zip(PATH_NAMES, coordinates, strict=True))
     return f"{DELIVERIES}{code}{pairs}"
 
 
@@ -74,7 +72,7 @@ def doubles() -> st.SearchStrategy[float]:
 
 def deliveries(codes: tuple[int, ...] = (COURIER, COFFEE)) -> st.SearchStrategy[Delivery]:
     """Deliveries of any finite coordinates."""
-    return st.builds(Delivery, st.sampled_from(codes), *[doubles()] * len(SEGMENTS))
+    return st.builds(Delivery, st.sampled_from(codes), *[doubles()] * len(PATH_NAMES))
 
 
 def lexical_deliveries() -> st.SearchStrategy[tuple[Delivery, tuple[str, ...]]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Final
 
+from conformance.contract.delivery import EXAMPLE
 from conformance.contract.files import CONTRACT_DIR
 from conformance.documents.wsdl import read_file
 from conformance.documents.xml_names import clark
@@ -15,15 +16,6 @@ if TYPE_CHECKING:
     from conformance.documents.xsd_shapes import Element
 
 NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
-# The paper's example client call.
-COORDINATES: Final = {
-    "depot_x": "68.269",
-    "depot_y": "38.718",
-    "destination_x": "60.633",
-    "destination_y": "37.51",
-    "source_x": "76.02",
-    "source_y": "41.35",
-}
 
 
 def request(operation: str, **values: float | str) -> Node:
@@ -46,7 +38,7 @@ def delivery(operation: str = "ExecuteDeliveryRequest", code: str = "4", **coord
         code: as written.
         coordinates: those that differ from the paper's, as written.
     """
-    return request(operation, **(COORDINATES | coordinates), message_code=code)
+    return request(operation, **(EXAMPLE | coordinates), message_code=code)
 
 
 @cache

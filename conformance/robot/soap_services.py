@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from conformance.contract.delivery import COFFEE
 from conformance.documents.xml import elements
 from conformance.documents.xml_names import local
-from conformance.robot.delivery import COFFEE, Delivery
 from conformance.robot.delivery_messages import NAMESPACE, delivery, request
 from conformance.soap.calls import call, read_exchange
 from conformance.soap.content import number_at
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from conformance.documents.wsdl import Operation
     from conformance.documents.xml_node import Node
+    from conformance.robot.delivery import Delivery
     from conformance.soap.service import SoapService
     from conformance.transport.exchange import Exchange
 

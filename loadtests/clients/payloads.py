@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from conformance.contract.delivery import COFFEE, COORDINATES, COURIER, EXAMPLE, PATH_NAMES, XSD_FIELDS
 from loadtests.clients.wire import Request
 
 if TYPE_CHECKING:
@@ -21,27 +22,6 @@ if TYPE_CHECKING:
 VARIANTS = 64
 NAMESPACE = "http://soap.turtlebot.mybot.org/"
 ENVELOPE = "http://schemas.xmlsoap.org/soap/envelope/"
-COURIER, COFFEE = 3, 4  # the paper's message codes
-
-#: Fields of deliveryRequestMessage in the order of the schema's sequence.
-FIELDS = ("depot_x", "depot_y", "destination_x", "destination_y", "message_code", "source_x", "source_y")
-#: The same in the order of the REST path, with the path's names.
-PATH = (
-    ("depot_x", "depot_x"),
-    ("depot_y", "depot_y"),
-    ("dest_x", "destination_x"),
-    ("dest_y", "destination_y"),
-    ("source_x", "source_x"),
-    ("source_y", "source_y"),
-)
-_EXAMPLE = {
-    "depot_x": 68.269,
-    "depot_y": 38.718,
-    "destination_x": 60.633,
-    "destination_y": 37.51,
-    "source_x": 76.02,
-    "source_y": 41.35,
-}
 
 Values = dict[str, float]
 
@@ -82,7 +62,7 @@ def variants(operation: str, seed: int) -> list[Values]:
         return [{} for _ in range(VARIANTS)]
     lot = np.random.default_rng([seed, 5])
     return [
-        {name: value + float(lot.uniform(-5, 5)) for name, value in _EXAMPLE.items()} | {"message_code": code}
+        {name: value + float(lot.uniform(-5, 5)) for name, value in EXAMPLE.items()} | {"message_code": code}
         for _ in range(VARIANTS)
     ]
 
@@ -91,14 +71,14 @@ def rest_path(values: Values) -> str:
     """The resource's path below the base URL (Table 1 and the delivery application)."""
     if not values:
         return "/robot/pose/"
-    places = "".join(f"/{name}/{values[field]!r}" for name, field in PATH)
+    places = "".join(f"/{name}/{values[field]!r}" for name, field in zip(PATH_NAMES, COORDINATES, strict=True))
     return f"/robot/app/delivery/{int(values['message_code'])}{places}"
 
 
 def soap_envelope(operation: str, values: Values) -> bytes:
     """The SOAP 1.1 request, document/literal wrapped; the wrapper's child is the unqualified `arg0`."""
     texts = {field: repr(int(value) if field == "message_code" else value) for field, value in values.items()}
-    inner = "".join(f"<{field}>{texts[field]}</{field}>" for field in FIELDS if field in texts)
+    inner = "".join(f"<{field}>{texts[field]}</{field}>" for field in XSD_FIELDS if field in texts)
     argument = f"<arg0>{inner}</arg0>" if values else ""
     element = CATALOGUE[operation].element
     return (

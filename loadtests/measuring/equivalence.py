@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
-from loadtests.clients.payloads import CATALOGUE, FIELDS, NAMESPACE, PATH, Values
+from conformance.contract.delivery import COORDINATES, XSD_FIELDS
+from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values
 from loadtests.clients.xml_reader import XmlError, parse_xml
 
 if TYPE_CHECKING:
@@ -29,13 +30,13 @@ def request_difference(operation: str, rest: Request, soap: Request) -> str | No
     if CATALOGUE[operation].code is None:
         return None
     parts = rest.octets.split(b" ", 2)[1].decode().rsplit("/robot/app/delivery/", 1)[1].split("/")
-    over_rest = {field: float(parts[2 * index + 2]) for index, (_, field) in enumerate(PATH)}
+    over_rest = {field: float(parts[2 * index + 2]) for index, field in enumerate(COORDINATES)}
     over_rest["message_code"] = int(parts[0])
     argument = parse_xml(soap.octets.split(b"\r\n\r\n", 1)[1]).find(".//arg0")
     if argument is None:
         return "the SOAP request carries no arg0"
     over_soap = {child.tag: float(child.text or "nan") for child in argument}
-    for field in FIELDS:
+    for field in XSD_FIELDS:
         if not _same_double(over_rest[field], over_soap.get(field, float("nan"))):
             return f"{field} is {over_rest[field]!r} over REST and {over_soap.get(field)!r} over SOAP"
     return None
@@ -105,7 +106,7 @@ def _xml_leaves(element: Any) -> Iterator[str]:
 
 def _is_request(listed: Any, sent: Values) -> bool:
     try:
-        return all(_same_double(float(listed[field]), sent[field]) for field in FIELDS)
+        return all(_same_double(float(listed[field]), sent[field]) for field in XSD_FIELDS)
     except (KeyError, TypeError, ValueError):
         return False
 

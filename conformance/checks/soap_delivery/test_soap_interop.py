@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from conformance.robot import delivery_messages
-from conformance.robot.delivery import COFFEE, COURIER
+from conformance.contract.delivery import COFFEE, COURIER, EXAMPLE
 from conformance.soap.callable_services import rounds
 from conformance.soap.valid_messages import example
 from conformance.transport.exchange import NoAnswerError
@@ -85,9 +84,7 @@ def test_publishers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     if client is None:
         return
     for code in (COFFEE, COURIER) * rounds(effort, 4):
-        values: dict[str, Any] = {key: float(text) for key, text in delivery_messages.COORDINATES.items()} | {
-            "message_code": code
-        }
+        values: dict[str, Any] = {**EXAMPLE, "message_code": code}
         for operation in ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest"):
             if operation == "ExecuteCoffeeRequest":
                 values["message_code"] = COFFEE

@@ -16,10 +16,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
+from conformance.contract.delivery import COORDINATES
+
 _NAME: Final = "roaas_probe"
 _STEP_S: Final = 0.05
 _DEPTH: Final = 1000
-_COORDINATES: Final = ("depot_x", "depot_y", "destination_x", "destination_y", "source_x", "source_y")
 _STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 
 
@@ -104,7 +105,7 @@ class ProbeNode:
         return QoSProfile(depth=_DEPTH, reliability=reliability)
 
     def _delivery_came(self, message: Any) -> None:
-        values = [float(getattr(message, name)).hex() for name in _COORDINATES]
+        values = [float(getattr(message, name)).hex() for name in COORDINATES]
         self._deliveries.append([message.message_code, *values])
 
     def _stamped_came(self, message: Any) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
+from conformance.contract.delivery import XSD_FIELDS
 from conformance.selftest.mutants.changes import SOAP, TNS, altered, named, rewritten, soap, xml
 from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.mutants.soap_responses import is_fault
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 _ANY = soap()
 _XSI = "http://www.w3.org/2001/XMLSchema-instance"
-_ORDER = ("depot_x", "depot_y", "destination_x", "destination_y", "message_code", "source_x", "source_y")
 _DOUBLE = re.compile(r"\s*([+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?INF|NaN)\s*", re.ASCII)
 _INT = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
 
@@ -57,7 +57,7 @@ def _filled(body: Any, message: Any) -> None:
     if message is None:
         return
     there = [child.tag for child in _children(message)]
-    for place, name in enumerate(_ORDER):
+    for place, name in enumerate(XSD_FIELDS):
         if name not in there:
             made = etree.Element(name)
             made.text = "3" if name == "message_code" else "0"
@@ -66,7 +66,7 @@ def _filled(body: Any, message: Any) -> None:
 
 def _known(body: Any, message: Any) -> None:
     for child in _children(message):
-        if etree.QName(child).localname not in _ORDER:
+        if etree.QName(child).localname not in XSD_FIELDS:
             message.remove(child)
     for wrapper in body:
         for child in _children(wrapper):
@@ -88,7 +88,9 @@ def _once(_body: Any, message: Any) -> None:
 
 def _ordered(_body: Any, message: Any) -> None:
     if message is not None:
-        message[:] = sorted(message, key=lambda child: _ORDER.index(child.tag) if child.tag in _ORDER else len(_ORDER))
+        message[:] = sorted(
+            message, key=lambda child: XSD_FIELDS.index(child.tag) if child.tag in XSD_FIELDS else len(XSD_FIELDS)
+        )
 
 
 def _renamed(body: Any, _message: Any) -> None:

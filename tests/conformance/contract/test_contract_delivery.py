@@ -1,0 +1,26 @@
+"""The delivery's fields are those of the contract's files."""
+
+from __future__ import annotations
+
+import re
+
+from lxml import etree
+
+from conformance.contract.delivery import COFFEE, COORDINATES, COURIER, EXAMPLE, MESSAGE_FIELDS, PATH_NAMES, XSD_FIELDS
+from conformance.contract.files import CONTRACT_DIR, Contract
+
+
+def test_the_path_of_the_openapi_description():
+    paths = Contract.load().openapi["paths"]
+    path = next(path for path in paths if "/depot_x/" in path)
+    assert tuple(re.findall(r"/(\w+)/\{", path))[1:] == PATH_NAMES
+    code = next(item for item in paths[path]["put"]["parameters"] if item["name"] in {"code", "message_code"})
+    assert code["schema"]["enum"] == [COURIER, COFFEE]
+
+
+def test_the_sequence_of_the_xsd():
+    schema = etree.parse(CONTRACT_DIR / "publishers.xsd")
+    elements = schema.iterfind("//{*}complexType[@name='deliveryRequestMessage']//{*}element")
+    assert tuple(element.get("name") for element in elements) == XSD_FIELDS
+    assert set(MESSAGE_FIELDS) == set(XSD_FIELDS)
+    assert tuple(EXAMPLE) == COORDINATES
