@@ -30,8 +30,8 @@ def record_exception(
         return
     known = [id_ for id_ in ids if id_ in run.judge.evidence]
     now = run.judge.counts(known)
-    # Those that the check had not come to; when it had come to all, the one that it is named for.
-    open_ids = [id_ for id_ in known if now[id_] == judged[id_]] or known[:1]
+    # Those that the check had not come to; when it had come to all, all: each might have had a further case.
+    open_ids = [id_ for id_ in known if now[id_] == judged[id_]] or known
     if isinstance(error, NoAnswerError):
         _no_answer(run, alive, known, open_ids, error)
         return

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from conformance.verdict.verdicts import Verdict
 
 RESULT_FORMAT = "roaas-result/1"
+_PACKAGE = Path(__file__).parents[1]
+# The rooms that decide what is asked and what is said of it.
+JUDGING = ("contract", "transport", "documents", "verdict", "rest", "soap", "robot", "checks", "engine")
 # As much of a body as a reader looks at; its length is always told.
 _SHOWN_BODY = 4096
 _SHOWN_CURL = 20_000
@@ -188,13 +191,24 @@ def suite_version() -> str:
     return _installed("roaas")
 
 
-def suite_digest(contract: Contract) -> str:
-    """Digest over the suite's modules and the contract's files: two runs with the same digest asked the same."""
+def suite_digest(contract: Contract, package: Path = _PACKAGE) -> str:
+    """Digest over the modules that judge and the contract's files: two runs with the same digest asked the same.
+
+    Args:
+        contract: what is judged by.
+        package: the suite's folder.
+    """
+    modules = {
+        path.relative_to(package).as_posix(): path for room in JUDGING for path in (package / room).rglob("*.py")
+    }
+    texts = {
+        f"the contract: {path.name}": path
+        for path in contract.directory.iterdir()
+        if path.is_file() and path.suffix != ".py"
+    }
     digest = hashlib.sha256()
-    package = Path(__file__).parents[1]
-    files = [*package.rglob("*.py"), *(path for path in contract.directory.iterdir() if path.is_file())]
-    for path in sorted(set(files)):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    for name, path in sorted({**modules, **texts}.items()):
+        digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return f"sha256:{digest.hexdigest()}"
 
 

@@ -1,0 +1,57 @@
+"""Two runs with the same digest asked the same: it covers what judges, and nothing else."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from conformance.contract.files import CONTRACT_DIR, Contract
+from conformance.engine.result import JUDGING, suite_digest
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A suite with one module in each room."""
+    for room in (*JUDGING, "selftest", "cli"):
+        (tmp_path / room).mkdir()
+        (tmp_path / room / "module.py").write_text("x = 1\n")
+    return tmp_path
+
+
+def test_the_rooms_that_judge_are_all_there_are_but_two():
+    rooms = {path.parent.name for path in CONTRACT_DIR.parent.glob("*/__init__.py")}
+    assert rooms - set(JUDGING) == {"selftest", "cli"}
+
+
+@pytest.mark.parametrize("room", ["selftest", "cli"])
+def test_what_does_not_judge_is_not_in_it(package, room):
+    before = suite_digest(Contract.load(), package)
+    (package / room / "module.py").write_text("x = 2\n")
+    assert suite_digest(Contract.load(), package) == before
+
+
+@pytest.mark.parametrize("room", JUDGING)
+def test_what_judges_is_in_it(package, room):
+    before = suite_digest(Contract.load(), package)
+    (package / room / "module.py").write_text("x = 2\n")
+    assert suite_digest(Contract.load(), package) != before
+
+
+def test_where_a_module_lies_is_in_it(package):
+    before = suite_digest(Contract.load(), package)
+    (package / "rest" / "module.py").rename(package / "rest" / "other.py")
+    (package / "soap" / "module.py").rename(package / "rest" / "module.py")
+    (package / "rest" / "other.py").rename(package / "soap" / "module.py")
+    assert suite_digest(Contract.load(), package) == before, "the same modules at the same places"
+    (package / "soap" / "inner").mkdir()
+    (package / "soap" / "module.py").rename(package / "soap" / "inner" / "module.py")
+    assert suite_digest(Contract.load(), package) != before
+
+
+def test_the_contract_is_in_it(package, tmp_path_factory):
+    own = tmp_path_factory.mktemp("own")
+    shutil.copy(CONTRACT_DIR / "openapi.yaml", own)
+    before = suite_digest(Contract.load(own), package)
+    (own / "openapi.yaml").write_text((own / "openapi.yaml").read_text() + "\n")
+    assert suite_digest(Contract.load(own), package) != before
