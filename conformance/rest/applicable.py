@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import TYPE_CHECKING
 
 from conformance.documents.json_schema import kind_of
@@ -54,7 +55,7 @@ def answered(api: RestInterface) -> list[Call]:
     found = []
     for call in reads(api):
         answer = call.send(api).response
-        if answer.status == 200:  # noqa: PLR2004 - RFC 9110 15.3.1
+        if answer.status == HTTPStatus.OK:
             found.append(call)
     return found
 

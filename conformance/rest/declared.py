@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import TYPE_CHECKING
 
 from conformance.documents.json_schema import shape_of
@@ -58,7 +59,7 @@ def _status_fits(operation: Operation, answer: Response, context: RequestContext
     # Invalid input may be refused with any 4xx (contract, fine print); 404 only where a value is in the path.
     has_input = bool(context.request.body or operation.parameters or operation.bodies)
     elsewhere = status == _NO_METHOD or (status == _NOT_FOUND and not operation.parameter("path"))
-    return has_input and 400 <= status < _SERVER_ERROR and not elsewhere  # noqa: PLR2004 - RFC 9110 15.5
+    return has_input and HTTPStatus.BAD_REQUEST <= status < _SERVER_ERROR and not elsewhere
 
 
 def _judge_body(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:

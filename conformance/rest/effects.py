@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 
 from conformance.documents.openapi import operations_of
@@ -42,7 +43,7 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
     renew_at = time.monotonic() + 0.4 * (limits.hold_s or math.inf)
     while True:
         shown = flatten(read.send(api, ("Accept", JSON)))
-        if shown["status"] == 404:  # noqa: PLR2004 - what was put has ended since: a goal that was reached
+        if shown["status"] == HTTPStatus.NOT_FOUND:  # what was put has ended since: a goal that was reached
             return None
         other = [
             f"{place} is {shown.get(place, 'nothing')!r} for {value!r}"

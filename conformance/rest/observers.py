@@ -6,6 +6,7 @@ They judge only what the request itself makes applicable; strange requests are l
 from __future__ import annotations
 
 from email.utils import parsedate_to_datetime
+from http import HTTPStatus
 from typing import TYPE_CHECKING
 
 from conformance.documents.json_text import read_json
@@ -46,7 +47,7 @@ class Observer(Listener):
         self._judge_fields(exchange, answer, context)
         if answer.body and not context.is_head and is_json(answer.media_type):
             self._judge_json(exchange, answer)
-        if answer.status >= 400:  # noqa: PLR2004 - RFC 9110 15
+        if answer.status >= HTTPStatus.BAD_REQUEST:
             inside = inside_shown(answer.body)
             api.run.judge.check(
                 "http/no-traceback",
@@ -88,7 +89,8 @@ class Observer(Listener):
                 "Content-Type with a media type",
                 found=f"Content-Type {answer.header('content-type')!r} on {len(answer.body)} octets",
             )
-        if answer.status < 500 and context.request.raw is None:  # noqa: PLR2004 - RFC 9110 6.6.1 leaves 5xx free
+        # RFC 9110 6.6.1 leaves 5xx free.
+        if answer.status < HTTPStatus.INTERNAL_SERVER_ERROR and context.request.raw is None:
             date = answer.header("date")
             judge.check(
                 "http/date", _is_date(date), exchange, "Date with the time of the answer", found=f"Date: {date}"
@@ -117,12 +119,12 @@ class Observer(Listener):
     def _judge_server_error(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
         status = answer.status
         fine = (
-            status < 500  # noqa: PLR2004 - RFC 9110 15.6
-            or (status == 501 and context.request.method not in KNOWN_METHODS)  # noqa: PLR2004
-            or (status == 503 and answer.header("retry-after") is not None)  # noqa: PLR2004
-            or (status == 505 and context.request.raw is not None)  # noqa: PLR2004 - HTTP version not supported
+            status < HTTPStatus.INTERNAL_SERVER_ERROR
+            or (status == HTTPStatus.NOT_IMPLEMENTED and context.request.method not in KNOWN_METHODS)
+            or (status == HTTPStatus.SERVICE_UNAVAILABLE and answer.header("retry-after") is not None)
+            or (status == HTTPStatus.HTTP_VERSION_NOT_SUPPORTED and context.request.raw is not None)
         )
-        retry = " without Retry-After" if status == 503 else ""  # noqa: PLR2004
+        retry = " without Retry-After" if status == HTTPStatus.SERVICE_UNAVAILABLE else ""
         self._api.run.judge.check(
             "http/no-server-error",
             fine,

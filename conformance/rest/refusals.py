@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import TYPE_CHECKING
 
 from conformance.rest import problem
@@ -20,7 +21,7 @@ _MALFORMED, _INVALID = 400, 422
 
 def refuses(status: int) -> bool:
     """Whether a status refuses a request because of what is in it."""
-    return 400 <= status < 500 and status not in _NO_REFUSALS  # noqa: PLR2004 - RFC 9110 15.5
+    return HTTPStatus.BAD_REQUEST <= status < HTTPStatus.INTERNAL_SERVER_ERROR and status not in _NO_REFUSALS
 
 
 def judge_refusal(

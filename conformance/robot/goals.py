@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from http import HTTPStatus
 from typing import TYPE_CHECKING, Final
 
 import pytest
@@ -34,7 +35,7 @@ def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
     if not goals:
         goals = [here.ahead(reach)]
         _, _, exchange = ask(robot, goals[0])
-        if 400 <= exchange.response.status < 500:  # noqa: PLR2004 - RFC 9110 15.5
+        if HTTPStatus.BAD_REQUEST <= exchange.response.status < HTTPStatus.INTERNAL_SERVER_ERROR:
             pytest.skip("the robot has no plan to any pose around it")
     for part in range(1, count):
         if len(goals) < count:
