@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 
 from conformance.selftest.mutants.changes import TNS, instead, plain, posted, rewritten
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped, fault
 
 if TYPE_CHECKING:
@@ -189,9 +189,7 @@ class _Exhausted:
         return forward(request)
 
 
-def _mutant(name: str, says: str, id_: str, make: Any, interface: str = "soap") -> Mutant:
-    return Mutant(name, says, (f"xml-security/{id_}",), interface, make)
-
+_mutant = of_class("xml-security", "soap")
 
 MUTANTS = (
     _mutant(
@@ -266,7 +264,7 @@ MUTANTS = (
         "A Document Type Declaration in a REST body is passed over.",
         "rest",
         instead(_rest_xml, plain(204)),
-        "rest",
+        interface="rest",
     ),
-    _mutant("attack-exhausted", "After an attack everything takes 1.6 s.", "responsive", _Exhausted, "both"),
+    _mutant("attack-exhausted", "After an attack everything takes 1.6 s.", "responsive", _Exhausted, interface="both"),
 )

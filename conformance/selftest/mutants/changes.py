@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
+from conformance.selftest.change import HangUpError
 from conformance.selftest.messages import Response
 
 if TYPE_CHECKING:
@@ -158,6 +159,15 @@ def instead(where: Where, response: Callable[[Request], Response]) -> Make:
         return change
 
     return make
+
+
+def hanging_up(where: Where) -> Make:
+    """Close the connection in place of a response."""
+
+    def respond(_request: Request) -> Response:
+        raise HangUpError
+
+    return instead(where, respond)
 
 
 def plain(

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from conformance.selftest.change import HangUpError
 from conformance.selftest.mutants.changes import (
     altered,
     becomes,
     deliveries,
+    hanging_up,
     instead,
     plain,
     problem,
     rewritten,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -85,14 +85,7 @@ class _OnlyOnce:
         return forward(request)
 
 
-def _hung_up(request: Request, forward: Forward) -> Response:
-    if deliveries(request):
-        raise HangUpError
-    return forward(request)
-
-
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (f"rest-delivery/{id_}",), "rest", make)
+_mutant = of_class("rest-delivery", "rest")
 
 
 def _page(response: Response) -> None:
@@ -111,7 +104,7 @@ MUTANTS = (
             problem(404, "code: 4 is not known"),
         ),
     ),
-    _mutant("delivery-silent", "A delivery is accepted by closing the connection.", "put", lambda: _hung_up),
+    _mutant("delivery-silent", "A delivery is accepted by closing the connection.", "put", hanging_up(deliveries)),
     _mutant(
         "delivery-sometimes-lost",
         "One delivery in 50 is answered 500.",

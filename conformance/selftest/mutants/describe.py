@@ -17,7 +17,7 @@ from conformance.selftest.mutants.changes import (
     tree,
     values,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -71,9 +71,7 @@ def _parameter_lost(root: Any) -> None:
             node.getparent().remove(node)
 
 
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (f"describe/{id_}",), "rest", make)
-
+_mutant = of_class("describe", "rest")
 
 MUTANTS = (
     _mutant("openapi-gone", "There is no /openapi.json.", "openapi", instead(_OPENAPI, problem(404, "no description"))),

@@ -21,7 +21,7 @@ from conformance.selftest.mutants.changes import (
     text,
     tree,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -84,8 +84,7 @@ def _as_properties(response: Response) -> None:
     )
 
 
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (f"rest-formats/{id_}",), "rest", make)
+_mutant = of_class("rest-formats", "rest")
 
 
 def _no_xml_input(request: Request, forward: Forward) -> Response:

@@ -31,7 +31,7 @@ from conformance.selftest.mutants.goal_memory import (
     pose_of,
     position,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -108,9 +108,7 @@ def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
     return apply
 
 
-def _mutant(name: str, says: str, catches: str | tuple[str, ...], make: Any) -> Mutant:
-    ids = (catches,) if isinstance(catches, str) else catches
-    return Mutant(name, says, tuple(f"rest-resources/{id_}" for id_ in ids), "rest", make)
+_mutant = of_class("rest-resources", "rest")
 
 
 def _nothing(response: Response, status_: int) -> None:

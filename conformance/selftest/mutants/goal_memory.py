@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-import threading
 from typing import TYPE_CHECKING, Any
 
 from conformance.selftest.messages import Response
 from conformance.selftest.mutants.changes import GOAL, parsed, plain, problem, rest, success
+from conformance.selftest.mutants.in_background import later
 
 if TYPE_CHECKING:
     from conformance.selftest.change import Forward
@@ -109,16 +109,9 @@ class Abandoned:
         """See proxy.Change."""
         response = forward(request)
         if _PUT(request) and response.status in {201, 202}:
-            later = request.copy(method="DELETE", body=b"", fields=[("Host", "robot"), ("Connection", "close")])
-            threading.Timer(0.4, _quietly, (forward, later)).start()
+            fields = [("Host", "robot"), ("Connection", "close")]
+            later(0.4, forward, request.copy(method="DELETE", body=b"", fields=fields))
         return response
-
-
-def _quietly(forward: Forward, request: Request) -> None:
-    try:
-        forward(request)
-    except Exception:  # noqa: BLE001 - the run may be over
-        return
 
 
 class Unreachable:

@@ -20,7 +20,7 @@ from conformance.selftest.mutants.changes import (
     text,
     values,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 _ANY, _GET, _POSE = rest(), rest("GET"), rest("GET", POSE)
 _INPUT = rest("PUT", *RESOURCES)
+_SESAME = "open-sesame"
 _TRACE = (
     'Traceback (most recent call last):\n  File "/opt/robot/server.py", line 118, in handle\n'
     '    x = float(body["linear"]["x"])\nKeyError: \'linear\''
@@ -139,15 +140,14 @@ def _token(refused: Callable[[Request], Response]) -> Callable[[], Any]:
     """A robot that wants a token, and refuses in its own way where it is missing or wrong."""
 
     def change(request: Request, forward: Forward) -> Response:
-        if request.side == "rest" and request.raw is None and request.field("Authorization") != "Bearer open-sesame":
+        if request.side == "rest" and request.raw is None and request.field("Authorization") != f"Bearer {_SESAME}":
             return refused(request)
         return forward(request)
 
     return lambda: change
 
 
-def _mutant(name: str, says: str, id_: str, make: Any, token: str = "") -> Mutant:
-    return Mutant(name, says, (f"http/{id_}",), "rest", make, token=token)
+_mutant = of_class("http", "rest")
 
 
 def _marked(response: Response) -> None:
@@ -273,13 +273,13 @@ MUTANTS = (
         "Without the token, the answer is 403.",
         "authentication",
         _token(problem(403, "no token")),
-        "open-sesame",
+        token=_SESAME,
     ),
     _mutant(
         "http-token-unnamed",
         "Without the token, the answer is 401 without WWW-Authenticate.",
         "authentication",
         _token(problem(401, "no token")),
-        "open-sesame",
+        token=_SESAME,
     ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from conformance.selftest.mutants.changes import (
     GOAL,
@@ -26,7 +26,7 @@ from conformance.selftest.mutants.changes import (
     success,
     values,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -119,8 +119,7 @@ def _not_found(request: Request, forward: Forward) -> Response:
     return response
 
 
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (f"http/{id_}",), "rest", make)
+_mutant = of_class("http", "rest")
 
 
 def _page(response: Response) -> None:

@@ -25,7 +25,7 @@ from conformance.selftest.mutants.changes import (
     success,
 )
 from conformance.selftest.mutants.delivery import any_code, finite, lenient, segments
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -210,9 +210,7 @@ def _path(request: Request) -> None:
         segments(edit)(request)
 
 
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (f"strict-input/{id_}",), "rest", make)
-
+_mutant = of_class("strict-input", "rest")
 
 MUTANTS = (
     _mutant("input-malformed-fine", "JSON that is none is answered 204.", "json-malformed", _swallowed(_malformed)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,3 +38,14 @@ class Mutant:
     observer: bool = False
     token: str = ""
     serial: bool = False
+
+
+def of_class(class_: str, interface: str) -> Callable[..., Mutant]:
+    """A maker of mutants that requirements of one class catch: their names in the class, or the only one's."""
+
+    def mutant(name: str, says: str, catches: str | tuple[str, ...], make: Callable[[], Change], **more: Any) -> Mutant:
+        names = (catches,) if isinstance(catches, str) else catches
+        settings: dict[str, Any] = {"interface": interface, **more}
+        return Mutant(name, says, tuple(f"{class_}/{one}" for one in names), make=make, **settings)
+
+    return mutant

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlencode
 
 from conformance.selftest.mutants.changes import PLAN, altered, becomes, rest, rewritten, status, values
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -71,9 +71,7 @@ def _frame(value: Any) -> None:
         pose["header"]["frame_id"] = "base_link"
 
 
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (f"rest-resources/{id_}",), "rest", make)
-
+_mutant = of_class("rest-resources", "rest")
 
 MUTANTS = (
     _mutant(

@@ -5,39 +5,26 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from conformance.selftest.change import HangUpError
-from conformance.selftest.mutants.changes import instead, plain
+from conformance.selftest.mutants.changes import hanging_up, instead, plain, rest
 from conformance.selftest.mutants.mutant import Mutant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from conformance.selftest.change import Change, Forward
     from conformance.selftest.messages import Request, Response
 
 _REST_CLASSES = ("rest-resources", "rest-delivery", "http", "safety", "equivalence", "strict-input")
 _LOST = plain(404, b"<html><body>It works!</body></html>", "text/html")
 
 
-def _hung_up() -> Change:
-    def change(request: Request, forward: Forward) -> Response:
-        if request.side == "rest":
-            raise HangUpError
-        return forward(request)
-
-    return change
-
-
 def _service(name: str) -> Callable[[Request], bool]:
     return lambda request: request.side == "soap" and name in request.path
 
 
-def _nothing_there() -> Change:
-    def change(request: Request, forward: Forward) -> Response:  # noqa: ARG001 - a change has a way forward
-        if request.side == "rest":
-            raise HangUpError
-        return _LOST(request)
-
-    return change
+def _nothing_there(request: Request) -> Response:
+    if request.side == "rest":
+        raise HangUpError
+    return _LOST(request)
 
 
 MUTANTS = (
@@ -47,7 +34,7 @@ MUTANTS = (
             f"REST closes every connection without an answer (seen by class {name}).",
             (f"{name}/reachable",),
             "rest",
-            _hung_up,
+            hanging_up(rest()),
         )
         for name in _REST_CLASSES
     ),
@@ -77,6 +64,6 @@ MUTANTS = (
         "REST hangs up, and SOAP is somebody else's web server.",
         ("xml-security/reachable",),
         "both",
-        _nothing_there,
+        instead(lambda _request: True, _nothing_there),
     ),
 )

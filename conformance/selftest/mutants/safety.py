@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +20,9 @@ from conformance.selftest.mutants.changes import (
     values,
 )
 from conformance.selftest.mutants.goal_memory import active
+from conformance.selftest.mutants.in_background import later
 from conformance.selftest.mutants.input_effects import drive, goal_ahead, sent
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -57,20 +57,15 @@ class _Relentless:
             self._turn += 1
         response = forward(request)
         if _PUT(request) and success(response) and moving(request):
-            threading.Thread(target=self._renew, args=(self._turn, request.copy(), forward), daemon=True).start()
+            later(0.15, self._renew, self._turn, request.copy(), forward)
         return response
 
     def _renew(self, turn: int, request: Request, forward: Forward) -> None:
         until = time.monotonic() + 10
         value = parsed(request.body)
-        while time.monotonic() < until:
+        while time.monotonic() < until and self._turn == turn:
+            sent(request, forward, "PUT", VELOCITY, value)
             time.sleep(0.15)
-            if self._turn != turn:
-                return
-            try:
-                sent(request, forward, "PUT", VELOCITY, value)
-            except Exception:  # noqa: BLE001 - the run may be over
-                return
 
 
 class _ShortOfBreath:
@@ -83,16 +78,12 @@ class _ShortOfBreath:
         response = forward(request)
         if _PUT(request) and success(response):
             self._turn += 1
-            threading.Thread(target=self._end, args=(self._turn, request.copy(), forward), daemon=True).start()
+            later(0.15, self._end, self._turn, request.copy(), forward)
         return response
 
     def _end(self, turn: int, request: Request, forward: Forward) -> None:
-        time.sleep(0.15)
         if self._turn == turn:
-            try:
-                drive(request, forward, 0.0)
-            except Exception:  # noqa: BLE001 - the run may be over
-                return
+            drive(request, forward, 0.0)
 
 
 class _Once:
@@ -122,34 +113,19 @@ class _SlowCancel:
         gone = time.monotonic() < self._until
         if _DELETE(request) and not gone and active(forward, request) is not None:
             self._until = time.monotonic() + 3.0
-            threading.Thread(target=self._later, args=(request.copy(), forward), daemon=True).start()
+            later(3.0, sent, request.copy(), forward, "DELETE", GOAL)
             return plain(204)(request)
         if gone and rest("GET DELETE", GOAL)(request):
             body = b'{"status": 404, "detail": "there is no goal"}'
             return plain(404, body, "application/problem+json")(request)
         return forward(request)
 
-    def _later(self, request: Request, forward: Forward) -> None:
-        time.sleep(3.0)
-        try:
-            sent(request, forward, "DELETE", GOAL)
-        except Exception:  # noqa: BLE001 - the run may be over
-            return
-
 
 def _second_wind(request: Request, forward: Forward) -> Response:
     """A second after its goal was cancelled, the robot drives again."""
     response = forward(request)
     if _DELETE(request) and response.status == 204:
-        later = request.copy()
-
-        def again() -> None:
-            try:
-                goal_ahead(later, forward, 0.8)
-            except Exception:  # noqa: BLE001 - the run may be over
-                return
-
-        threading.Timer(1.0, again).start()
+        later(1.0, goal_ahead, request.copy(), forward, 0.8)
     return response
 
 
@@ -215,16 +191,13 @@ class _Stubborn:
         if self._last is None or not _zero(parsed(request.body)):
             return forward(request)
         last, self._last = self._last, None
-        threading.Thread(target=self._go_on, args=(self._turn, last, request.copy(), forward), daemon=True).start()
+        later(0, self._go_on, self._turn, last, request.copy(), forward)
         return plain(204)(request)
 
     def _go_on(self, turn: int, last: Any, request: Request, forward: Forward) -> None:
         until = time.monotonic() + 3
         while time.monotonic() < until and self._turn == turn:
-            try:
-                sent(request, forward, "PUT", VELOCITY, last)
-            except Exception:  # noqa: BLE001 - the run may be over
-                return
+            sent(request, forward, "PUT", VELOCITY, last)
             time.sleep(0.15)
 
 
@@ -249,9 +222,7 @@ def _unchanged() -> Callable[[Request, Forward], Response]:
     return lambda request, forward: forward(request)
 
 
-def _mutant(name: str, says: str, ids: tuple[str, ...], make: Any, **more: Any) -> Mutant:
-    return Mutant(name, says, tuple(f"safety/{id_}" for id_ in ids), "rest", make, **more)
-
+_mutant = of_class("safety", "rest")
 
 MUTANTS = (
     _mutant("safety-relentless", "A velocity holds for ten seconds.", ("watchdog",), _Relentless),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from lxml import etree
 
 from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, posted, rewritten, soap, xml
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import coded, enveloped, fault, is_fault
 
 if TYPE_CHECKING:
@@ -136,9 +136,7 @@ def _unknown(request: Request) -> bool:
 _NOTHING = f'<t:NothingResponse xmlns:t="{TNS}"/>'
 
 
-def _mutant(name: str, says: str, id_: str, make: Any, *, observer: bool = False) -> Mutant:
-    return Mutant(name, says, (f"soap-basic-profile/{id_}",), "soap", make, observer=observer)
-
+_mutant = of_class("soap-basic-profile", "soap")
 
 MUTANTS = (
     _mutant("bp-any-envelope", "An Envelope of any namespace is taken.", "R1015", rewritten(_foreign, _made_soap11)),

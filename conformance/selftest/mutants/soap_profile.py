@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from lxml import etree
 
@@ -16,7 +16,7 @@ from conformance.selftest.mutants.changes import (
     text,
     tree,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import (
     bare_500,
     coded,
@@ -75,8 +75,7 @@ def _not_post(request: Request) -> bool:
     )
 
 
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (f"soap-basic-profile/{id_}",), "soap", make)
+_mutant = of_class("soap-basic-profile", "soap")
 
 
 def _any_type(request: Request, forward: Forward) -> Response:

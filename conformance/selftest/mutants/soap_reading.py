@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from conformance.selftest.mutants.changes import altered, named, rewritten, soap, text, tree
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -59,9 +59,7 @@ def _in_map(request: Request) -> None:
     request.body = request.body.replace(b"no_such_frame", b"map")
 
 
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (f"soap-subscribers/{id_}",), "soap", make)
-
+_mutant = of_class("soap-subscribers", "soap")
 
 MUTANTS = (
     _mutant(

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
-from conformance.selftest.change import HangUpError
-from conformance.selftest.mutants.changes import TNS, altered, named, plain, text, tree, wsdls
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.changes import TNS, altered, hanging_up, named, plain, text, tree, wsdls
+from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -158,12 +157,6 @@ def _optional(schema: Any) -> None:
             return
 
 
-def _silent(request: Request, forward: Forward) -> Response:
-    if wsdls(request):
-        raise HangUpError
-    return forward(request)
-
-
 def _elsewhere(response: Response) -> None:
     response.body = re.sub(rb'location="http://[^"]*"', b'location="http://127.0.0.1:9/turtlesim"', response.body)
 
@@ -176,9 +169,7 @@ def _inline_no_target(root: Any) -> None:
         schema.addnext(made)
 
 
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (f"describe/{id_}",), "soap", make)
-
+_mutant = of_class("describe", "soap")
 
 _OPERATION = f"{_W}portType/{_W}operation"
 _BINDING = f"{_W}binding"
@@ -191,7 +182,7 @@ MUTANTS = (
         "wsdl",
         lambda: lambda request, forward: plain(404)(request) if wsdls(request) else forward(request),
     ),
-    _mutant("wsdl-silent", "Asked for its WSDL, the robot hangs up.", "wsdl", lambda: _silent),
+    _mutant("wsdl-silent", "Asked for its WSDL, the robot hangs up.", "wsdl", hanging_up(wsdls)),
     _mutant("wsdl-broken", "The WSDL is not closed.", "wsdl", altered(_description, text(r"</[\w:]+>\s*$", ""))),
     _mutant("wsdl-import-gone", "What the WSDL imports is not there.", "wsdl", lambda: _broken_import),
     _mutant(
