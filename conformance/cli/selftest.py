@@ -43,12 +43,22 @@ _SHORT = (
 @click.option(
     "--faults", "patterns", multiple=True, metavar="PATTERN", help="Only faults whose names match (repeatable)."
 )
-@click.option("--target", type=click.Choice(["reference", "plain", "baroque"]), default="reference", show_default=True,
-              help="The good robot behind the faults; independent robots need no ROS.")  # fmt: skip
+@click.option(
+    "--target",
+    type=click.Choice(["reference", "plain", "baroque"]),
+    default="reference",
+    show_default=True,
+    help="The good robot behind the faults; independent robots need no ROS.",
+)
 @click.option("--seeds", type=click.IntRange(min=0), default=20, show_default=True, help="Seeds for each good robot.")
 @click.option("--short", is_flag=True, help="A dozen faults and one seed, in less than a minute.")
-@click.option("--effort", type=click.Choice(["quick", "standard"]), default="quick", show_default=True,
-              help="Of the first run of each; a fault that is missed is tried again at standard.")  # fmt: skip
+@click.option(
+    "--effort",
+    type=click.Choice(["quick", "standard"]),
+    default="quick",
+    show_default=True,
+    help="Of the first run of each; a fault that is missed is tried again at standard.",
+)
 @click.option(
     "--compare/--no-compare", default=True, help="Run the plain Schemathesis command line against the REST faults too."
 )
@@ -60,8 +70,13 @@ _SHORT = (
     "--domain-id", type=click.IntRange(0, 100), default=80, show_default=True, help="First ROS domain to use."
 )
 @click.option("--list", "listed", is_flag=True, help="List the faults, and run nothing.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out/selftest"),
-              show_default=True, help="Folder for selftest.json and the matrix.")  # fmt: skip
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("out/selftest"),
+    show_default=True,
+    help="Folder for selftest.json and the matrix.",
+)
 def selftest(**options: Any) -> None:
     """Show that the suite catches faulty robots and blames no good one.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
+from typing import Any
 
 _REASONS = {status.value: status.phrase for status in HTTPStatus}
 _INFORMATIONAL = range(100, 200)
@@ -77,9 +78,9 @@ class Request(_Message):
         """What follows the question mark."""
         return self.target.partition("?")[2]
 
-    def copy(self, **changes: object) -> Request:
+    def copy(self, **changes: Any) -> Request:
         """A copy with other parts; its fields can be altered without altering ours."""
-        return replace(self, **{"fields": list(self.fields), **changes})  # type: ignore[arg-type] # fields by name
+        return replace(self, **{"fields": list(self.fields), **changes})
 
     def octets(self) -> bytes:
         """Its octets, with a Content-Length that fits unless several contradict each other."""

@@ -7,7 +7,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from conformance.selftest.certifying import Job, Outcome, run_job
 from conformance.selftest.change import unchanged
@@ -91,7 +91,7 @@ class RobotPool:
         self._free.put((robot, proxy))
 
 
-def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, **more: object) -> Job:
+def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, **more: Any) -> Job:
     """A job that judges a robot through its proxy."""
     return Job(
         statement=statement_of(robot.kind),
@@ -101,7 +101,7 @@ def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, **more: object) 
         effort=effort,
         seed=seed,
         timeout_s=_TIMEOUTS[effort],
-        **more,  # type: ignore[arg-type] # Job's further fields by name
+        **more,
     )
 
 

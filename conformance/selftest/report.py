@@ -116,7 +116,7 @@ class Report:
 
     def matrix(self) -> str:
         """The matrix, as a table: each mutant, and the requirements that caught it."""
-        compared = {seen.mutant: seen.caught for seen in self.compared}
+        compared = {seen.mutant: "caught" if seen.caught else "not caught" for seen in self.compared}
         lines = [
             "# Faulty robots, and what caught them",
             "",
@@ -129,9 +129,9 @@ class Report:
             ours = [id_ for id_ in result.caught if id_ in result.mutant.catches]
             others = len(result.caught) - len(ours)
             caught = ", ".join(f"`{id_}`" for id_ in ours) + (f" and {others} more" if others else "")
-            known = {True: "caught", False: "not caught"}.get(compared.get(result.mutant.name))  # type: ignore[arg-type] # None is no key
+            known = compared.get(result.mutant.name, "")
             missed = ", ".join(f"`{id_}`" for id_ in result.missed)
-            cells = (result.mutant.name, result.mutant.says, result.not_tried or caught, missed, known or "")
+            cells = (result.mutant.name, result.mutant.says, result.not_tried or caught, missed, known)
             lines.append(f"| {' | '.join(cells)} |")
         return "\n".join(lines) + "\n"
 

@@ -197,9 +197,16 @@ def test_soap_operations_answer_with_their_wrappers(robot):
 
 @pytest.mark.parametrize(
     "content",
-    ["", MESSAGE.format(7), MESSAGE.format("x"), MESSAGE.format(2**31), MESSAGE.format(3).replace("6.25", "INF"),
-     MESSAGE.format(3).replace("<depot_x>1</depot_x>", ""), MESSAGE.format(3).replace("depot_x", "depot_q")],
-)  # fmt: skip
+    [
+        "",
+        MESSAGE.format(7),
+        MESSAGE.format("x"),
+        MESSAGE.format(2**31),
+        MESSAGE.format(3).replace("6.25", "INF"),
+        MESSAGE.format(3).replace("<depot_x>1</depot_x>", ""),
+        MESSAGE.format(3).replace("depot_x", "depot_q"),
+    ],
+)
 def test_soap_faults_are_client_faults_with_500(robot, content):
     answer, envelope = robot.call("ExecuteDeliveryRequest", content)
     fault = body_of(envelope)

@@ -8,11 +8,6 @@ from click.testing import CliRunner
 from conformance.cli.contract import contract
 from conformance.cli.selftest import selftest
 from conformance.contract.files import CONTRACT_FILES
-from conformance.selftest.certifying import Outcome
-from conformance.selftest.controls import ControlResult
-from conformance.selftest.mutant_run import MutantResult
-from conformance.selftest.mutants import MUTANTS
-from conformance.selftest.report import Report
 
 
 def run(command, *words):
@@ -57,30 +52,6 @@ def test_a_mutant_is_caught_and_a_good_one_is_not_blamed(tmp_path):
     assert document["format"] == "roaas-selftest/1"
     assert document["faults"][0]["caught"] == ["rest-resources/sensors-unique"]
     assert "sensors-twice" in (tmp_path / "selftest.md").read_text()
-
-
-def outcome(code, **verdicts):
-    reasons = {id_.replace("_", "/", 1): "said" for id_, value in verdicts.items() if value != "pass"}
-    return Outcome(code, {id_.replace("_", "/", 1): value for id_, value in verdicts.items()}, reasons, 10, 1.0)
-
-
-def test_a_missed_mutant_and_a_blamed_robot_are_told(tmp_path):
-    mutant = MUTANTS[0]
-    report = Report(
-        "reference", [MutantResult(mutant, missed=mutant.catches, reasons={mutant.catches[0]: "pass: pass"})]
-    )
-    report.control_results = [ControlResult("plain", "", 3, outcome(1, http_date="fail"))]
-    assert not report.holds
-    assert f"MISSED {mutant.name}" in report.summary()
-    assert "BLAMED plain, seed 3, exit code 1: http/date: said" in report.summary()
-    report.write(tmp_path)
-    assert json.loads((tmp_path / "selftest.json").read_text())["holds"] is False
-
-
-def test_nothing_tried_is_no_proof():
-    assert not Report("reference").holds
-    assert Report("reference", control_results=[ControlResult("plain", "", 0, outcome(0, http_date="pass"))]).holds
-    assert not Report("reference", control_results=[ControlResult("plain", "", 0, outcome(4, http_date="skip"))]).holds
 
 
 def test_requirements_are_listed():
