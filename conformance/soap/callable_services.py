@@ -1,4 +1,4 @@
-"""Which SOAP services a check may ask in this run."""
+"""Which SOAP services a check may call in this run."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class SoapServices:
         return {name: service for name, service in named.items() if service is not None}
 
 
-def askable(soap: SoapServices, *ids: str) -> list[SoapService]:
-    """The services that may be asked, the one that only reads first.
+def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
+    """The services that may be called, the one that only reads first.
 
     What was not allowed or does not answer is put down against the requirements that need it, so that they are not
     passed on half of the evidence.
@@ -78,6 +78,6 @@ def _add(soap: SoapServices, service: SoapService, found: list[SoapService], rea
         found.append(service)
 
 
-def rounds(effort: Effort, standard: int) -> int:
+def repetitions(effort: Effort, standard: int) -> int:
     """How often to repeat what one time shows already, for the sake of failures that come now and then."""
     return max(1, round(standard * effort.factor))

@@ -13,7 +13,7 @@ from conformance.documents.wsdl import Description, DescriptionError, describe, 
 from conformance.documents.xml_names import WSDL_SOAP, clark
 from conformance.soap import comparison
 from conformance.soap.address import is_http, split
-from conformance.soap.callable_services import rounds
+from conformance.soap.callable_services import repetitions
 from conformance.soap.published_wsdl import get
 from conformance.soap.wsdl_rules import RULES
 from conformance.transport.client import HttpClient
@@ -88,7 +88,7 @@ def _served(service: SoapService) -> _Served:
 def test_served(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """GET ?wsdl answers with the description, and everything that it refers to can be had."""
     for service in _services(soap, "describe/wsdl"):
-        for _ in range(rounds(effort, 6)):
+        for _ in range(repetitions(effort, 6)):
             served = _served(service)
             judge.check(
                 "describe/wsdl",
@@ -104,7 +104,7 @@ def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> N
     """Names, operations, types and actions are those of the contract."""
     ids = [f"describe/{name_}" for name_ in _COMPARED]
     for service in _services(soap, *ids):
-        for _ in range(rounds(effort, 3)):
+        for _ in range(repetitions(effort, 3)):
             served = _served(service)
             broken = served.problem if served.description is None else comparison.broken(served.description)
             for name_, (compare, expected) in _COMPARED.items():
@@ -167,7 +167,7 @@ def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
 def test_profile(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """The description keeps the rules of the Basic Profile."""
     for service in _services(soap, *(f"describe/wsdl-{rule}" for rule in RULES)):
-        for _ in range(rounds(effort, 3)):
+        for _ in range(repetitions(effort, 3)):
             served = _served(service)
             for rule, check in RULES.items():
                 found = iter([served.problem]) if served.description is None else _guarded(check, served.description)

@@ -8,7 +8,7 @@ import pytest
 
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
-from conformance.soap.callable_services import askable
+from conformance.soap.callable_services import callable_services
 from conformance.soap.calls import call
 from conformance.soap.observer import PASSIVE
 
@@ -26,7 +26,7 @@ def test_every_answer_is_watched(soap: SoapServices, effort: Effort) -> None:
 
     To begin with, a fault is provoked and each operation without arguments is asked.
     """
-    for service in askable(soap, *PASSIVE):
+    for service in callable_services(soap, *PASSIVE):
         for _ in range(effort.cases(10)):
             call(service, _STRANGE)
             for operation in service.contract.operations if service is soap.subscribers else ():

@@ -9,7 +9,7 @@ import pytest
 
 from conformance.documents.xml_names import ENVELOPE, NEXT_ACTOR, clark
 from conformance.documents.xml_node import Node
-from conformance.soap.callable_services import askable, rounds
+from conformance.soap.callable_services import callable_services, repetitions
 from conformance.soap.calls import SoapResponse, call, send
 from conformance.soap.envelope import envelope
 from conformance.soap.valid_messages import example, quiet_example
@@ -49,7 +49,7 @@ def _is_fault(judge: Judge, id_: str, answer: SoapResponse, code: str, what: str
 @pytest.mark.requirement("soap-basic-profile/R1015", "soap-basic-profile/version-mismatch")
 def test_other_versions(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """An Envelope of another namespace is answered with a fault, VersionMismatch."""
-    for service in askable(soap, "soap-basic-profile/R1015", "soap-basic-profile/version-mismatch"):
+    for service in callable_services(soap, "soap-basic-profile/R1015", "soap-basic-profile/version-mismatch"):
         messages = _messages(service)[: effort.cases(10)] or [_UNKNOWN]
         for message in messages:
             answer = send(service, envelope([message], space=_OTHER_VERSION))
@@ -76,7 +76,7 @@ def test_other_versions(soap: SoapServices, judge: Judge, effort: Effort) -> Non
 @pytest.mark.requirement("soap-basic-profile/R1027", "soap-basic-profile/R1028")
 def test_must_understand(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """A mandatory header block that is not understood is answered with MustUnderstand, and nothing else is done."""
-    for service in askable(soap, "soap-basic-profile/R1027", "soap-basic-profile/R1028"):
+    for service in callable_services(soap, "soap-basic-profile/R1027", "soap-basic-profile/R1028"):
         for message in _messages(service)[: effort.cases(10)] or [_UNKNOWN]:
             for what, headers in (
                 ("a mandatory block", (_block("1"),)),
@@ -98,7 +98,7 @@ def test_must_understand(soap: SoapServices, judge: Judge, effort: Effort) -> No
 @pytest.mark.requirement("soap-basic-profile/mustunderstand-actor", "soap-basic-profile/R2739")
 def test_other_headers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Mandatory blocks for somebody else, and optional ones that the description does not have, change nothing."""
-    for service in askable(soap, "soap-basic-profile/mustunderstand-actor", "soap-basic-profile/R2739"):
+    for service in callable_services(soap, "soap-basic-profile/mustunderstand-actor", "soap-basic-profile/R2739"):
         for message in _messages(service)[: effort.cases(10)]:
             for id_, what, headers in (
                 ("mustunderstand-actor", "a mandatory block for another actor", (_block("1", "http://example.com/a"),)),
@@ -120,7 +120,7 @@ def test_other_headers(soap: SoapServices, judge: Judge, effort: Effort) -> None
 @pytest.mark.requirement("soap-basic-profile/R2725")
 def test_order_of_faults(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """VersionMismatch comes before MustUnderstand, and MustUnderstand before Client."""
-    for service in askable(soap, "soap-basic-profile/R2725"):
+    for service in callable_services(soap, "soap-basic-profile/R2725"):
         good = quiet_example(service)
         message = good[1] if good else _UNKNOWN
         broken = replace(message, children=(*message.children, Node("no_such_element", "x")))
@@ -130,7 +130,7 @@ def test_order_of_faults(soap: SoapServices, judge: Judge, effort: Effort) -> No
             (None, "an empty Body"),
         ):
             body = [payload] if payload is not None else []
-            for space in (_OTHER_VERSION,) * rounds(effort, 3):
+            for space in (_OTHER_VERSION,) * repetitions(effort, 3):
                 old = envelope(body, (_block("1", space=space),), space=space)
                 answer = send(service, old)
                 _is_fault(
@@ -140,6 +140,6 @@ def test_order_of_faults(soap: SoapServices, judge: Judge, effort: Effort) -> No
                     "VersionMismatch",
                     f"another envelope with a mandatory block and {what}",
                 )
-            for _ in range(rounds(effort, 3)):
+            for _ in range(repetitions(effort, 3)):
                 answer = call(service, *body, headers=(_block("1"),))
                 _is_fault(judge, "soap-basic-profile/R2725", answer, "MustUnderstand", f"a mandatory block and {what}")

@@ -9,7 +9,7 @@ import pytest
 from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xml_node import Node
-from conformance.soap.callable_services import askable, rounds
+from conformance.soap.callable_services import callable_services, repetitions
 from conformance.soap.calls import SoapResponse, call, read_exchange, send
 from conformance.soap.envelope import envelope
 from conformance.soap.valid_messages import quiet_example
@@ -36,14 +36,14 @@ def _message(service: SoapService) -> Node:
 @pytest.mark.requirement("soap-basic-profile/R1109")
 def test_soap_action(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """SOAPAction is taken in quotes, with something in them or nothing."""
-    for service in askable(soap, "soap-basic-profile/R1109"):
+    for service in callable_services(soap, "soap-basic-profile/R1109"):
         good = quiet_example(service)
         if good is None:
             judge.skip("soap-basic-profile/R1109", f"the {service.name} service took none of the messages tried")
             continue
         operation, message = good
         actions = ['""', f'"{operation.input_action or operation.name}"', '"http://example.com/some/action"']
-        for action in actions * rounds(effort, 3):
+        for action in actions * repetitions(effort, 3):
             answer = call(service, message, soap_action=action)
             judge.check(
                 "soap-basic-profile/R1109",
@@ -77,7 +77,7 @@ def _malformed(message: Node) -> list[tuple[str, bytes]]:
 @pytest.mark.requirement("soap-basic-profile/R1125", "soap-basic-profile/R1113")
 def test_malformed(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Malformed XML is answered 4xx without a fault (best 400), or 500 with one."""
-    for service in askable(soap, "soap-basic-profile/R1125", "soap-basic-profile/R1113"):
+    for service in callable_services(soap, "soap-basic-profile/R1125", "soap-basic-profile/R1113"):
         cases = _malformed(_message(service))
         apart = service.apart()
         for what, body in cases[: effort.cases(len(cases))]:
@@ -134,9 +134,9 @@ def _truncated(judge: Judge, service: SoapService) -> None:
 @pytest.mark.requirement("soap-basic-profile/R1114")
 def test_methods(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Methods other than POST are answered 405; GET may be answered with a description."""
-    for service in askable(soap, "soap-basic-profile/R1114"):
+    for service in callable_services(soap, "soap-basic-profile/R1114"):
         body = envelope([_message(service)]).written()
-        for method in ("PUT", "GET", "DELETE", "PATCH") * rounds(effort, 3):
+        for method in ("PUT", "GET", "DELETE", "PATCH") * repetitions(effort, 3):
             exchange = service.client.send(
                 method,
                 service.path,
@@ -166,9 +166,9 @@ def _is_description(exchange: Exchange) -> bool:
 def test_media_types(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """A message that comes as anything but text/xml is answered 415."""
     types = ("text/plain", "application/json", "application/octet-stream", "text/html", "application/xml")
-    for service in askable(soap, "soap-basic-profile/R1115"):
+    for service in callable_services(soap, "soap-basic-profile/R1115"):
         body = envelope([_message(service)]).written()
-        for media_type in types * rounds(effort, 3):
+        for media_type in types * repetitions(effort, 3):
             answer = send(service, body, content_type=media_type)
             judge.check(
                 "soap-basic-profile/R1115",

@@ -9,7 +9,7 @@ import pytest
 
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
-from conformance.soap.callable_services import askable
+from conformance.soap.callable_services import callable_services
 from conformance.soap.calls import call, send
 from conformance.soap.envelope import envelope
 from conformance.soap.mutations import invalid_ones, mutations
@@ -42,7 +42,7 @@ def _examples(service: SoapService) -> list[tuple[Operation, Node]]:
 @pytest.mark.requirement(*_REPEATED)
 def test_answers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """A valid message, without xsi:type, is answered 200 with the element that the description refers to."""
-    for service in askable(soap, *_REPEATED):
+    for service in callable_services(soap, *_REPEATED):
         good = _examples(service)
         if not good:
             for id_ in _REPEATED:
@@ -89,7 +89,7 @@ def _untyped(judge: Judge, service: SoapService) -> None:
 def test_dispatch(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """The operation is chosen by the Body's element, whatever SOAPAction says."""
     ids = ("soap-basic-profile/R1127", "xml-security/soapaction-spoofing")
-    for service in askable(soap, *ids):
+    for service in callable_services(soap, *ids):
         good = _examples(service)
         for operation, message in good:
             others = [other for other in service.contract.operations if other.name != operation.name]
@@ -119,7 +119,7 @@ def test_dispatch(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 def test_unknown_operation(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """A Body element that no operation has is never answered with success."""
     id_ = "soap-basic-profile/unknown-operation"
-    for service in askable(soap, id_):
+    for service in callable_services(soap, id_):
         space = service.contract.target_namespace
         known = [operation for operation in service.contract.operations if operation.request]
         tags = [clark(space, "NoSuchOperation"), clark(_STRANGE, "NoSuchOperation"), "NoSuchOperation"]
@@ -134,7 +134,7 @@ def test_unknown_operation(soap: SoapServices, judge: Judge, effort: Effort) -> 
 @pytest.mark.requirement("soap-basic-profile/R4001", "soap-basic-profile/utf-16")
 def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """A byte order mark is taken, and so is UTF-16."""
-    for service in askable(soap, "soap-basic-profile/R4001", "soap-basic-profile/utf-16"):
+    for service in callable_services(soap, "soap-basic-profile/R4001", "soap-basic-profile/utf-16"):
         for operation, message in _examples(service)[: effort.cases(6)]:
             plain = serialize(envelope([message]), XmlStyle())
             declared = '<?xml version="1.0" encoding="UTF-16"?>' + plain
@@ -159,7 +159,7 @@ def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 @pytest.mark.requirement("soap-basic-profile/R2724")
 def test_invalid_messages(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """A message that is not what the description says is answered with a Client fault."""
-    for service in askable(soap, "soap-basic-profile/R2724"):
+    for service in callable_services(soap, "soap-basic-profile/R2724"):
         for operation, message in _examples(service):
             declared = service.contract.shape(operation.request) if operation.request else None
             if declared is None:

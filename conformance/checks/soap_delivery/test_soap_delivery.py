@@ -11,7 +11,7 @@ from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import ADDRESSING, clark, local
 from conformance.documents.xml_node import Node
 from conformance.robot import delivery_messages
-from conformance.soap.callable_services import rounds
+from conformance.soap.callable_services import repetitions
 from conformance.soap.calls import SoapResponse, call, send
 from conformance.soap.envelope import envelope
 from conformance.soap.forms import written_integer
@@ -137,7 +137,7 @@ def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort
 def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> None:
     """WS-Addressing headers change nothing, with the action as the paper prints it and as JAX-WS RI makes it."""
     address = publishers.endpoint
-    for number in range(rounds(effort, 5)):
+    for number in range(repetitions(effort, 5)):
         for operation in _BOTH:
             for form in (operation, f"{operation}Request"):
                 action = f"{delivery_messages.NAMESPACE}TurtlebotPublishersInterface/{form}"

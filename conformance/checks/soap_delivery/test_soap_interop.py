@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from conformance.contract.delivery import COFFEE, COURIER, EXAMPLE
-from conformance.soap.callable_services import rounds
+from conformance.soap.callable_services import repetitions
 from conformance.soap.valid_messages import example
 from conformance.transport.exchange import NoAnswerError
 
@@ -83,7 +83,7 @@ def test_publishers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     client = _client(judge, "soap-delivery/interop", soap.publishers)
     if client is None:
         return
-    for code in (COFFEE, COURIER) * rounds(effort, 4):
+    for code in (COFFEE, COURIER) * repetitions(effort, 4):
         values: dict[str, Any] = {**EXAMPLE, "message_code": code}
         for operation in ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest"):
             if operation == "ExecuteCoffeeRequest":
@@ -102,7 +102,7 @@ def test_subscribers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     if client is None or soap.subscribers is None:
         return
     plan = _plan(soap.subscribers)
-    for _ in range(rounds(effort, 5)):
+    for _ in range(repetitions(effort, 5)):
         for operation, arguments in (
             ("GetPose", {}),
             ("GetVelocity", {}),

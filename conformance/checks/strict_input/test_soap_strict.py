@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import strategies as st
 
-from conformance.soap.callable_services import askable
+from conformance.soap.callable_services import callable_services
 from conformance.soap.calls import SoapResponse, call
 from conformance.soap.messages import ordinary, variants
 from conformance.soap.mutations import Mutation, invalid_ones, mutations
@@ -70,7 +70,7 @@ def test_single_mutations(soap: SoapServices, judge: Judge, effort: Effort) -> N
     """Every single mutation of a message that the robot takes is refused with a fault."""
     chance = random.Random(soap.run.seed)  # noqa: S311 - choice of cases, not of secrets
     asked: dict[str, int] = dict.fromkeys(_KINDS, 0)
-    services = askable(soap, *_IDS)
+    services = callable_services(soap, *_IDS)
     for service in services:
         found = [
             (declared, mutant) for _, declared, message in _targets(service) for mutant in mutations(declared, message)
@@ -95,7 +95,7 @@ def _nothing(services: list[SoapService], kind: str) -> str:
 @pytest.mark.requirement(*_IDS)
 def test_mutations_of_any_message(soap: SoapServices, judge: Judge, explore: Explorer) -> None:
     """Mutations are refused whatever the other values of the message are."""
-    for service in askable(soap, *_IDS):
+    for service in callable_services(soap, *_IDS):
         targets = [
             (declared, _fullest(declared, message)) for _, declared, message in _targets(service) if message.children
         ]

@@ -12,7 +12,7 @@ from conformance.documents.xml_names import ADDRESSING, clark
 from conformance.documents.xml_node import Node
 from conformance.soap.attack_runner import AttackRunner, judge_calls, outcome
 from conformance.soap.attacks import IGNORED_SLOT, VALUE_SLOT, Attack, Template, attacks
-from conformance.soap.callable_services import askable
+from conformance.soap.callable_services import callable_services
 from conformance.soap.callback_server import CallbackServer
 from conformance.soap.envelope import envelope
 from conformance.soap.messages import simple_leaves, with_text
@@ -97,7 +97,7 @@ def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Each attack in a message that the robot would take without it, in the Body and in a Header block."""
     if _no_soap(soap):
         return
-    services = askable(soap, *_IDS)
+    services = callable_services(soap, *_IDS)
     with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
         runners = []
         for service in services:
@@ -125,7 +125,7 @@ def test_addressing(soap: SoapServices, judge: Judge, effort: Effort) -> None:
         for id_ in (ids[0], "xml-security/soapaction-spoofing"):
             judge.unclaimed(id_, "the robot has no SOAP service")
         return
-    services = askable(soap, *ids)
+    services = callable_services(soap, *ids)
     with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
         runners = []
         for service in services:
