@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
-from conformance.selftest.mutants.changes import TNS, altered, hanging_up, named, plain, text, tree, wsdls
+from conformance.selftest.mutants.changes import TNS, altered, hanging_up, instead, named, plain, text, tree, wsdls
 from conformance.selftest.mutants.mutant import of_class
 
 if TYPE_CHECKING:
@@ -52,8 +52,7 @@ def _all(path: str, edit: Callable[[Any], object]) -> Callable[[Any], None]:
 
 def _first(path: str, edit: Callable[[Any], object]) -> Callable[[Any], None]:
     def apply(root: Any) -> None:
-        node = root.find(path)
-        if node is not None:
+        for node in root.findall(path)[:1]:
             edit(node)
 
     return apply
@@ -176,12 +175,7 @@ _BINDING = f"{_W}binding"
 _TRANSPORT = f"{_BINDING}/{_S}binding"
 
 MUTANTS = (
-    _mutant(
-        "wsdl-gone",
-        "There is no WSDL: 404.",
-        "wsdl",
-        lambda: lambda request, forward: plain(404)(request) if wsdls(request) else forward(request),
-    ),
+    _mutant("wsdl-gone", "There is no WSDL: 404.", "wsdl", instead(wsdls, plain(404))),
     _mutant("wsdl-silent", "Asked for its WSDL, the robot hangs up.", "wsdl", hanging_up(wsdls)),
     _mutant("wsdl-broken", "The WSDL is not closed.", "wsdl", altered(_description, text(r"</[\w:]+>\s*$", ""))),
     _mutant("wsdl-import-gone", "What the WSDL imports is not there.", "wsdl", lambda: _broken_import),
