@@ -6,13 +6,16 @@ Rooms are imported when their command is used, so that ``roaas certify`` needs n
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from conformance.contract.command import ResultCommand
+
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from conformance.contract.command import CommandResult
 
 _COMMANDS = {
     "robot": ("reference_robot.cli", "robot"),
@@ -34,8 +37,6 @@ _SUMMARIES = {
     "contract": "Show the requirements, export the contract's files.",
 }
 _EXTRAS = {"robot": "robot", "load": "load"}
-# Commands that leave a result file in --out, and that file: the reports room turns it into what people read.
-_RESULTS = {"certify": "result.json", "load": "latency.json"}
 _ROOMS = {"conformance", "loadtests", "reference_robot", "reports"}
 
 
@@ -65,39 +66,30 @@ class _Rooms(click.Group):
             ) from missing
         if not isinstance(command, click.Command):
             raise TypeError(f"{module}.{name} is no command")
-        if cmd_name in _RESULTS:
-            _render_afterwards(command, _RESULTS[cmd_name])
+        if isinstance(command, ResultCommand):
+            render_afterwards(command)
         return command
 
 
-def _render_afterwards(command: click.Command, result: str) -> None:
-    """Have the reports room render what the command left, also when it failed or was interrupted."""
+def render_afterwards(command: click.Command) -> None:
+    """Have the reports room render what the command says it wrote, also when it failed or was interrupted."""
     run = command.callback
-    if run is None or isinstance(run, _RunAndRender):
-        return
-    command.callback = _RunAndRender(run, result)
+    if run is not None and not isinstance(run, _RunAndRender):
+        command.callback = _RunAndRender(run)
 
 
 class _RunAndRender:
     """A command's callback that has the reports room render what it left."""
 
-    def __init__(self, run: Callable[..., Any], result: str) -> None:
+    def __init__(self, run: Callable[..., CommandResult]) -> None:
         self._run = run
-        self._result = result
 
-    def __call__(self, *args: Any, out: Path | str, **options: Any) -> Any:
-        file = Path(out, self._result)
-        before = _changed(file)
-        try:
-            return self._run(*args, out=out, **options)
-        finally:
-            if _changed(file) != before:
-                for path in import_module("reports").render(file.parent):
-                    click.echo(f"report: {path}")
-
-
-def _changed(path: Path) -> int:
-    return path.stat().st_mtime_ns if path.exists() else 0
+    def __call__(self, *args: Any, **options: Any) -> CommandResult:
+        result = self._run(*args, **options)
+        if result.file is not None:
+            for path in import_module("reports").render(result.file.parent):
+                click.echo(f"report: {path}")
+        return result
 
 
 @click.command(cls=_Rooms, context_settings={"help_option_names": ["-h", "--help"]})

@@ -1,4 +1,6 @@
-"""The process that measures: `python -m loadtests`, with the settings as JSON on its standard input.
+"""The process that measures: `python -m loadtests`.
+
+On its standard input stand the name of the file into which it puts the result's path, and the settings as JSON.
 
 It is a process of its own because importing Locust makes gevent replace the sockets, locks and sleeps of
 everything in the process: front door, reports and tests keep the real ones.
@@ -9,6 +11,7 @@ from __future__ import annotations
 import signal
 import sys
 import traceback
+from pathlib import Path
 
 from conformance.contract.exit_codes import ExitCode
 
@@ -21,10 +24,14 @@ def main() -> int:
 
     _raise_file_limit()
     try:
-        return carry_out(Settings.from_json(sys.stdin.read()))
+        written, _, settings = sys.stdin.read().partition("\n")
+        result = carry_out(Settings.from_json(settings))
     except Exception:  # noqa: BLE001 -- exit code 1 would say that the robot missed a threshold
         traceback.print_exc()
         return ExitCode.INCONCLUSIVE
+    if result.file is not None:
+        Path(written).write_text(str(result.file), encoding="utf-8")
+    return result.exit_code
 
 
 def _raise_file_limit() -> None:

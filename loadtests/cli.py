@@ -8,10 +8,12 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from conformance.contract.command import CommandResult, ResultCommand
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.statement import Statement, load_statement
 from conformance.contract.thresholds import load_thresholds
@@ -30,8 +32,8 @@ _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _FILE = click.Path(path_type=Path)
 
 
-def run_load(settings: Settings) -> int:
-    """Carry out a run in a process of its own; returns its exit code.
+def _run_load(settings: Settings, written: Path) -> CommandResult:
+    """Carry out a run in a process of its own, which says by a file of ours what it wrote.
 
     The process has its own session, so that Ctrl-C comes to it through us, once: it then writes what it has.
     """
@@ -49,7 +51,7 @@ def run_load(settings: Settings) -> int:
     earlier = {number: signal.signal(number, forward) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         if child.stdin is not None:
-            child.stdin.write(settings.to_json())
+            child.stdin.write(f"{written}\n{settings.to_json()}")
             child.stdin.close()
         code = child.wait()
     finally:
@@ -57,7 +59,7 @@ def run_load(settings: Settings) -> int:
             signal.signal(number, handler)
     if code < 0:  # ended by a signal: before it could take Ctrl-C as a wish, or by force
         code = ExitCode.INTERRUPTED if -code in earlier else ExitCode.INCONCLUSIVE
-    return code
+    return CommandResult(code, Path(written.read_text(encoding="utf-8")) if written.exists() else None)
 
 
 def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[float, ...]:
@@ -69,7 +71,7 @@ def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[fl
         raise click.BadParameter(f"{value!r} is no list of rates such as 100,200,400") from None
 
 
-@click.command()
+@click.command(cls=ResultCommand)
 @click.argument("statement", required=False, type=_FILE)
 @click.option("--rest", metavar="URL", help="The REST interface's base URL.")
 @click.option("--publishers-wsdl", metavar="URL|FILE", help="WSDL of the service that takes deliveries.")
@@ -114,8 +116,7 @@ def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[fl
 @click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")
 @click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
 @click.option("--out", metavar="DIR", default=DEFAULT_OUT, show_default=True, help="Where the result goes.")
-@click.pass_context
-def load(ctx: click.Context, /, statement: Path | None, **options: Any) -> None:
+def load(statement: Path | None, **options: Any) -> CommandResult:
     """Measure how fast a robot answers, SOAP against REST.
 
     Exit codes: 0 thresholds met, 1 missed, 2 usage, 3 robot not reachable, 4 measurement not valid, 130 interrupted.
@@ -128,8 +129,9 @@ def load(ctx: click.Context, /, statement: Path | None, **options: Any) -> None:
         _check_folder(Path(settings.output.folder))
     except (TomlFileError, SettingsError) as error:
         click.echo(f"roaas load: {error}", err=True)
-        ctx.exit(ExitCode.USAGE)
-    ctx.exit(run_load(settings))
+        return CommandResult(ExitCode.USAGE)
+    with TemporaryDirectory(prefix="roaas-load-") as folder:
+        return _run_load(settings, Path(folder, "written"))
 
 
 def _command_line() -> str:

@@ -13,6 +13,7 @@ import msgspec
 
 from conformance.cli.summary import print_summary
 from conformance.contract.classes import CLASSES, PROFILES
+from conformance.contract.command import CommandResult, ResultCommand
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.files import CONTRACT_DIR, Contract, ContractError
 from conformance.contract.statement import Statement, StatementError, load_statement
@@ -34,7 +35,7 @@ _ENDPOINTS = (
 )
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(cls=ResultCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("statement", required=False, type=click.Path(dir_okay=False, path_type=Path))
 @click.option(
     "--init", is_flag=True, help="Ask the robot's descriptions and write a commented STATEMENT; judge nothing."
@@ -101,7 +102,7 @@ _ENDPOINTS = (
     help="Folder for the results.",
 )
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
-def certify(statement: Path | None, **options: Any) -> None:
+def certify(statement: Path | None, **options: Any) -> CommandResult:
     """Judge a robot by its contract, requirement by requirement.
 
     STATEMENT is the robot's implementation conformance statement (TOML); options win over it.
@@ -115,15 +116,14 @@ def certify(statement: Path | None, **options: Any) -> None:
         declared = load_statement(statement) if statement and not options["init"] else Statement()
         chosen = _apply(declared, options)
         if options["init"]:
-            _init(statement, chosen, force=options["force"])
-            return
+            return _init(statement, chosen, force=options["force"])
         outcome = _certify(chosen, options)
     except (StatementError, ContractError) as error:
         raise click.UsageError(str(error)) from error
     except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)
+        return CommandResult(ExitCode.INTERRUPTED)
     print_summary(outcome)
-    sys.exit(outcome.exit_code)
+    return CommandResult(outcome.exit_code, outcome.path)
 
 
 def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
@@ -147,7 +147,7 @@ def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
     return msgspec.structs.replace(declared, endpoints=where, claims=claims, ros=ros)
 
 
-def _init(path: Path | None, chosen: Statement, *, force: bool) -> None:
+def _init(path: Path | None, chosen: Statement, *, force: bool) -> CommandResult:
     from conformance.engine.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
 
     if path is None:
@@ -157,8 +157,9 @@ def _init(path: Path | None, chosen: Statement, *, force: bool) -> None:
     problem = write_first_statement(path, chosen)
     if problem:
         click.echo(f"the robot cannot be reached: {problem}", err=True)
-        sys.exit(ExitCode.UNREACHABLE)
+        return CommandResult(ExitCode.UNREACHABLE)
     click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
+    return CommandResult(ExitCode.PASSED)
 
 
 def _certify(chosen: Statement, options: dict[str, Any]) -> Certification:

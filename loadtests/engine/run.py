@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import gevent
 import locust  # patches the standard library, which has to come before our modules that use it
 
+from conformance.contract.command import CommandResult
 from conformance.contract.exit_codes import ExitCode
 from loadtests.clients.failures import CallError
 from loadtests.clients.wsdl import WsdlError, with_addresses
@@ -190,8 +191,8 @@ class Run:
         )
 
 
-def carry_out(settings: Settings) -> int:
-    """Do a run and write its result; returns the exit code."""
+def carry_out(settings: Settings) -> CommandResult:
+    """Do a run and write its result."""
     logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of spawning fast, which is what we want
     run = Run(settings)
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -208,10 +209,11 @@ def carry_out(settings: Settings) -> int:
         traceback.print_exc()
         aborted = RunAborted(ExitCode.INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
     code, document = compose(run.outcome, run.plan, aborted)
+    path: Path | None = None
     if aborted is None or aborted.code != ExitCode.USAGE:
         path = write(Path(settings.output.folder), document)
         tell(f"written: {path}")
     if aborted is None:
         sys.stdout.write(summary(document))
         sys.stdout.flush()
-    return code
+    return CommandResult(code, path)

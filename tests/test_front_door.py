@@ -1,0 +1,60 @@
+"""The front door renders the result that a command says it wrote, whatever the command's exit code."""
+
+from __future__ import annotations
+
+import os
+
+import click
+import pytest
+from click.testing import CliRunner
+
+import reports
+import roaas
+from conformance.contract.command import CommandResult, ResultCommand
+from conformance.contract.exit_codes import ExitCode
+
+
+@pytest.fixture
+def rendered(monkeypatch):
+    folders = []
+    monkeypatch.setattr(reports, "render", lambda folder: folders.append(folder) or [])
+    return folders
+
+
+def run(callback) -> int:
+    command = ResultCommand("certify", callback=callback, params=[])
+    roaas.render_afterwards(command)
+    roaas.render_afterwards(command)
+    return CliRunner().invoke(command, []).exit_code
+
+
+@pytest.mark.parametrize("code", list(ExitCode))
+def test_a_result_is_rendered_once_whatever_the_exit_code(tmp_path, rendered, code):
+    file = tmp_path / "result.json"
+    file.write_text("{}")
+    os.utime(file, ns=(0, 0))
+
+    def callback() -> CommandResult:
+        file.write_text("{}")
+        os.utime(file, ns=(0, 0))  # on a coarse clock a new file is as old as the one before
+        return CommandResult(code, file)
+
+    assert run(callback) == code
+    assert rendered == [tmp_path]
+
+
+def test_a_file_that_the_command_did_not_write_is_not_rendered(tmp_path, rendered):
+    def callback() -> CommandResult:
+        (tmp_path / "result.json").write_text("{}")  # somebody else's
+        return CommandResult(ExitCode.UNREACHABLE)
+
+    assert run(callback) == ExitCode.UNREACHABLE
+    assert rendered == []
+
+
+def test_wrong_usage_renders_nothing(rendered):
+    def callback() -> CommandResult:
+        raise click.UsageError("no")
+
+    assert run(callback) == ExitCode.USAGE
+    assert rendered == []
