@@ -7,6 +7,7 @@ inconclusive, never passed; so is one of which nothing was judged.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -16,20 +17,48 @@ if TYPE_CHECKING:
     from conformance.verdict.evidence import Evidence
 
 
+class Value(StrEnum):
+    """What can be said of one requirement."""
+
+    PASS = "pass"  # noqa: S105 - no password
+    FAIL = "fail"
+    WARN = "warn"
+    SKIP = "skip"
+    NOT_CLAIMED = "not-claimed"
+    ERROR = "error"
+
+
+class ClassValue(StrEnum):
+    """What can be said of a conformance class."""
+
+    PASS = "pass"  # noqa: S105 - as above
+    FAIL = "fail"
+    INCONCLUSIVE = "inconclusive"
+    NOT_CLAIMED = "not-claimed"
+
+
+class Overall(StrEnum):
+    """What can be said of a robot."""
+
+    CONFORMANT = "conformant"
+    NOT_CONFORMANT = "not-conformant"
+    INCONCLUSIVE = "inconclusive"
+
+
 @dataclass(frozen=True)
 class Verdict:
     """What is said of one requirement.
 
     Attributes:
         requirement: which.
-        value: pass, fail, warn, skip, not-claimed or error.
+        value: what is said of it.
         reason: why, where it is not simply passed.
         evidence: what was seen.
         expected_failure: reason and last day of the baseline's entry that accepts the failure, or None.
     """
 
     requirement: Requirement
-    value: str
+    value: Value
     reason: str
     evidence: Evidence
     expected_failure: tuple[str, str] | None = None
@@ -38,31 +67,31 @@ class Verdict:
 def verdict_of(requirement: Requirement, evidence: Evidence, claims: Iterable[str]) -> Verdict:
     """Judge one requirement by its evidence."""
 
-    def verdict(value: str, reason: str = "") -> Verdict:
+    def verdict(value: Value, reason: str = "") -> Verdict:
         return Verdict(requirement, value, reason, evidence)
 
     if requirement.class_ not in claims:
-        return verdict("not-claimed", f"class {requirement.class_} is not claimed")
+        return verdict(Value.NOT_CLAIMED, f"class {requirement.class_} is not claimed")
     if evidence.unclaimed and not evidence.cases:
-        return verdict("not-claimed", evidence.unclaimed)
+        return verdict(Value.NOT_CLAIMED, evidence.unclaimed)
     if evidence.findings:
         first = next(iter(evidence.findings.values()))
         more = f" (and {len(evidence.findings) - 1} more)" if len(evidence.findings) > 1 else ""
         reason = f"{first.expected}; found: {first.message}{more}"
-        value = {"MUST": "fail", "SHOULD": "warn"}.get(requirement.level)
-        return verdict(value, reason) if value else verdict("pass", f"not so, as it may be: {reason}")
+        value = {"MUST": Value.FAIL, "SHOULD": Value.WARN}.get(requirement.level)
+        return verdict(value, reason) if value else verdict(Value.PASS, f"not so, as it may be: {reason}")
     for value, reasons in (
-        ("skip", [requirement.untestable] if requirement.untestable else []),
-        ("error", evidence.errors),
-        ("skip", evidence.skips),
-        ("skip", [] if evidence.cases else evidence.notes or ["nothing was executed for it"]),
+        (Value.SKIP, [requirement.untestable] if requirement.untestable else []),
+        (Value.ERROR, evidence.errors),
+        (Value.SKIP, evidence.skips),
+        (Value.SKIP, [] if evidence.cases else evidence.notes or ["nothing was executed for it"]),
     ):
         if reasons:
             return verdict(value, "; ".join(reasons))
-    return verdict("pass", "; ".join(evidence.notes))
+    return verdict(Value.PASS, "; ".join(evidence.notes))
 
 
-def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[str, tuple[str, str]]:
+def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[str, tuple[ClassValue, str]]:
     """Verdict and reason for each class that has requirements: pass, fail, inconclusive or not-claimed."""
     by_class: dict[str, list[Verdict]] = {}
     for verdict in verdicts:
@@ -70,27 +99,32 @@ def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[s
     return {name: _class_verdict(items, name in claims) for name, items in by_class.items()}
 
 
-def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[str, str]:  # noqa: FBT001 - private
+def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, str]:  # noqa: FBT001 - private
     if not claimed:
-        return "not-claimed", ""
-    failed = [item for item in verdicts if item.value == "fail"]
+        return ClassValue.NOT_CLAIMED, ""
+    failed = [item for item in verdicts if item.value is Value.FAIL]
     if failed:
-        return "fail", f"{len(failed)} of {len(verdicts)} requirements failed, first {failed[0].requirement.id}"
+        return (
+            ClassValue.FAIL,
+            f"{len(failed)} of {len(verdicts)} requirements failed, first {failed[0].requirement.id}",
+        )
     unjudged = [
-        item for item in verdicts if item.value == "error" or (item.value == "skip" and _holds_back(item.requirement))
+        item
+        for item in verdicts
+        if item.value is Value.ERROR or (item.value is Value.SKIP and _holds_back(item.requirement))
     ]
     if unjudged:
         first = unjudged[0]
         return (
-            "inconclusive",
+            ClassValue.INCONCLUSIVE,
             (
                 f"{len(unjudged)} of {len(verdicts)} requirements could not be judged, first {first.requirement.id}: "
                 f"{first.reason}"
             ),
         )
     if not any(item.evidence.cases for item in verdicts):
-        return "inconclusive", "nothing was executed"
-    return "pass", ""
+        return ClassValue.INCONCLUSIVE, "nothing was executed"
+    return ClassValue.PASS, ""
 
 
 def _holds_back(requirement: Requirement) -> bool:
@@ -101,22 +135,22 @@ def _holds_back(requirement: Requirement) -> bool:
     return requirement.level == "MUST" and requirement.untestable is None and "probe" not in requirement.needs
 
 
-def overall(classes: Mapping[str, tuple[str, str]]) -> str:
+def overall(classes: Mapping[str, tuple[ClassValue, str]]) -> Overall:
     """conformant, not-conformant or inconclusive."""
-    values = {value for value, _ in classes.values()} - {"not-claimed"}
-    if "fail" in values:
-        return "not-conformant"
-    if "inconclusive" in values or not values:
-        return "inconclusive"
-    return "conformant"
+    values = {value for value, _ in classes.values()} - {ClassValue.NOT_CLAIMED}
+    if ClassValue.FAIL in values:
+        return Overall.NOT_CONFORMANT
+    if ClassValue.INCONCLUSIVE in values or not values:
+        return Overall.INCONCLUSIVE
+    return Overall.CONFORMANT
 
 
 def expected_failure(verdict: Verdict, reason: str, expires: str) -> Verdict:
     """The verdict of a requirement whose failure a baseline expects."""
     told = f"expected until {expires} ({reason}): {verdict.reason}"
-    return replace(verdict, value="warn", reason=told, expected_failure=(reason, expires))
+    return replace(verdict, value=Value.WARN, reason=told, expected_failure=(reason, expires))
 
 
 def broken_baseline(verdict: Verdict, problem: str) -> Verdict:
     """The verdict of a requirement whose baseline entry is wrong."""
-    return replace(verdict, value="error", reason=problem)
+    return replace(verdict, value=Value.ERROR, reason=problem)
