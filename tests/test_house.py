@@ -1,0 +1,131 @@
+"""The house is as CONTRIBUTING draws it: floors, no circles, every folder says what it is, no overlong module.
+
+The floors themselves stand in pyproject.toml for import-linter, which reads imports for type checking as well. Here
+is what it does not see: circles between modules, modules that are named in strings, and the drawing.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import grimp
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("conformance", "reference_robot", "loadtests", "reports")
+MOST_LINES = 300
+_MODULE_NAME = re.compile(rf"({'|'.join(ROOMS)})(\.\w+)+")
+
+
+def _modules() -> list[Path]:
+    return [
+        path
+        for room in ROOMS
+        for path in sorted((ROOT / room).rglob("*.py"))
+        if "interfaces" not in path.relative_to(ROOT).parts
+    ]
+
+
+def _name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+@pytest.fixture(scope="module")
+def imports():
+    return grimp.build_graph(*ROOMS, cache_dir=None)
+
+
+def test_the_floors_hold():
+    done = subprocess.run(
+        [sys.executable, "-c", "from importlinter.cli import lint_imports_command; lint_imports_command()", "--no-cache"],
+        capture_output=True, text=True, check=False, cwd=ROOT,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_there_is_no_circle_of_modules(imports):
+    assert _circles({name: imports.find_modules_directly_imported_by(name) for name in imports.modules}) == []
+
+
+def _circles(graph):
+    """Modules that cannot be put in an order: what is left when all that import nothing left are taken away."""
+    left = dict(graph)
+    while done := {name for name, imported in left.items() if not imported & left.keys()}:
+        left = {name: imported for name, imported in left.items() if name not in done}
+    while done := left.keys() - set().union(*left.values()):
+        left = {name: imported for name, imported in left.items() if name not in done}
+    return sorted(left)
+
+
+def test_a_circle_would_be_seen():
+    assert _circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": set(), "e": {"a"}}) == ["b", "c"]
+
+
+def test_modules_that_are_named_in_strings_exist_and_lie_no_higher():
+    floors = _floors()
+    names = {_name(path) for path in _modules()}
+    for path in _modules():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and _MODULE_NAME.fullmatch(node.value):
+                assert node.value in names, f"{_name(path)} names {node.value!r}, which is not there"
+                assert _floor(floors, node.value) <= _floor(floors, _name(path)), f"{_name(path)} names {node.value!r}"
+
+
+def _floors():
+    """Each package of a layers contract with its height."""
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    floors = {}
+    for contract in config["contracts"]:
+        for container in contract.get("containers", ()):
+            for height, layer in enumerate(reversed(contract["layers"])):
+                floors |= {f"{container}.{name.strip()}": height for name in re.split(r"[:|]", layer)}
+    return floors
+
+
+def _floor(floors, module):
+    return max((height for name, height in floors.items() if f"{module}.".startswith(f"{name}.")), default=0)
+
+
+def test_every_folder_says_what_it_is():
+    silent = [
+        str(folder.relative_to(ROOT))
+        for folder in {path.parent for path in _modules()}
+        if not (folder / "__init__.py").is_file()
+        or not ast.get_docstring(ast.parse((folder / "__init__.py").read_text(encoding="utf-8")))
+    ]
+    assert silent == []
+
+
+def test_no_module_is_overlong_without_a_reason():
+    for path in _modules():
+        text = path.read_text(encoding="utf-8")
+        if len(text.splitlines()) > MOST_LINES:
+            assert f"Over {MOST_LINES} lines" in (ast.get_docstring(ast.parse(text)) or ""), path
+
+
+def test_the_drawing_in_contributing_is_the_real_tree():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    drawing = re.search(r"```text\n(conformance/.*?)```", text, re.DOTALL)
+    assert drawing, "CONTRIBUTING.md has no drawing of the tree"
+    drawn, room = set(), ""
+    for line in drawing[1].splitlines():
+        found = re.match(r"( *)((?:\w+/ +)*\w+/)", line)
+        if found is None:
+            continue
+        folders = found[2].split()
+        if not found[1]:
+            room = folders[0]
+        drawn |= set(folders) if not found[1] else {room + folder for folder in folders}
+    real = {
+        f"{folder.relative_to(ROOT)}/"
+        for room in (*ROOMS, "tests")
+        for folder in (ROOT / room, *(ROOT / room).iterdir())
+        if folder.is_dir() and folder.name != "__pycache__"
+    }
+    assert {name for name in drawn if name.startswith((*ROOMS, "tests"))} == real
