@@ -1,7 +1,5 @@
 """``make demo``: the whole job on this machine. A robot, its certification, a load test, and the reports."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -11,12 +9,10 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from typing import Any
 
 _START_S = 60
 _STOP_S = 10

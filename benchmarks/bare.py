@@ -4,8 +4,6 @@
 prints its port.
 """
 
-from __future__ import annotations
-
 import json
 import socket
 import sys

@@ -8,8 +8,6 @@ Measurements that are compared take turns, and the medians of the rounds are pri
 too, single figures say little.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -21,15 +19,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _HERE = Path(__file__).parent
 _POSE = (

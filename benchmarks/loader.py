@@ -4,8 +4,6 @@ Both send the next request of a connection when the answer to the last one is co
 this module is the second kind: ``python loader.py HOST PORT CONNECTIONS SECONDS < request``.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -17,11 +15,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
 _SUMMARY = """

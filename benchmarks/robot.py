@@ -5,8 +5,6 @@ same bytes, and measures both in turn with the load from another process: so the
 It ends with exit code 1 if a target is missed. ``--seconds`` sets the length of each of the measurements.
 """
 
-from __future__ import annotations
-
 import argparse
 import http.client
 import json
@@ -16,16 +14,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from loader import Call, load
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 DELIVERY = (
     "/robot/app/delivery/4/depot_x/68.269/depot_y/38.718/dest_x/60.633/dest_y/37.51/source_x/76.02/source_y/41.35"

@@ -1,7 +1,5 @@
 """The command ``robot``: the simulated robot and its web services, or the web services alone."""
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from pathlib import Path

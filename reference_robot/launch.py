@@ -1,33 +1,24 @@
 """Starts a whole robot: the simulation as a child process, unless a robot is there already, and the web services."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from types import FrameType
+from typing import Final
 
 from conformance.contract.toml_file import TomlFileError
 from reference_robot.simulated import SimulatedRobot, SimulationError
+from reference_robot.webservices.assembly import Endpoints
 from reference_robot.webservices.configuration import load_configuration
 from reference_robot.webservices.endpoint import PortInUseError
 from reference_robot.webservices.http.authorization import Authorization, TokenFileError, read_token
-from reference_robot.webservices.runner import (
-    Listening,
-    RobotNotFoundError,
-    RobotWebServiceNodesRunner,
-)
+from reference_robot.webservices.runner import Listening, RobotNotFoundError, RobotWebServiceNodesRunner
 from reference_robot.webservices.soap.publishers import PATH as PUBLISHERS_PATH
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-    from types import FrameType
-
-    from reference_robot.webservices.assembly import Endpoints
 
 _DISCOVERY_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 

@@ -4,8 +4,6 @@ Both the simulation and the web services bind to a ``RosNames``, so that a robot
 served by another file and no code.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final, Literal
 

@@ -1,7 +1,5 @@
 """The simulated robot as a child process, which ends with its parent, however that ends."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import select
@@ -10,11 +8,9 @@ import subprocess
 import sys
 import threading
 import time
-from typing import IO, TYPE_CHECKING, Final
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Final
 
 _START: Final = 30.0  # seconds
 _STOP: Final = 5.0  # seconds

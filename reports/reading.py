@@ -76,7 +76,7 @@ def _parse(path: Path, text: str) -> Any:
     except json.JSONDecodeError as error:
         near = excerpt(text[max(0, error.pos - 20) : error.pos + 20], 60)
         raise ResultGarbledError(
-            f"{path}: line {error.lineno}, column {error.colno}: {error.msg}, near {near!r}",
+            f"{path}: line {error.lineno}, column {error.colno}: {error.msg}, near {near!r}"
         ) from error
     except ValueError as error:  # NaN and Infinity, and integers of thousands of digits
         raise ResultGarbledError(f"{path}: {error}") from error

@@ -67,7 +67,4 @@ def _latency(path: Path) -> dict[str, str]:
     from reports.latency.page import latency_html, latency_markdown  # noqa: PLC0415 - see above
 
     document = read_latency(path)
-    return {
-        "latency.html": latency_html(document, str(path)),
-        "latency.md": latency_markdown(document, str(path)),
-    }
+    return {"latency.html": latency_html(document, str(path)), "latency.md": latency_markdown(document, str(path))}

@@ -1,17 +1,12 @@
 """Fixtures for every room's tests: a ROS domain of one's own."""
 
-from __future__ import annotations
-
 import fcntl
 import tempfile
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
 _DOMAIN_IDS = range(40, 102)

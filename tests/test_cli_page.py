@@ -1,7 +1,5 @@
 """docs/cli.md says what `--help` says: every command, every option, every exit code, and no other."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

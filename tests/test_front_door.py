@@ -1,7 +1,5 @@
 """The front door renders the result that a command says it wrote, whatever the command's exit code."""
 
-from __future__ import annotations
-
 import os
 
 import click

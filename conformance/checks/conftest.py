@@ -1,22 +1,16 @@
 """What goes along with every check: the observers, which judge each exchange whoever has it, and the ROS probe."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import pytest
 
 from conformance.rest.observers import Observer as RestObserver
+from conformance.robot.interfaces import Interfaces
 from conformance.robot.observer import Observer as RobotObserver
 from conformance.robot.probe.client import RosProbe
 from conformance.soap.observer import PASSIVE, SoapObserver, answers_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from conformance.robot.interfaces import Interfaces
-    from conformance.transport.client import Connection
-    from conformance.verdict.run import Run
+from conformance.transport.client import Connection
+from conformance.verdict.run import Run
 
 
 @pytest.fixture(scope="session", autouse=True)

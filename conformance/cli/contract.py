@@ -1,7 +1,5 @@
 """``roaas contract``: the requirements, the contract's files, and what binds each requirement."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import sys

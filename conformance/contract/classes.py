@@ -1,7 +1,5 @@
 """What a requirement can be: conformance classes with the interfaces that they need, profiles, levels."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 from typing import Final
 
@@ -48,11 +46,7 @@ class Profile(StrEnum):
 
 CLASSES: Final = tuple(ConformanceClass)
 PROFILES: Final[dict[str, tuple[ConformanceClass, ...]]] = {
-    Profile.PAPER: (
-        ConformanceClass.REST_RESOURCES,
-        ConformanceClass.REST_DELIVERY,
-        ConformanceClass.SOAP_DELIVERY,
-    ),
+    Profile.PAPER: (ConformanceClass.REST_RESOURCES, ConformanceClass.REST_DELIVERY, ConformanceClass.SOAP_DELIVERY),
     Profile.FULL: CLASSES,
 }
 #: What each conformance class holds.

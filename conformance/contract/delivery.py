@@ -3,8 +3,6 @@
 openapi.yaml, publishers.xsd and mybot_delivery_app/DeliveryRequestMsg are the binding form; a test compares.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 #: Message codes.

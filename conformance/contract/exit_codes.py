@@ -1,7 +1,5 @@
 """Exit codes of every command (docs/cli.md)."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 from typing import Final
 

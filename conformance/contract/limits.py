@@ -5,8 +5,6 @@ robot by all the same (contract.md, the statement): the reference robot's limits
 follow.
 """
 
-from __future__ import annotations
-
 import msgspec
 
 from conformance.contract.toml_file import NotNegative

@@ -7,6 +7,7 @@ passed by ``jsonschema_rs`` before: a plan of a thousand poses takes it 1 ms, an
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import jsonschema_rs
@@ -17,8 +18,6 @@ from jsonschema.validators import extend
 from conformance.documents.json_text import shown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from jsonschema.exceptions import ValidationError
 
 Schema = dict[str, Any]

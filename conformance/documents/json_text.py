@@ -1,7 +1,5 @@
 """JSON as it came over the wire, read more strictly than programs usually do (RFC 8259)."""
 
-from __future__ import annotations
-
 import codecs
 import json
 import math

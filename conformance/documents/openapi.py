@@ -1,17 +1,12 @@
 """The operations of a contract, read from its OpenAPI description into values."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from conformance.contract.files import ContractError
+from conformance.contract.files import Contract, ContractError
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, opened, resolved
-
-if TYPE_CHECKING:
-    from conformance.contract.files import Contract
 
 METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace")
 SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE"})

@@ -1,7 +1,5 @@
 """Whether a document is a valid OpenAPI description: by the schema of its version, its references and its paths."""
 
-from __future__ import annotations
-
 import re
 from functools import lru_cache
 from typing import Any

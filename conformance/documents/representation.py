@@ -1,7 +1,5 @@
 """JSON, XML and YAML read by one schema into one comparable value."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

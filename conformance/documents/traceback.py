@@ -1,7 +1,5 @@
 """The inside of a program, as it shows in an answer by accident."""
 
-from __future__ import annotations
-
 import re
 
 # As much of a body is looked through, octets.

@@ -4,23 +4,18 @@ Whatever the layout: schemas inline, by xsd:import with a relative or absolute l
 description by wsdl:import, as JAX-WS RI writes it when interface and service are in different namespaces.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from lxml import etree
 
 from conformance.documents.wsdl_imports import Collected, Fetch, collect
 from conformance.documents.xml_names import WSAM, WSAW, WSDL, WSDL_SOAP, clark
 from conformance.documents.xsd import SchemaDocument, SchemaError, Types
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from conformance.documents.xsd_shapes import Element
+from conformance.documents.xsd_shapes import Element
 
 _ACTIONS: Final = tuple(clark(space, "Action") for space in (WSAM, WSAW, "http://www.w3.org/2005/08/addressing"))
 

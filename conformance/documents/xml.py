@@ -5,8 +5,6 @@ depth, names and texts stay on (``huge_tree``); how many octets come at all is b
 refused here, unless the caller judges it by itself.
 """
 
-from __future__ import annotations
-
 from lxml import etree
 
 

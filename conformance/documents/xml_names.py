@@ -1,7 +1,5 @@
 """Namespaces and qualified names, in Clark notation where they name elements or attributes."""
 
-from __future__ import annotations
-
 from typing import Final
 
 ENVELOPE: Final = "http://schemas.xmlsoap.org/soap/envelope/"

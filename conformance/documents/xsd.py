@@ -7,18 +7,16 @@ from __future__ import annotations
 
 import copy
 import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import xmlschema
 from lxml import etree
 
 from conformance.documents.xml_names import XSD, clark
 from conformance.documents.xsd_shapes import Element, shape
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 _IMPORT: Final = clark(XSD, "import")
 _INCLUDE: Final = clark(XSD, "include")

@@ -4,13 +4,10 @@ After XML Schema 1.0 Part 2 (the clause is named at each type). White space arou
 type's whiteSpace is collapse (4.3.6), which it is for all but strings.
 """
 
-from __future__ import annotations
-
 from decimal import Decimal
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-if TYPE_CHECKING:
-    from conformance.documents.xsd_shapes import Simple
+from conformance.documents.xsd_shapes import Simple
 
 # 3.3.13 to 3.3.25: the integers, each with its own bounds where it has any.
 INTEGERS: Final = frozenset(

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from conformance.documents.xml_names import XSD, clark
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 # A type that holds itself is followed this deep.
 _DEEPEST: Final = 12
@@ -104,11 +102,7 @@ def shape(declared: Any, depth: int = 0) -> Element:
     space, _, name = str(declared.name).rpartition("}")
     tag = str(declared.name) if space else name
     return Element(
-        tag,
-        _type(declared.type, depth),
-        declared.min_occurs,
-        declared.max_occurs,
-        nillable=bool(declared.nillable),
+        tag, _type(declared.type, depth), declared.min_occurs, declared.max_occurs, nillable=bool(declared.nillable)
     )
 
 

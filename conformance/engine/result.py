@@ -99,10 +99,7 @@ def _contract_name(contract: Contract) -> str:
 def _target(robot: RobotUnderTest) -> dict[str, Any]:
     where = robot.run.statement.endpoints
     target: dict[str, Any] = {"rest": where.rest}
-    for name, wsdl in (
-        (Interface.PUBLISHERS, where.publishers_wsdl),
-        (Interface.SUBSCRIBERS, where.subscribers_wsdl),
-    ):
+    for name, wsdl in ((Interface.PUBLISHERS, where.publishers_wsdl), (Interface.SUBSCRIBERS, where.subscribers_wsdl)):
         service = robot.soap.there.get(name)
         target[f"{name}_wsdl"] = wsdl
         target[f"{name}_endpoint"] = service.client.base_url + service.path if service else None

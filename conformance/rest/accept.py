@@ -1,7 +1,5 @@
 """The Accept field as RFC 9110 12.5.1 means it: which media type a client would rather have."""
 
-from __future__ import annotations
-
 import re
 from functools import lru_cache
 

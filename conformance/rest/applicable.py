@@ -1,19 +1,12 @@
 """What of the contract a check can be tried on: with this robot, and with the permission that was given."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Sequence
 from http import HTTPStatus
-from typing import TYPE_CHECKING
 
 from conformance.documents.json_schema import kind_of
-from conformance.documents.openapi import operations_of
+from conformance.documents.openapi import Operation, operations_of
 from conformance.rest.calls import Call, example_call
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from conformance.documents.openapi import Operation
-    from conformance.rest.interface import RestInterface
+from conformance.rest.interface import RestInterface
 
 NO_MOTION = "it moves the robot, and --allow-motion was not given"
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 from conformance.documents.json_schema import Schema, kind_of
+from conformance.documents.openapi import Operation, Parameter
 from conformance.documents.representation import flat
 from conformance.documents.writing import json_text, text_of, xml_bytes
-
-if TYPE_CHECKING:
-    from conformance.documents.openapi import Operation, Parameter
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
+from conformance.rest.interface import RestInterface
+from conformance.transport.exchange import Exchange
 
 JSON = "application/json"
 XML = "application/xml"

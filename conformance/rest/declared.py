@@ -1,21 +1,14 @@
 """Whether an answer is one that the contract declares for its operation: status, media type, shape, Vary."""
 
-from __future__ import annotations
-
 from http import HTTPStatus
-from typing import TYPE_CHECKING
 
-from conformance.documents.json_schema import shape_of
-from conformance.documents.openapi import is_json, is_xml
+from conformance.documents.json_schema import Schema, shape_of
+from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.representation import UnreadableError, read
 from conformance.rest.accept import quality
-
-if TYPE_CHECKING:
-    from conformance.documents.json_schema import Schema
-    from conformance.documents.openapi import Operation
-    from conformance.rest.interface import RestInterface
-    from conformance.rest.request_context import RequestContext
-    from conformance.transport.exchange import Exchange, Response
+from conformance.rest.interface import RestInterface
+from conformance.rest.request_context import RequestContext
+from conformance.transport.exchange import Exchange, Response
 
 # RFC 9110 and RFC 6585 give these to any request: authentication, rate, and 5xx, which a requirement of its own judges.
 _ANY_REQUEST = frozenset({401, 429})

@@ -1,17 +1,13 @@
 """What of the contract a robot's own descriptions of its REST interface lack."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlsplit
 
 from conformance.documents.json_schema import UnresolvedError
 from conformance.documents.openapi import PARAMETER, Operation, read_operations
 from conformance.documents.wadl import read_wadl
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,15 @@
 """Whether what was put is what is then got."""
 
-from __future__ import annotations
-
 import math
 import time
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import flattened
 from conformance.rest.calls import JSON, Call, example_call
+from conformance.rest.interface import RestInterface
 from conformance.rest.snapshot import flatten
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
 
 _PAUSE_S = 0.01
 

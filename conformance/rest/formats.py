@@ -1,19 +1,14 @@
 """One state in several formats: read each, and compare value by value."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from conformance.documents.json_schema import Schema
 from conformance.documents.representation import UnreadableError, flattened, read
-from conformance.rest.calls import JSON
+from conformance.rest.calls import JSON, Call
+from conformance.rest.interface import RestInterface
 from conformance.rest.snapshot import steady
-
-if TYPE_CHECKING:
-    from conformance.documents.json_schema import Schema
-    from conformance.rest.calls import Call
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange
 
 # A robot at rest jitters; what its formats say otherwise in so many turns in a row is no jitter.
 _TURNS = 10

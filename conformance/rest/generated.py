@@ -7,6 +7,7 @@ is read back from the wire (validity.py) and judged by that.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -20,14 +21,12 @@ from schemathesis.generation.drivers import CoverageGenerator, ExamplesGenerator
 from schemathesis.generation.feedback import NO_FEEDBACK
 from schemathesis.generation.overrides import Override
 
+from conformance.contract.files import Contract
+from conformance.rest.interface import RestInterface
+from conformance.transport.exchange import Exchange
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from hypothesis.strategies import SearchStrategy
-
-    from conformance.contract.files import Contract
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
 
 _BASE = "http://robot.invalid"
 

@@ -1,16 +1,12 @@
 """One robot's REST interface in one run: where requests go, what answers are judged by, and what its domain adds."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.contract.files import Contract
-    from conformance.transport.client import HttpClient
-    from conformance.verdict.run import Run
+from conformance.contract.files import Contract
+from conformance.transport.client import HttpClient
+from conformance.verdict.run import Run
 
 
 class Domain(Protocol):

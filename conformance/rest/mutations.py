@@ -1,19 +1,15 @@
 """Named mutations of a valid JSON value: each breaks the contract in one way, at one place."""
 
-from __future__ import annotations
-
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.documents.json_schema import Schema, kind_of, shape_of, types_of
 from conformance.documents.json_text import read_json
 from conformance.documents.representation import flat
 from conformance.documents.writing import Pairs, Token, json_text
 from conformance.rest.calls import minimal
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 Path = tuple[str | int, ...]
 # Names in class strict-input of what may ask for the refusal of a mutation.

@@ -3,24 +3,17 @@
 They judge only what the request itself makes applicable; strange requests are left to the checks that send them.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterable
 from email.utils import parsedate_to_datetime
 from http import HTTPStatus
-from typing import TYPE_CHECKING
 
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.documents.traceback import inside_shown
 from conformance.rest import declared, problem
+from conformance.rest.interface import RestInterface
 from conformance.rest.request_context import RequestContext
-from conformance.transport.exchange import Listener, NoAnswer
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange, Request, Response, Unanswered
+from conformance.transport.exchange import Exchange, Listener, NoAnswer, Request, Response, Unanswered
 
 # Methods of which a server may say that it knows none (RFC 9110 15.6.2); the others it has to know.
 KNOWN_METHODS = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS"})

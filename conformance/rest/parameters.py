@@ -1,14 +1,9 @@
 """Parameter texts that the contract clearly does not allow (contract, fine print: only what is clearly outside)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from conformance.documents.json_schema import kind_of, shape_of
-
-if TYPE_CHECKING:
-    from conformance.documents.openapi import Parameter
+from conformance.documents.openapi import Parameter
 
 # Letters, nothing, and what programming languages take for numbers though the contract does not.
 _NO_NUMBERS = ("abc", "roaas-no-number", "", "NaN", "Infinity", "-Infinity", "inf", "1e400", "-1e400", "1.5m", "0x1F")

@@ -1,17 +1,13 @@
 """Problem details (RFC 9457): what an error answer has to be."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.documents.json_text import read_json
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.rest.request_context import RequestContext
-    from conformance.transport.exchange import Exchange, Response
+from conformance.rest.interface import RestInterface
+from conformance.rest.request_context import RequestContext
+from conformance.transport.exchange import Exchange, Response
 
 JSON = "application/problem+json"
 XML = "application/problem+xml"

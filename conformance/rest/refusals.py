@@ -1,18 +1,11 @@
 """Whether what breaks the contract is refused: with 4xx, with the fitting one, and with a detail that helps."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from http import HTTPStatus
-from typing import TYPE_CHECKING
 
 from conformance.rest import problem
-from conformance.transport.exchange import NoAnswer, NoAnswerError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
+from conformance.rest.interface import RestInterface
+from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
 
 # These refuse the request for another reason than its content.
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})

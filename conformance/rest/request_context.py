@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
-from conformance.documents.openapi import matching
+from conformance.contract.files import Contract
+from conformance.documents.openapi import Operation, matching
 from conformance.rest.accept import accept_of, quality
-
-if TYPE_CHECKING:
-    from conformance.contract.files import Contract
-    from conformance.documents.openapi import Operation
-    from conformance.transport.exchange import Request
+from conformance.transport.exchange import Request
 
 _USUAL_FIELDS = {
     "host",

@@ -1,20 +1,15 @@
 """What a robot shows that does not change by itself: what two readings may be compared by."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.documents.representation import flattened
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from conformance.rest.calls import Call
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
+from conformance.rest.calls import Call
+from conformance.rest.interface import RestInterface
+from conformance.transport.exchange import Exchange
 
 Snapshot = dict[str, Any]
 _READINGS = 3

@@ -1,20 +1,15 @@
 """Whether a request is valid by the contract, read back from what really goes over the wire."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, unquote
 
+from conformance.contract.files import Contract
 from conformance.documents.json_schema import Schema, kind_of, shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, Parameter, is_json, is_xml, matching
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
-
-if TYPE_CHECKING:
-    from conformance.contract.files import Contract
 
 VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
 # The contract's grammar of numbers in paths and queries (fine print).

@@ -1,16 +1,12 @@
 """Named mutations of a valid XML body: each breaks the contract in one way, at one place."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 from conformance.documents.json_schema import Schema, numbers_in, shape_of, types_of
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
 from conformance.documents.writing import Pairs, Token, xml_bytes
 from conformance.rest.mutations import STRANGE_NAME, STRANGE_TEXT, places, replaced
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _NO_NUMBERS = (STRANGE_TEXT, "NaN", "INF", "-INF", "Infinity", "1e400", "", "0.1 0.2", "1,5")
 

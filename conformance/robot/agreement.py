@@ -1,7 +1,5 @@
 """Whether a value read in between two others is what they say: for states that may change while they are read."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from typing import Any, Final

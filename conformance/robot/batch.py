@@ -1,24 +1,18 @@
 """Deliveries sent one after another over both interfaces, and what arrived of each."""
 
-from __future__ import annotations
-
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from conformance.contract.delivery import COFFEE
-from conformance.robot.delivery import path_of
+from conformance.robot.deliveries_seen import DeliveryObserver, Seen
+from conformance.robot.delivery import Delivery, path_of
 from conformance.robot.soap_services import send_delivery
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from conformance.robot.deliveries_seen import DeliveryObserver, Seen
-    from conformance.robot.delivery import Delivery
-    from conformance.soap.service import SoapService
-    from conformance.transport.client import HttpClient
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.soap.service import SoapService
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 REQUIREMENT: Final = {
     "rest": "equivalence/delivery-rest",

@@ -1,21 +1,16 @@
 """Who sees what became of a delivery: a ROS probe beside the robot, or the robot's own list."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.delivery import Delivery
 from conformance.robot.message_shapes import DELIVERIES as LIST
 from conformance.robot.message_shapes import read_as
-from conformance.robot.probe.client import ProbeError
+from conformance.robot.probe.client import Probe, ProbeError, RosProbe
 from conformance.robot.robot import ACCEPT_JSON, DELIVERIES
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.robot.probe.client import Probe, RosProbe
-    from conformance.transport.client import HttpClient
+from conformance.transport.client import HttpClient
 
 # How long messages are waited for, and how long after the last one another would still be noticed, s.
 _ARRIVES_S: Final = 2.0

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
 
 from hypothesis import strategies as st
 
 from conformance.contract.delivery import COFFEE, COURIER, PATH_NAMES
 from conformance.robot.robot import DELIVERIES
 from conformance.soap.forms import EXTREMES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 # Both ends of a double, of its subnormals and of what an integer holds exactly; the paper's own example.
 _KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-308)

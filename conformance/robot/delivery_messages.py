@@ -1,19 +1,15 @@
 """The requests of this contract's SOAP services: values put into the shapes that its XSD has."""
 
-from __future__ import annotations
-
 from functools import cache
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from conformance.contract.delivery import EXAMPLE
 from conformance.contract.files import CONTRACT_DIR
 from conformance.documents.wsdl import read_file
 from conformance.documents.xml_names import clark
+from conformance.documents.xml_node import Node
+from conformance.documents.xsd_shapes import Element
 from conformance.soap.messages import filled
-
-if TYPE_CHECKING:
-    from conformance.documents.xml_node import Node
-    from conformance.documents.xsd_shapes import Element
 
 NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
 

@@ -1,20 +1,15 @@
 """Driving a robot by its velocity: what talks to the robot, and keeps a trace for drive_rules to judge."""
 
-from __future__ import annotations
-
 import time
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from conformance.robot import drive_rules
+from conformance.robot.drive_rules import Judgement
 from conformance.robot.drive_trace import Command, Trace, Turn
 from conformance.robot.path import judge_path
-from conformance.robot.robot import STILL, VELOCITY, Velocity
-
-if TYPE_CHECKING:
-    from conformance.robot.drive_rules import Judgement
-    from conformance.robot.robot import Robot
-    from conformance.transport.exchange import Exchange
+from conformance.robot.robot import STILL, VELOCITY, Robot, Velocity
+from conformance.transport.exchange import Exchange
 
 # A turn of readings is not begun more often than this, s: the robot's odometry has tens of hertz.
 _PACE_S: Final = 0.02

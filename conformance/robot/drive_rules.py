@@ -1,20 +1,15 @@
 """What a drive shows of a robot: every function judges a trace, or a part of one, and talks to nobody."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from conformance.contract.limits import Limits
+from conformance.robot.drive_trace import Command, Trace
 from conformance.robot.message_shapes import TWIST, VECTOR3, read_as
 from conformance.robot.robot import Velocity, is_near
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from conformance.contract.limits import Limits
-    from conformance.robot.drive_trace import Command, Trace
-    from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange
 
 # What was measured for so long alike is steady: readings of two resources may be compared, s.
 _STEADY_S: Final = 0.3

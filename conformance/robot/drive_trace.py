@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from conformance.robot.robot import Odometry, Velocity
-    from conformance.transport.exchange import Exchange
+from conformance.robot.robot import Odometry, Velocity
+from conformance.transport.exchange import Exchange
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,12 @@
 """The contract's examples made fit for one robot: within its limits, near where it is, in its frames."""
 
-from __future__ import annotations
+from collections.abc import Callable
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import Pose, quaternion_of
 from conformance.robot.plan import reachable
 from conformance.robot.robot import Robot
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.rest.interface import RestInterface
 
 # Far enough to be on the way for a while, near enough to be inside every room; nearer where there is no room.
 _FAR_M = (1.5, 0.5)

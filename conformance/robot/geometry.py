@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 
 class Pose(NamedTuple):
@@ -29,9 +27,7 @@ class Pose(NamedTuple):
         """This pose, given in a frame which lies at ``frame``, in the frame that ``frame`` is given in."""
         cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
         return Pose(
-            frame.x + cos * self.x - sin * self.y,
-            frame.y + sin * self.x + cos * self.y,
-            wrapped(self.yaw + frame.yaw),
+            frame.x + cos * self.x - sin * self.y, frame.y + sin * self.x + cos * self.y, wrapped(self.yaw + frame.yaw)
         )
 
 

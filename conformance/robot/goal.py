@@ -1,21 +1,15 @@
 """Goals as they are put, and as they have to come back."""
 
-from __future__ import annotations
-
 import math
 import time
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from conformance.documents.json_text import shown
-from conformance.robot.geometry import quaternion_of
+from conformance.robot.geometry import Pose, quaternion_of
 from conformance.robot.message_shapes import STATUS
-from conformance.robot.robot import GOAL_PATH
-
-if TYPE_CHECKING:
-    from conformance.robot.geometry import Pose
-    from conformance.robot.robot import Robot
-    from conformance.transport.exchange import Exchange
+from conformance.robot.robot import GOAL_PATH, Robot
+from conformance.transport.exchange import Exchange
 
 NEW: Final = frozenset({201, 202})
 REPEATED: Final = frozenset({200, 202, 204})

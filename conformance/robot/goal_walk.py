@@ -1,13 +1,13 @@
 """Goals in any order, as a state machine: put, repeated, contradicted, displaced, cancelled, put again."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Sequence
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, rule
 
+from conformance.robot.geometry import Pose
 from conformance.robot.goal import (
     CANCELLED,
     NEW,
@@ -20,14 +20,9 @@ from conformance.robot.goal import (
     put_goal,
     status_fault,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from conformance.robot.geometry import Pose
-    from conformance.robot.robot import Robot
-    from conformance.robot.walk import Walk
-    from conformance.transport.exchange import Exchange
+from conformance.robot.robot import Robot
+from conformance.robot.walk import Walk
+from conformance.transport.exchange import Exchange
 
 _IDS: Final = st.sampled_from((None, "a", "b", "a ", "A"))
 _WHICH: Final = st.integers(0, 1)

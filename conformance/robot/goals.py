@@ -1,19 +1,15 @@
 """Where a robot may be sent."""
 
-from __future__ import annotations
-
 import math
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import pytest
 
 from conformance.robot.geometry import Pose
 from conformance.robot.goal import await_none, goal_body, put_goal
 from conformance.robot.plan import EXACT, ask, reachable
-
-if TYPE_CHECKING:
-    from conformance.robot.robot import Robot
+from conformance.robot.robot import Robot
 
 # How far velocities may take a robot: aside, and straight ahead, m.
 _NEAR_M: Final = 0.4

@@ -1,13 +1,9 @@
 """All interfaces of one robot, each of which may be missing."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.soap.callable_services import SoapServices
+from conformance.rest.interface import RestInterface
+from conformance.soap.callable_services import SoapServices
 
 
 @dataclass(frozen=True)

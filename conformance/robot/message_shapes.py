@@ -3,20 +3,15 @@
 A robot may add fields to what a schema names.
 """
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 from conformance.contract.files import Contract
 from conformance.documents.json_schema import Schema, Shape
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from conformance.transport.exchange import Response
+from conformance.transport.exchange import Response
 
 
 def _answer_of(operation_id: str) -> Schema:

@@ -3,19 +3,14 @@
 A fault that shows once in fifty answers is seen by reading often; all reading that is done anyway counts.
 """
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from conformance.documents.json_schema import Shape
+from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import length_of
 from conformance.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
-from conformance.transport.exchange import Listener
-
-if TYPE_CHECKING:
-    from conformance.documents.json_schema import Shape
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange, Listener
 
 _READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
     "/robot/pose/": ("rest-resources/pose-type", ODOMETRY, "status 200 with a complete nav_msgs/Odometry"),

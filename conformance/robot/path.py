@@ -1,19 +1,14 @@
 """Whether a pose moves by what its velocity says: the velocity is summed up and compared with the way that was made."""
 
-from __future__ import annotations
-
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from conformance.robot.geometry import wrapped
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from conformance.robot.robot import Odometry, Velocity
-    from conformance.verdict.evidence import Judge
+from conformance.robot.robot import Odometry, Velocity
+from conformance.verdict.evidence import Judge
 
 # Less than this is no drive to judge: m and rad.
 _SHORTEST: Final = 0.08

@@ -1,20 +1,15 @@
 """Asking for plans, and finding poses near the robot that it can reach."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 from urllib.parse import urlencode
 
 from conformance.robot.geometry import Pose, pose_of
 from conformance.robot.message_shapes import GET_PLAN, read_as
-from conformance.robot.robot import PLAN
-
-if TYPE_CHECKING:
-    from conformance.robot.robot import Robot
-    from conformance.transport.exchange import Exchange
+from conformance.robot.robot import PLAN, Robot
+from conformance.transport.exchange import Exchange
 
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
 # A way so much longer than the distance goes around something: not what a short drive is for.

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
+from conformance.contract.limits import Limits
+from conformance.documents.json_schema import Shape
 from conformance.documents.representation import projected
+from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import Pose, pose_of
 from conformance.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from conformance.contract.limits import Limits
-    from conformance.documents.json_schema import Shape
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange
 
 POSE: Final = "/robot/pose/"
 VELOCITY: Final = "/robot/velocity/"

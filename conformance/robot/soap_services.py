@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from conformance.contract.delivery import COFFEE
+from conformance.documents.wsdl import Operation
 from conformance.documents.xml import elements
 from conformance.documents.xml_names import local
+from conformance.documents.xml_node import Node
+from conformance.robot.delivery import Delivery
 from conformance.robot.delivery_messages import NAMESPACE, delivery, request
 from conformance.soap.calls import call, read_exchange
 from conformance.soap.content import number_at
+from conformance.soap.service import SoapService
+from conformance.transport.exchange import Exchange
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from lxml import etree
-
-    from conformance.documents.wsdl import Operation
-    from conformance.documents.xml_node import Node
-    from conformance.robot.delivery import Delivery
-    from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Exchange
 
 # Where a robot may have a plan to, seen from where it is, m.
 _NEAR = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5))

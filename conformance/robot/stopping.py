@@ -1,19 +1,14 @@
 """Bringing a robot to rest: before a check that needs it there, and at the end of every run."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from conformance.documents.json_text import read_json
+from conformance.rest.interface import RestInterface
 from conformance.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import NoAnswerError
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange, Response
+from conformance.transport.exchange import Exchange, NoAnswerError, Response
 
 _GOAL: Final = "/robot/navigation/action/goal/"
 _VELOCITY: Final = "/robot/velocity/"

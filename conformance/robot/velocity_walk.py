@@ -1,19 +1,13 @@
 """Velocities in any order, as a state machine: what was asked for last is what the robot does."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
 from conformance.robot.robot import STILL, Velocity
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.robot.walk import Walk
+from conformance.robot.walk import Walk
 
 # Of the limits: fast enough to be told from rest, slow enough to stay near.
 _LINEAR_SHARE = 0.35

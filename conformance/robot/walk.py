@@ -1,17 +1,11 @@
 """What the walks of a state machine share: they end by a refutation, an unreachable robot, or the clock."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from conformance.robot.drive import BusyError, Drive
+from conformance.robot.robot import Robot
 from conformance.transport.exchange import NoAnswerError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.robot.robot import Robot
 
 
 class Walk:

@@ -1,12 +1,8 @@
 """Where a robot is behind a proxy: what it says of its own addresses leads to the proxy, never past it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Request, Response
 
 
 @dataclass(frozen=True)

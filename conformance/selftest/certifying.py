@@ -1,7 +1,5 @@
 """One certification as part of a self-test: in a process of its own, so that nothing is left of it for the next."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import multiprocessing
@@ -9,8 +7,9 @@ import os
 import tempfile
 import time
 from dataclasses import dataclass, field
+from multiprocessing.connection import Connection as Pipe
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
@@ -22,9 +21,6 @@ from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
-
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection as Pipe
 
 # What every run imports: loaded once, and inherited by the processes that are forked from there.
 _PRELOADED = ["conformance.selftest.preloaded"]
@@ -134,11 +130,7 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
         (folder / "token").write_text(job.token, encoding="utf-8")
         given["token_file"] = str(folder / "token")
     where = msgspec.structs.replace(
-        statement.endpoints,
-        rest=job.rest,
-        publishers_wsdl=job.publishers,
-        subscribers_wsdl=job.subscribers,
-        **given,
+        statement.endpoints, rest=job.rest, publishers_wsdl=job.publishers, subscribers_wsdl=job.subscribers, **given
     )
     ros = msgspec.structs.replace(statement.ros, domain_id=job.domain_id)
     claims = tuple(map(ConformanceClass, job.classes)) or statement.claims

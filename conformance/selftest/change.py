@@ -1,7 +1,5 @@
 """What may happen to an exchange between a client and the robot: the one thing that makes a mutant."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Protocol
 

@@ -4,30 +4,24 @@ It is bounded in time, as our runs are. A mutant counts as caught when Schemathe
 report of the good robot behind the same proxy: what it says of a good robot is no catch.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lxml import etree
 
 from conformance.contract.files import CONTRACT_DIR
 from conformance.selftest.change import unchanged
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from conformance.selftest.mutant_run import RobotPool
-    from conformance.selftest.mutants.mutant import Mutant
-    from conformance.selftest.proxy import Proxy
+from conformance.selftest.mutant_run import RobotPool
+from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.proxy import Proxy
 
 EXAMPLES, LIMIT_S = 3, 40.0
 _FINDING = re.compile(r"^- (ST\d+)", re.MULTILINE)

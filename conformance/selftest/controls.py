@@ -1,21 +1,16 @@
 """False alarms: good robots, over many seeds and in many circumstances, none of which may be blamed."""
 
-from __future__ import annotations
-
 import tempfile
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from conformance.selftest.certifying import Job, Outcome, run_job
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import Robot, running, statement_of
 from conformance.selftest.variants import CertificateError, Variant, certificate
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 # A robot that takes 300 ms for everything needs its time.
 _TIMEOUT_S = 900.0

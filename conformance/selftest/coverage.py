@@ -1,22 +1,18 @@
 """What binds each requirement: the checks that judge it, and the mutants that prove that they do."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import Any
 
 import conformance.checks
 from conformance.contract.classes import CLASSES
 from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import Requirement, load_ledger
 from conformance.selftest.mutants import MUTANTS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from types import ModuleType
 
 _TITLE = "# Coverage: requirement, source, check, faulty robots"
 _ABOUT = """
@@ -91,11 +87,7 @@ def bindings() -> tuple[Binding, ...]:
     """
     checks = checks_by_requirement()
     return tuple(
-        Binding(
-            requirement,
-            checks.get(id_, ()),
-            tuple(mutant.name for mutant in MUTANTS if id_ in mutant.catches),
-        )
+        Binding(requirement, checks.get(id_, ()), tuple(mutant.name for mutant in MUTANTS if id_ in mutant.catches))
         for id_, requirement in load_ledger(CONTRACT_DIR / "requirements.toml").items()
     )
 
@@ -134,11 +126,7 @@ def page() -> str:
         f"{len(found)} requirements ({musts} MUST, {shoulds} SHOULD, {len(found) - musts - shoulds} MAY), "
         f"{len(checks)} checks, {len(MUTANTS)} faulty robots."
     )
-    lines = [
-        _TITLE,
-        _ABOUT,
-        figures,
-    ]
+    lines = [_TITLE, _ABOUT, figures]
     for class_ in CLASSES:
         lines += [
             "",

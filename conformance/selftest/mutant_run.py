@@ -1,23 +1,18 @@
 """Each mutant is judged, and each requirement that must catch it has to say so."""
 
-from __future__ import annotations
-
 import queue
 import threading
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from conformance.selftest.certifying import Job, Outcome, run_job
 from conformance.selftest.change import unchanged
+from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import REFERENCE, Robot, running, statement_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from conformance.selftest.mutants.mutant import Mutant
 
 # How long one run may take, s, by effort.
 _TIMEOUTS = {"quick": 90.0, "standard": 240.0, "deep": 900.0}

@@ -1,7 +1,5 @@
 """Octets to messages, without a socket: h11 reads what is HTTP, and what it refuses stays as it came."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

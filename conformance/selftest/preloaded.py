@@ -1,7 +1,5 @@
 """What every certification needs, imported once: processes forked from there start in milliseconds."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 

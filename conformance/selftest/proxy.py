@@ -1,24 +1,16 @@
 """A reverse proxy that makes a robot a mutant: REST and SOAP, each on a port of its own, with one change in between."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
+import ssl
 import threading
 import traceback
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from conformance.selftest.addresses import Addresses
-from conformance.selftest.change import HangUpError, unchanged
-from conformance.selftest.messages import Response
+from conformance.selftest.change import Change, Forward, HangUpError, IncompleteRequest, unchanged
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.wire import ClientConnection, IncompleteMessageError, RobotConnection
-
-if TYPE_CHECKING:
-    import ssl
-
-    from conformance.selftest.change import Change, Forward, IncompleteRequest
-    from conformance.selftest.messages import Request
 
 _IDLE_S = 60.0
 

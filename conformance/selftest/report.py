@@ -1,17 +1,13 @@
 """What a self-test says in the end: selftest.json, and a summary for people."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from conformance.selftest.comparison import SchemathesisResult
-    from conformance.selftest.controls import ControlResult
-    from conformance.selftest.mutant_run import MutantResult
+from conformance.selftest.comparison import SchemathesisResult
+from conformance.selftest.controls import ControlResult
+from conformance.selftest.mutant_run import MutantResult
 
 
 @dataclass

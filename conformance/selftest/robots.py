@@ -1,7 +1,5 @@
 """The good robots of a self-test: started as processes of their own, and stopped again."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re
@@ -10,13 +8,11 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from typing import IO
 
 _HERE = Path(__file__).parent
 _READY = re.compile(r"ready rest=(\S+) soap=(\S+)")

@@ -1,25 +1,19 @@
 """Circumstances in which a good robot stays a good one: what stands between it and its clients in the field."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import ssl
 import subprocess
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-from conformance.selftest.change import unchanged
+from conformance.selftest.change import Change, Forward, unchanged
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import parsed, problem
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from conformance.selftest.change import Change, Forward
-    from conformance.selftest.messages import Request, Response
 
 _PREFIX = "/r2d2/api"
 _TOKEN = "open-sesame"  # noqa: S105 - of a robot that lives for seconds, on loopback

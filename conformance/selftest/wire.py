@@ -1,18 +1,13 @@
 """Talking: a client's requests are read off its connection, and exchanged with the robot over another one."""
 
-from __future__ import annotations
-
 import select
 import socket
 import time
-from typing import TYPE_CHECKING
 
 import h11
 
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.parsing import RequestParser, ResponseParser
-
-if TYPE_CHECKING:
-    from conformance.selftest.messages import Request, Response
 
 _WAIT_S = 30.0
 _PIECE = 262_144

@@ -1,7 +1,5 @@
 """URLs of services: which can be used at all, and which of a robot's own words are followed."""
 
-from __future__ import annotations
-
 import ipaddress
 from urllib.parse import urlsplit
 

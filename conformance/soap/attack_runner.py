@@ -1,20 +1,14 @@
 """Sending attacks: each over a connection of its own, with the robot asked afterwards whether it is still well."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from conformance.soap.attack_verdict import attack_verdict, is_closed
-from conformance.transport.exchange import NoAnswer, NoAnswerError, Unanswered
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from conformance.soap.attacks import Attack
-    from conformance.soap.callback_server import CallbackServer
-    from conformance.transport.exchange import Attempt, Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.soap.attacks import Attack
+from conformance.soap.callback_server import CallbackServer
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
+from conformance.verdict.evidence import Judge
 
 # A robot is well if it answers within 20 times its usual time, and within a second in any case.
 _SLOWER: Final = 20

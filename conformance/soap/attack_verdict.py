@@ -1,18 +1,12 @@
 """What an attack's outcome says of a robot: refused, harmless, or a breach."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from conformance.soap.attacks import LEAKS, MARK
+from conformance.soap.attacks import LEAKS, MARK, Attack
 from conformance.soap.calls import read_exchange
-from conformance.transport.exchange import NoAnswer, Unanswered
-
-if TYPE_CHECKING:
-    from conformance.soap.attacks import Attack
-    from conformance.transport.exchange import Attempt
+from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 
 _LEAK: Final = re.compile(LEAKS)
 _REFUSED: Final = 400

@@ -3,17 +3,13 @@
 Each attack names the requirement that it is for and what a robot must not do with it.
 """
 
-from __future__ import annotations
-
 import codecs
 import gzip
 import zlib
 from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+from typing import Final
 
 # In a document: where text is that the robot reads as a value; and where it is that it may pass over.
 VALUE_SLOT: Final = "roaas-value-here"
@@ -146,11 +142,7 @@ def _external(template: Template, url: Callable[[str], str]) -> Iterator[Attack]
             f'<!DOCTYPE {root} [<!ENTITY % p SYSTEM "{url("parameter")}"> %p;]>',
             "parameter",
         ),
-        (
-            "a parameter entity that is a file",
-            f'<!DOCTYPE {root} [<!ENTITY % p SYSTEM "{_FILES[0]}"> %p;]>',
-            "",
-        ),
+        ("a parameter entity that is a file", f'<!DOCTYPE {root} [<!ENTITY % p SYSTEM "{_FILES[0]}"> %p;]>', ""),
     ):
         yield Attack("parameter-entity", what, template.octets(prolog=prolog), canary=canary)
 

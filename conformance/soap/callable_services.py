@@ -1,18 +1,13 @@
 """Which SOAP services a check may call in this run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import pytest
 
 from conformance.contract.interfaces import Interface
-
-if TYPE_CHECKING:
-    from conformance.soap.service import SoapService
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.run import Run
+from conformance.soap.service import SoapService
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
 
 _NO_MOTION = "the publishers service moves the robot, and --allow-motion was not given"
 

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from conformance.documents.xml_node import Node
 from conformance.soap.envelope import Envelope, Fault, NotSoapError, envelope, read
+from conformance.soap.service import SoapService
+from conformance.transport.exchange import Exchange
 
 if TYPE_CHECKING:
     from lxml import etree
-
-    from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Exchange
 
 _SHOWN = 200
 

@@ -1,18 +1,11 @@
 """Two descriptions of one service, compared by what a client sees of them; layout, prefixes and type names are free."""
 
-from __future__ import annotations
+from collections.abc import Iterator
 
-from typing import TYPE_CHECKING
-
-from conformance.documents.wsdl import DescriptionError, name
+from conformance.documents.wsdl import Description, DescriptionError, Operation, name
 from conformance.documents.xml_names import WSDL, WSDL_SOAP, clark, local
 from conformance.documents.xsd import SchemaError
 from conformance.documents.xsd_shapes import Complex, Element, Simple
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from conformance.documents.wsdl import Description, Operation
 
 
 def names(contract: Description, robot: Description) -> Iterator[str]:

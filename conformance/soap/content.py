@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Final
 
 from conformance.documents.xml import elements, text_of
@@ -15,8 +16,6 @@ from conformance.documents.xsd_lexical import FLOATS, INTEGERS
 from conformance.documents.xsd_shapes import Element, Simple
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
     from lxml import etree
 
 # XML Schema 1.0 Part 2, 3.2.5.1 without INF and NaN: those never leave a robot (contract, REST).

@@ -1,22 +1,14 @@
 """Finding out where a robot's SOAP service is."""
 
-from __future__ import annotations
+from pathlib import Path
 
-from typing import TYPE_CHECKING
-
+from conformance.contract.interfaces import Interface
 from conformance.contract.statement import StatementError
 from conformance.soap.address import is_http, may_be_followed, soap_address, split
 from conformance.soap.published_wsdl import PublishedWsdl, get, obtain
-from conformance.soap.service import SoapService
-from conformance.transport.client import HttpClient
+from conformance.soap.service import KnownMessages, SoapService
+from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from conformance.contract.interfaces import Interface
-    from conformance.soap.service import KnownMessages
-    from conformance.transport.client import Connection
 
 # How long the address in a WSDL is given to answer before the WSDL's own is taken instead, s.
 _PROBE_S = 3.0

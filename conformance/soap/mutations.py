@@ -3,22 +3,17 @@
 A mutation is a candidate only. Whether the message really is invalid is for both validators to say (see invalid_ones).
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from conformance.documents import xsd_lexical as lexical
 from conformance.documents.xml import parse
 from conformance.documents.xml_names import XSI, clark, local, namespace
 from conformance.documents.xml_node import Node
+from conformance.documents.xsd import Types
+from conformance.documents.xsd_shapes import Element
 from conformance.soap.messages import declarations, sequences, simple_leaves, with_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from conformance.documents.xsd import Types
-    from conformance.documents.xsd_shapes import Element
 
 STRANGE: Final = "urn:example:strange"
 _NOBODY: Final = "no_such_element"
@@ -85,9 +80,7 @@ def _duplicate(element: Element, base: Node) -> Iterator[Mutation]:
     for path, declared in declarations(element, base):
         if declared.maximum is not None:
             yield Mutation(
-                "duplicate",
-                f"{local(declared.tag)} twice",
-                (base.replaced(path, base.at(path), base.at(path)),),
+                "duplicate", f"{local(declared.tag)} twice", (base.replaced(path, base.at(path), base.at(path)),)
             )
 
 
@@ -145,11 +138,7 @@ def _nil(element: Element, base: Node) -> Iterator[Mutation]:
     for path, declared in declarations(element, base):
         if not declared.nillable:
             empty = Node(declared.tag, "", (), (nil,))
-            yield Mutation(
-                "nil",
-                f"{local(declared.tag)} is xsi:nil",
-                (base.replaced(path, empty),),
-            )
+            yield Mutation("nil", f"{local(declared.tag)} is xsi:nil", (base.replaced(path, empty),))
 
 
 def _body(_element: Element, base: Node) -> Iterator[Mutation]:

@@ -1,9 +1,8 @@
 """Watches every SOAP answer of a run for what must hold of all of them, so that rare failures are seen as well."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Collection, Mapping
+from typing import Final
 
 from lxml import etree
 
@@ -12,14 +11,9 @@ from conformance.documents.wsdl import DescriptionError
 from conformance.documents.xml import NotXmlError, elements, has_doctype, parse
 from conformance.documents.xml_names import ENVELOPE, clark, local, namespace
 from conformance.soap.envelope import Envelope, Fault, NotSoapError, read_root
-from conformance.transport.exchange import Listener
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
-
-    from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Exchange, Response
-    from conformance.verdict.evidence import Judge
+from conformance.soap.service import SoapService
+from conformance.transport.exchange import Exchange, Listener, Response
+from conformance.verdict.evidence import Judge
 
 # BP 1.1 R1012; ASCII is a part of UTF-8.
 _ENCODINGS: Final = frozenset({"", "utf-8", "utf8", "utf-16", "utf-16le", "utf-16be", "us-ascii", "ascii"})

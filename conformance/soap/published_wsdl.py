@@ -1,21 +1,14 @@
 """The WSDL that a robot publishes: got from it, or read from a file of the vendor's."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from conformance.contract.statement import StatementError
 from conformance.documents.wsdl import Description, DescriptionError, describe
 from conformance.soap.address import split
-from conformance.transport.client import HttpClient
-from conformance.transport.exchange import NoAnswerError
-
-if TYPE_CHECKING:
-    from conformance.transport.client import Connection
-    from conformance.transport.exchange import Attempt, Exchange
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
 
 _OK = 200
 

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from pathlib import Path
 
-from conformance.documents.wsdl import Description, DescriptionError, faults, read_file
+from conformance.contract.interfaces import Interface
+from conformance.documents.wsdl import Description, DescriptionError, Operation, faults, read_file
+from conformance.documents.xml_node import Node
 from conformance.soap.published_wsdl import PublishedWsdl, fetch
 from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-    from pathlib import Path
-
-    from conformance.contract.interfaces import Interface
-    from conformance.documents.wsdl import Operation
-    from conformance.documents.xml_node import Node
-    from conformance.transport.exchange import Exchange
-
-    # Messages that a robot is likely to take for an operation of a service, likeliest first.
-    KnownMessages = Callable[["SoapService", Operation], Iterable[Node]]
+KnownMessages = Callable[["SoapService", Operation], Iterable[Node]]
 
 MEDIA_TYPE = "text/xml; charset=utf-8"
 

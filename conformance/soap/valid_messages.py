@@ -3,23 +3,18 @@
 A contract may limit values beyond its schema. So a message is not believed to be valid before the robot has taken it.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from conformance.documents.wsdl import Operation
 from conformance.documents.xml_names import XSD, XSI, clark, namespace
+from conformance.documents.xml_node import Node
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS, bounds
+from conformance.documents.xsd_shapes import Element
 from conformance.soap.calls import call
 from conformance.soap.messages import ordinary, simple_leaves, with_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from conformance.documents.wsdl import Operation
-    from conformance.documents.xml_node import Node
-    from conformance.documents.xsd_shapes import Element
-    from conformance.soap.service import SoapService
+from conformance.soap.service import SoapService
 
 # Whole numbers tried where a contract takes only some, such as codes.
 _NUMBERS: Final = (0, 1, 2, 3, 4, 5)

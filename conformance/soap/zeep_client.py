@@ -4,10 +4,8 @@ zeep is no judge of messages (it takes a wrong response wrapper for None), but a
 to those who use it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from requests.structures import CaseInsensitiveDict
 from zeep import Client, Settings
@@ -15,11 +13,8 @@ from zeep.exceptions import Fault as ZeepFault
 from zeep.transports import Transport
 
 from conformance.documents.wsdl import name
-from conformance.transport.exchange import NoAnswerError
-
-if TYPE_CHECKING:
-    from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Exchange
+from conformance.soap.service import SoapService
+from conformance.transport.exchange import Exchange, NoAnswerError
 
 _OK = 200
 

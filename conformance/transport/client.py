@@ -1,31 +1,18 @@
 """The HTTP client of the suite: every exchange bounded, recorded and shown to those who watch."""
 
-from __future__ import annotations
-
 import re
 import ssl
 import time
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import httpcore
 
 from conformance.transport.deadlines import MAX_ANSWER, DeadlineBackend, set_deadline, tls_context
-from conformance.transport.exchange import (
-    Exchange,
-    Listener,
-    NoAnswer,
-    NoAnswerError,
-    Request,
-    Response,
-    Unanswered,
-)
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
+from conformance.transport.exchange import Exchange, Listener, NoAnswer, NoAnswerError, Request, Response, Unanswered
 
 Headers = tuple[tuple[str, str], ...]
 # An endpoint that has let this many deadlines pass is not asked again: a hang costs its deadline twice at most.

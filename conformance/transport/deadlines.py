@@ -4,18 +4,14 @@ httpcore is used rather than a higher client because it sends what it is given (
 parses answers strictly with h11, which makes it the judge of framing as well.
 """
 
-from __future__ import annotations
-
 import ssl
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 import httpcore
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
 
 # An answer longer than this is no answer to any request of the contract.
 MAX_ANSWER = 32 * 1024 * 1024

@@ -1,7 +1,5 @@
 """What was sent to a robot and what came back, as values that can be shown and sent again."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import shlex

@@ -1,16 +1,12 @@
 """Requests that are never completed: begun on a socket by hand, then left open or broken off."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 import struct
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 
+from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Unanswered
-
-if TYPE_CHECKING:
-    from conformance.transport.client import HttpClient
 
 # l_onoff 1, l_linger 0: close() sends RST instead of FIN.
 _RESET: Final = struct.pack("ii", 1, 0)

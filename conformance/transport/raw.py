@@ -3,19 +3,13 @@
 Every wait ends at one deadline. What is wrong with an answer's framing is told with the clause of RFC 9112.
 """
 
-from __future__ import annotations
-
 import re
 import socket
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
-
-if TYPE_CHECKING:
-    from conformance.transport.client import HttpClient
-    from conformance.transport.exchange import Attempt
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
 
 _STATUS_LINE = re.compile(rb"HTTP/1\.([01]) (\d{3})(?: [^\r\n]*)?")
 _FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*([^\r\n]*?)[ \t]*")

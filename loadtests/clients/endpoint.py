@@ -59,10 +59,7 @@ class Endpoint:
         if _FORBIDDEN.search(parts.netloc + parts.path):
             raise EndpointError(f"{url!r} holds a space or a control character")
         return cls(
-            parts.scheme,
-            parts.hostname,
-            DEFAULT_PORTS[parts.scheme] if port is None else port,
-            parts.path.rstrip("/"),
+            parts.scheme, parts.hostname, DEFAULT_PORTS[parts.scheme] if port is None else port, parts.path.rstrip("/")
         )
 
     @property

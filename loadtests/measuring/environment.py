@@ -21,18 +21,7 @@ if TYPE_CHECKING:
     from loadtests.settings.settings import Output
 
 _SECRET = re.compile(r"^-.*(token|password|secret|key)\b(?!-file)", re.IGNORECASE)
-_PACKAGES = (
-    "roaas",
-    "locust",
-    "gevent",
-    "httptools",
-    "zeep",
-    "requests",
-    "urllib3",
-    "lxml",
-    "numpy",
-    "hdrhistogram",
-)
+_PACKAGES = ("roaas", "locust", "gevent", "httptools", "zeep", "requests", "urllib3", "lxml", "numpy", "hdrhistogram")
 
 
 def describe(robot: Robot, output: Output, servers: dict[str, str | None]) -> dict[str, Any]:

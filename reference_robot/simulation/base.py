@@ -39,12 +39,7 @@ class Base:
         motion: The body's pose and velocity now.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        names: RosNames,
-        time_scale: float = 1.0,
-    ) -> None:
+    def __init__(self, node: Node, names: RosNames, time_scale: float = 1.0) -> None:
         self.motion = Motion(*DEPOT, 0.0)
         self._node = node
         self._clock = node.get_clock()

@@ -67,8 +67,7 @@ class Delivery:
     def _take(self, message: DeliveryRequestMsg) -> None:
         if message.message_code not in _CODES:
             self._node.get_logger().info(
-                f"ignored a request with the unknown message code {message.message_code}",
-                throttle_duration_sec=1.0,
+                f"ignored a request with the unknown message code {message.message_code}", throttle_duration_sec=1.0
             )
             return
         request = DeliveryRequest(

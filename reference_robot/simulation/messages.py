@@ -72,10 +72,7 @@ def plain(stamped: PoseStamped) -> dict[str, Any]:
     """Return a PoseStamped as JSON-ready values under its ROS field names."""
     stamp, position, turn = stamped.header.stamp, stamped.pose.position, stamped.pose.orientation
     return {
-        "header": {
-            "stamp": {"sec": stamp.sec, "nanosec": stamp.nanosec},
-            "frame_id": stamped.header.frame_id,
-        },
+        "header": {"stamp": {"sec": stamp.sec, "nanosec": stamp.nanosec}, "frame_id": stamped.header.frame_id},
         "pose": {
             "position": {"x": position.x, "y": position.y, "z": position.z},
             "orientation": {"x": turn.x, "y": turn.y, "z": turn.z, "w": turn.w},

@@ -36,11 +36,7 @@ class DeliveryRequest:
 
     def stops(self) -> tuple[tuple[float, float], ...]:
         """Where the robot goes, in order: source, destination, depot."""
-        return (
-            (self.source_x, self.source_y),
-            (self.destination_x, self.destination_y),
-            (self.depot_x, self.depot_y),
-        )
+        return ((self.source_x, self.source_y), (self.destination_x, self.destination_y), (self.depot_x, self.depot_y))
 
 
 @dataclass(slots=True)

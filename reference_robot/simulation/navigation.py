@@ -70,12 +70,7 @@ class Navigation:
     """
 
     def __init__(
-        self,
-        node: Node,
-        names: RosNames,
-        planner: Planner,
-        localisation: Localisation,
-        time_scale: float = 1.0,
+        self, node: Node, names: RosNames, planner: Planner, localisation: Localisation, time_scale: float = 1.0
     ) -> None:
         self._node = node
         self._names = names

@@ -1,11 +1,13 @@
 """How the layers hang together: one pair of ROS nodes, handed down to every resource and web method (paper)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from reference_robot.webservices.configuration import Configuration
 from reference_robot.webservices.http.address import Address, url_of
+from reference_robot.webservices.http.authorization import Authorization
+from reference_robot.webservices.nodes.calls import RosCalls
+from reference_robot.webservices.nodes.publishers import RobotPublishersNode
+from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.resources.delivery import Delivery, DeliveryList
 from reference_robot.webservices.resources.description import OpenApi, Wadl
 from reference_robot.webservices.resources.goal import Goal
@@ -23,13 +25,6 @@ from reference_robot.webservices.robot.velocity import Velocity
 from reference_robot.webservices.soap.interface import SoapInterface
 from reference_robot.webservices.soap.publishers import PublishersWebService
 from reference_robot.webservices.soap.subscribers import SubscribersWebService
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.configuration import Configuration
-    from reference_robot.webservices.http.authorization import Authorization
-    from reference_robot.webservices.nodes.calls import RosCalls
-    from reference_robot.webservices.nodes.publishers import RobotPublishersNode
-    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,11 @@
 """The one TOML file of the robot: names on the ROS graph, and what the web services need to know besides."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import msgspec
 
 from conformance.contract.toml_file import Positive, read_toml
 from reference_robot.names import DEFAULT_NAMES_FILE, RosNames
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class WebSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -3,21 +3,16 @@
 The robot publishes its endpoints itself, without an application server (paper, "Purpose").
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import socket
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator
+from typing import Any, Final
 
 import uvicorn
 
+from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.protocol import RobotHttpProtocol
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from reference_robot.webservices.http.interface import Interface
 
 _BACKLOG: Final = 1024  # connections that may arrive at once
 _KEEP_ALIVE: Final = 60  # seconds that an idle connection is kept for its next request

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable, Iterable
 from inspect import iscoroutinefunction
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from reference_robot.webservices.http.authorization import Authorization
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.messages import Message, Request, Response
 from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.resources.delivery import Delivery
+from reference_robot.webservices.resources.resource import Resource
 
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable
-
-    from reference_robot.webservices.http.authorization import Authorization
-    from reference_robot.webservices.resources.delivery import Delivery
-    from reference_robot.webservices.resources.resource import Resource
-
-    Handlers = dict[str, Callable[[Request], Response | Awaitable[Response]]]
+Handlers = dict[str, Callable[[Request], Response | Awaitable[Response]]]
 
 _DELIVERY_PATHS: Final = b"/robot/app/delivery/"
 

@@ -1,31 +1,26 @@
 """RobotWebServiceNodesRunner: starts nodes and endpoints, and stops them (paper; apart from the endpoint itself)."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import os
 import resource
 import signal
+import socket
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import uvloop
 
 from reference_robot.ros import RosRuntime
 from reference_robot.webservices.assembly import Endpoints, RosSide, interfaces
+from reference_robot.webservices.configuration import Configuration
 from reference_robot.webservices.endpoint import EndpointPublisher, bound
+from reference_robot.webservices.http.authorization import Authorization
 from reference_robot.webservices.nodes.calls import RosCalls
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
-
-if TYPE_CHECKING:
-    import socket
-    from collections.abc import Callable, Iterator
-
-    from reference_robot.webservices.configuration import Configuration
-    from reference_robot.webservices.http.authorization import Authorization
 
 _DESCRIPTORS: Final = 8192  # connections and ROS together; the usual soft limit of 1,024 is soon reached
 _DISCOVERY: Final = 20.0  # seconds in which a robot that has been started must appear on the graph
@@ -84,10 +79,7 @@ class RobotWebServiceNodesRunner:
                 _await_robot(publishers, subscribers)
             calls = RosCalls(publishers.node.executor, configuration.web.deadline)
             pair = interfaces(
-                RosSide(publishers, subscribers, calls),
-                configuration,
-                endpoints,
-                self._listening.authorization,
+                RosSide(publishers, subscribers, calls), configuration, endpoints, self._listening.authorization
             )
             publisher = EndpointPublisher(list(zip(pair, (rest, soap), strict=True)), configuration.web.read_deadline)
             uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))

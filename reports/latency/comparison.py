@@ -218,10 +218,7 @@ def noise_of(noise: Sequence[Mapping[str, Any]], series: Series, quantile: str) 
 
 
 def ratio_interval(
-    old: float | None,
-    old_bounds: Sequence[float] | None,
-    new: float | None,
-    new_bounds: Sequence[float] | None,
+    old: float | None, old_bounds: Sequence[float] | None, new: float | None, new_bounds: Sequence[float] | None
 ) -> tuple[float, float] | None:
     """The 95 % interval of new / old from the intervals of both; None where one of the four is missing or not above 0.
 

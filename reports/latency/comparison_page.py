@@ -61,10 +61,7 @@ def table(comparison: Comparison) -> str:
 
 def comparison_html(comparison: Comparison, names: tuple[str, str]) -> str:
     """The page; `names` are the two files."""
-    pictures = {
-        "ratios": _ratios(comparison.changes),
-        "change": change(comparison.old_series, comparison.new_series),
-    }
+    pictures = {"ratios": _ratios(comparison.changes), "change": change(comparison.old_series, comparison.new_series)}
     return html_page("compare.html.j2", pictures=pictures, **_values(comparison, names))
 
 

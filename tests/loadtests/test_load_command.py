@@ -226,16 +226,7 @@ def test_ports_in_use(toy, load, option):
 def test_the_closed_model_and_the_histograms_while_they_grow(toy, load):
     port = free_port()
     process, finish = load.begin(
-        "--rest",
-        toy().url,
-        "--users",
-        "2",
-        "--duration",
-        "3",
-        "--warmup",
-        "0.2",
-        "--metrics-port",
-        port,
+        "--rest", toy().url, "--users", "2", "--duration", "3", "--warmup", "0.2", "--metrics-port", port
     )
     wait_for(process, r"[1-9]\d* requests answered")
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=5) as answer:

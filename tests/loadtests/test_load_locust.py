@@ -172,11 +172,7 @@ def free_port():
 @pytest.mark.parametrize("words", [["--worker"], ["--worker", "--master-port", "1"]])
 def test_a_worker_has_to_know_its_master(words):
     run = subprocess.run(
-        [sys.executable, "-m", "loadtests.node", *words],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
+        [sys.executable, "-m", "loadtests.node", *words], capture_output=True, text=True, timeout=30, check=False
     )
     assert run.returncode == 1
     assert "--master-host" in run.stderr

@@ -1,8 +1,6 @@
 """/openapi.json: served, valid, the contract's operations in it, and all of them there (contract, describe)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -12,12 +10,10 @@ from conformance.documents.openapi_validity import openapi_fault
 from conformance.rest.applicable import allowed
 from conformance.rest.calls import Call, example_call
 from conformance.rest.description import Described, described_by_openapi, differences
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.client import HttpClient
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.rest.interface import RestInterface
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("describe"), pytest.mark.needs("rest")]
 _PATH = "/openapi.json"

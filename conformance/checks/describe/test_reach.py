@@ -1,19 +1,12 @@
 """Whether the interfaces that the claimed classes need are there at all: the prerequisite of everything else."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.contract.interfaces import NEEDS, Interface
-from conformance.transport.exchange import NoAnswerError
-
-if TYPE_CHECKING:
-    from conformance.robot.interfaces import Interfaces
-    from conformance.transport.exchange import Attempt
-    from conformance.verdict.evidence import Judge
-    from conformance.verdict.run import Run
+from conformance.robot.interfaces import Interfaces
+from conformance.transport.exchange import Attempt, NoAnswerError
+from conformance.verdict.evidence import Judge
+from conformance.verdict.run import Run
 
 pytestmark = pytest.mark.phase("reach")
 _ENVELOPE = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'

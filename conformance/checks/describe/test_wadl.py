@@ -1,20 +1,14 @@
 """/application.wadl: served, well-formed, and with the contract's resources (paper, REST; contract, describe)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import UnreadableError
 from conformance.rest.description import Described, described_by_wadl, differences
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.client import HttpClient
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.rest.interface import RestInterface
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("describe"), pytest.mark.needs("rest")]
 _PATH = "/application.wadl"

@@ -1,10 +1,8 @@
 """What a robot says of its SOAP services: served with all it refers to, and the same as the contract."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 import pytest
@@ -13,20 +11,14 @@ from conformance.documents.wsdl import Description, DescriptionError, describe, 
 from conformance.documents.xml_names import WSDL_SOAP, clark
 from conformance.soap import comparison
 from conformance.soap.address import is_http, split
-from conformance.soap.callable_services import repetitions
+from conformance.soap.callable_services import SoapServices, repetitions
 from conformance.soap.published_wsdl import get
+from conformance.soap.service import SoapService
 from conformance.soap.wsdl_rules import RULES
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import NoAnswerError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Attempt, Exchange
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("describe")
 _EMPTY = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'
@@ -124,11 +116,7 @@ def test_address(soap: SoapServices, judge: Judge) -> None:
         located = [(name(port), port.find(clark(WSDL_SOAP, "address"))) for port in ports]
         if not located:
             judge.check(
-                "describe/wsdl-address",
-                False,
-                served.exchange,
-                "a soap:address",
-                found=served.problem or "none",
+                "describe/wsdl-address", False, served.exchange, "a soap:address", found=served.problem or "none"
             )
         for port, element in located:
             location = (element.get("location") if element is not None else None) or ""

@@ -1,23 +1,16 @@
 """One request, one identical message, whichever interface it came by."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 from hypothesis import strategies as st
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.batch import Batch, Order
 from conformance.robot.deliveries_seen import NoObserverError, observer_of
 from conformance.robot.delivery import lexical_deliveries
-from conformance.robot.probe.client import ProbeError
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.robot.probe.client import RosProbe
-    from conformance.soap.service import SoapService
-    from conformance.verdict.evidence import Judge
-    from conformance.verdict.explorer import Explorer
+from conformance.robot.probe.client import ProbeError, RosProbe
+from conformance.soap.service import SoapService
+from conformance.verdict.evidence import Judge
+from conformance.verdict.explorer import Explorer
 
 pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest", "publishers"), pytest.mark.motion]
 # A robot's list holds at least the last fifty: no batch makes more messages than half of that.

@@ -1,15 +1,16 @@
 """One state, read over REST and over SOAP."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import pytest
 
+from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element, projected
+from conformance.rest.interface import RestInterface
 from conformance.robot.agreement import Slack, disagreement, entries_of, stamp_of
 from conformance.robot.drive import BusyError, Drive
+from conformance.robot.geometry import Pose
 from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals, make_room
 from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY, TWIST
@@ -19,15 +20,10 @@ from conformance.robot.plan import plan_of, query, reachable
 from conformance.robot.robot import POSE, SENSORS, SERVICES, STILL, VELOCITY, Robot, Velocity
 from conformance.robot.soap_services import ask, returned
 from conformance.robot.stopping import bring_to_rest
-
-if TYPE_CHECKING:
-    from conformance.documents.json_schema import Shape
-    from conformance.rest.interface import RestInterface
-    from conformance.robot.geometry import Pose
-    from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.soap.service import SoapService
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest", "subscribers")
 _SLACK: Final = Slack()
@@ -141,12 +137,7 @@ def _compare_lists(
         odd = sorted(set(listed) ^ set(wanted[0]))
         problem = f"{len(listed)} entries for {len(wanted[0])}; in one only: {', '.join(odd[:3])}"
     judge.check(
-        f"equivalence/{name}",
-        not problem,
-        exchange,
-        f"the entries of GET {path}",
-        found=problem,
-        cause="other entries",
+        f"equivalence/{name}", not problem, exchange, f"the entries of GET {path}", found=problem, cause="other entries"
     )
 
 

@@ -1,22 +1,18 @@
 """What only a look at the robot's ROS graph shows."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.drive import BusyError, Drive
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.probe.client import Probe, ProbeError, RosProbe
 from conformance.robot.robot import SENSORS, STILL, Robot, Velocity
 from conformance.robot.stopping import bring_to_rest
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
 # Types that nothing but a sensor publishes; what else is one is for the robot to say.

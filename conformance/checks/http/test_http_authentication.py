@@ -1,18 +1,12 @@
 """Authentication: a robot that asks for a token says so where it is missing (RFC 9110 11.6.1)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.rest.applicable import reads
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.client import HttpClient
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.rest.interface import RestInterface
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 

@@ -1,23 +1,16 @@
 """Bodies: media types that an operation does not take, charset, and sizes (RFC 9110 8.3, 15.5.14, 15.5.16)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import pytest
 
+from conformance.documents.openapi import Operation
 from conformance.rest.applicable import applicable_operations
 from conformance.rest.calls import JSON, Call, example_call
+from conformance.rest.interface import RestInterface
 from conformance.robot.stopping import stop_robot
-from conformance.transport.exchange import NoAnswer, NoAnswerError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from conformance.documents.openapi import Operation
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
 _OTHERS = (

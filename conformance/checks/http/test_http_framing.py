@@ -1,20 +1,14 @@
 """Framing, by hand: what a client library would never send, and answers read octet by octet (RFC 9112)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.rest.applicable import reads
+from conformance.rest.calls import Call
+from conformance.rest.interface import RestInterface
 from conformance.transport import raw
+from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Unanswered
-
-if TYPE_CHECKING:
-    from conformance.rest.calls import Call
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.client import HttpClient
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
 # How long a robot may think about octets that are no request before it is taken to wait for more of them, s.

@@ -1,23 +1,16 @@
 """Methods: those that a resource has, those that it has not, and how it tells (RFC 9110 9, 10.2.1, 15.5.6)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.documents.openapi import Resource, resources_of
 from conformance.rest.applicable import reads
 from conformance.rest.calls import Call, example_call
+from conformance.rest.interface import RestInterface
 from conformance.rest.observers import KNOWN_METHODS
 from conformance.transport import raw
-from conformance.transport.exchange import Unanswered
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.client import HttpClient
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange, Unanswered
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 # What a robot might take by mistake: the usual methods, one that only WebDAV knows, and one that nobody knows.

@@ -1,17 +1,11 @@
 """What a client will not have is not sent (RFC 9110 12.4.2, 12.5.1, 15.5.7)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.rest.accept import quality
 from conformance.rest.applicable import answered
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.evidence import Judge
+from conformance.rest.interface import RestInterface
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 # Nothing that a robot could have beside the formats of the contract.

@@ -1,8 +1,5 @@
 """Targets: paths that nobody knows, trailing slashes, targets and fields that are too long."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
 from urllib.parse import urljoin, urlsplit
 
 import pytest
@@ -10,14 +7,11 @@ import pytest
 from conformance.documents.openapi import known_path, resources_of
 from conformance.rest.applicable import reads
 from conformance.rest.calls import example_call
+from conformance.rest.interface import RestInterface
 from conformance.rest.observers import KNOWN_METHODS
-from conformance.transport.exchange import NoAnswer, NoAnswerError
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.client import HttpClient
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 _METHODS = ("GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS", "PATCH", "FOO")

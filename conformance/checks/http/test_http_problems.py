@@ -1,9 +1,6 @@
 """Problems: an error says in words what was wrong, and where (RFC 9457 3.1.4)."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -11,13 +8,11 @@ from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import operations_of
 from conformance.rest.applicable import applicable_operations, reads
 from conformance.rest.calls import JSON, example_call
+from conformance.rest.interface import RestInterface
 from conformance.rest.mutations import mutations
 from conformance.rest.refusals import judge_refusal
 from conformance.robot.stopping import stop_robot
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
 _IDS = ("http/problem-detail", "http/problem-value", "http/problem-type", "http/problem-status", "http/no-traceback")

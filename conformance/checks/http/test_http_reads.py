@@ -1,17 +1,12 @@
 """Plain reads, and many of them: what the observers judge has to hold each time, not forty-nine times in fifty."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
 import pytest
 
 from conformance.rest.applicable import reads
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.effort import Effort
+from conformance.rest.interface import RestInterface
+from conformance.verdict.effort import Effort
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 # Of each resource at standard effort; and in all at any effort with a robot that is fast enough: one fault in fifty.

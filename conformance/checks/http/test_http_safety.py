@@ -1,22 +1,17 @@
 """Safe methods change nothing (RFC 9110 9.2.1); PUT and DELETE are idempotent (9.2.2)."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING
 
 import pytest
 
 from conformance.rest.applicable import applicable_operations, reads
 from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.effects import reader_of, settles_at
+from conformance.rest.interface import RestInterface
 from conformance.rest.snapshot import changed, changes_by_itself, flatten, take_snapshots
 from conformance.robot.stopping import stop_robot
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
 _TURNS = 3

@@ -1,19 +1,15 @@
 """The delivery PUT: whatever is valid is taken, whatever is no number is not."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import pytest
 from hypothesis import strategies as st
 
 from conformance.robot.delivery import Delivery, deliveries, lexical_deliveries, path_of
-
-if TYPE_CHECKING:
-    from conformance.transport.client import HttpClient
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
-    from conformance.verdict.explorer import Explorer
+from conformance.transport.client import HttpClient
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+from conformance.verdict.explorer import Explorer
 
 pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest"), pytest.mark.motion]
 _PAPER: Final = Delivery(4, 68.269, 38.718, 60.633, 37.51, 76.02, 41.35)
@@ -50,10 +46,7 @@ def test_deliveries(rest: HttpClient, judge: Judge, explore: Explorer) -> None:
         if 200 <= status < 300:
             judge.check("rest-delivery/put-no-content", status == 204, first, "204 for a delivery")
         judge.check(
-            "rest-delivery/put-repeated",
-            status == repeated,
-            again,
-            f"the answer that it had the first time, {status}",
+            "rest-delivery/put-repeated", status == repeated, again, f"the answer that it had the first time, {status}"
         )
 
     for code in (3, 4):

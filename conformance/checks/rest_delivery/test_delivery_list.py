@@ -1,20 +1,14 @@
 """The list of deliveries, an extension that a robot may leave out."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.robot.delivery import Delivery
 from conformance.robot.message_shapes import DELIVERIES as LIST
 from conformance.robot.message_shapes import read_as
 from conformance.robot.robot import ACCEPT_JSON, DELIVERIES
-
-if TYPE_CHECKING:
-    from conformance.transport.client import HttpClient
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.transport.client import HttpClient
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest")]
 # What the list holds at least.

@@ -1,18 +1,12 @@
 """Which format is sent for which Accept (RFC 9110 12.4.2, 12.5.1)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.rest.accept import quality
 from conformance.rest.applicable import answered
-
-if TYPE_CHECKING:
-    from conformance.rest.calls import Call
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.evidence import Judge
+from conformance.rest.calls import Call
+from conformance.rest.interface import RestInterface
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 _Q = "rest-formats/q-values"

@@ -12,14 +12,13 @@ from conformance.rest.applicable import applicable_operations
 from conformance.rest.calls import XML, Call, example_call, root_name
 from conformance.rest.effects import reader_of, settles_at
 from conformance.rest.formats import disagreements
+from conformance.rest.interface import RestInterface
 from conformance.robot.stopping import stop_robot
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 if TYPE_CHECKING:
     from lxml import etree
-
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
 _ID = "rest-formats/xml-input"

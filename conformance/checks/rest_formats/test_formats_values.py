@@ -1,9 +1,5 @@
 """JSON, XML and text of one moment: each readable by itself, and all with the same values (contract, formats)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.documents.json_schema import kind_of
@@ -12,11 +8,9 @@ from conformance.documents.representation import UnreadableError, local_name, pa
 from conformance.rest.applicable import answered, reads
 from conformance.rest.calls import root_name
 from conformance.rest.formats import disagreements
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.rest.interface import RestInterface
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 _XML = "application/xml"

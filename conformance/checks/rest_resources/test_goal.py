@@ -1,12 +1,11 @@
 """The life of a goal: put, read, repeated, contradicted, displaced, cancelled, reached, and put again."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final
 
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.drive import Drive
 from conformance.robot.goal import (
     CANCELLED,
@@ -22,13 +21,8 @@ from conformance.robot.goal import (
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import STILL, Robot, Velocity
 from conformance.robot.stopping import bring_to_rest
-
-if TYPE_CHECKING:
-    from typing import Any
-
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 _ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"

@@ -1,23 +1,19 @@
 """Goals under all kinds of ids, each displacing the one before."""
 
-from __future__ import annotations
-
 import itertools
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import pytest
 from hypothesis import strategies as st
 
 from conformance.documents.json_text import shown
+from conformance.rest.interface import RestInterface
 from conformance.robot.goal import NEW, arrived, await_goal, await_none, difference, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.evidence import Judge
-    from conformance.verdict.explorer import Explorer
+from conformance.verdict.evidence import Judge
+from conformance.verdict.explorer import Explorer
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 _LONGEST: Final = 255

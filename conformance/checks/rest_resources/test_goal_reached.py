@@ -1,23 +1,19 @@
 """A goal that is driven to: it ends there, is then no longer current, and its id can be used again."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.drive import Drive
+from conformance.robot.geometry import Pose
 from conformance.robot.goal import NEW, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.plan import ask, judge_start
 from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.robot.geometry import Pose
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 # A robot that comes no nearer for so long does not drive, s; and how long one that does is waited for, by effort.
@@ -66,12 +62,7 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface
         judge_start(robot, plan, before, asked)
     again = put_goal(robot, body)
     status = again.response.status
-    judge.check(
-        "rest-resources/goal-id-again",
-        status in NEW,
-        again,
-        "201 or 202 for a goal whose id has ended before",
-    )
+    judge.check("rest-resources/goal-id-again", status in NEW, again, "201 or 202 for a goal whose id has ended before")
     await_none(robot, 0.1)
     robot.delete_goal()
 

@@ -1,20 +1,16 @@
 """Goals that a robot cannot take."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import Pose
 from conformance.robot.goal import await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 # A robot may look for a way before it gives up, s.

@@ -1,21 +1,15 @@
 """Goals in any order."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.goal_walk import machine
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
 from conformance.robot.walk import Walk
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.explorer import Explorer
+from conformance.verdict.effort import Effort
+from conformance.verdict.explorer import Explorer
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 

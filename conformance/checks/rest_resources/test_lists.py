@@ -1,24 +1,20 @@
 """The lists of sensors and of navigation services."""
 
-from __future__ import annotations
-
 import itertools
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
+from conformance.documents.json_schema import Shape
+from conformance.rest.interface import RestInterface
 from conformance.robot.message_shapes import MESSAGE_TYPE, SERVICE_TYPE, read_as
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.robot.robot import SENSORS, SERVICES, Robot
-
-if TYPE_CHECKING:
-    from conformance.documents.json_schema import Shape
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 

@@ -1,18 +1,12 @@
 """Driving straight ahead: what is asked for is reached, measured alike everywhere, and moves the pose."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.drive import BusyError, Drive
 from conformance.robot.goals import make_room
 from conformance.robot.robot import Robot, Velocity
 from conformance.robot.stopping import bring_to_rest
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 

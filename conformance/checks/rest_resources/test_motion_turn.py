@@ -1,21 +1,17 @@
 """Turning on the spot: renewed, bent into an arc, disturbed by what is refused, and at last left to itself."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.drive import BusyError, Drive
 from conformance.robot.goals import make_room
 from conformance.robot.robot import STILL, Robot, Velocity
 from conformance.robot.stopping import bring_to_rest
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 # Where no hold time is declared: a velocity is renewed so often, for so long, and has to end within so long, s.

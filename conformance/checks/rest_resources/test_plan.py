@@ -1,24 +1,19 @@
 """Plans: asked for, never driven."""
 
-from __future__ import annotations
-
 import itertools
 import math
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import strategies as st
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import Pose, pose_of, wrapped
 from conformance.robot.message_shapes import GET_PLAN, ODOMETRY, read_as
 from conformance.robot.plan import START_OFF, Plan, ask, judge_start, plan_of, query, reachable
 from conformance.robot.robot import POSE, Robot
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
-    from conformance.verdict.explorer import Explorer
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
+from conformance.verdict.explorer import Explorer
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 # A step that a robot cannot follow without another plan of its own, m.
@@ -147,11 +142,7 @@ def test_plans_from_a_given_start(robot: Robot, here: Pose, judge: Judge, explor
         if plan is not None:
             _judge_plan(judge, plan, goal, 0.1, exchange, robot.statement.motion.frame)
 
-    explore(
-        st.tuples(st.integers(0, 2), st.integers(0, 2), st.floats(-math.pi, math.pi)),
-        try_start,
-        cases=12,
-    )
+    explore(st.tuples(st.integers(0, 2), st.integers(0, 2), st.floats(-math.pi, math.pi)), try_start, cases=12)
     for start, goal in itertools.pairwise(starts):
         _judge_defaults(robot, judge, start, goal._replace(yaw=0.0))
 

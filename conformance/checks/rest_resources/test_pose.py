@@ -1,20 +1,15 @@
 """The robot's pose and its measured velocity, read while nothing is asked of the robot."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.drive import Drive
 from conformance.robot.robot import POSE, Robot
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 # A robot whose odometry is slow, or that has just been started, gets so long, s.

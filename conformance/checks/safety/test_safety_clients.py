@@ -1,13 +1,12 @@
 """Clients that vanish, and clients that never come to an end."""
 
-from __future__ import annotations
-
 import time
 from contextlib import closing
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.drive import Drive
 from conformance.robot.message_shapes import body_of
 from conformance.robot.robot import GOAL_PATH, LINEAR, POSE, STILL, VELOCITY, Robot, Velocity
@@ -15,10 +14,7 @@ from conformance.robot.stopping import bring_to_rest
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
 from conformance.transport.incomplete_request import PartialRequest
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
 _WATCH_S: Final = 0.3

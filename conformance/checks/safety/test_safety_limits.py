@@ -1,23 +1,18 @@
 """Velocities that the robot must not take."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator
+from typing import Final
 
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.robot.drive import BusyError, Drive
 from conformance.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.robot.stopping import bring_to_rest
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from conformance.rest.interface import RestInterface
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 # No robot of this contract is as fast, whatever its statement leaves out: m/s and rad/s.

@@ -1,20 +1,13 @@
 """What holds of every SOAP answer, whatever was asked: an observer watches them all over the whole run."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
-from conformance.soap.callable_services import callable_services
+from conformance.soap.callable_services import SoapServices, callable_services
 from conformance.soap.calls import call
 from conformance.soap.observer import PASSIVE
-
-if TYPE_CHECKING:
-    from conformance.soap.callable_services import SoapServices
-    from conformance.verdict.effort import Effort
+from conformance.verdict.effort import Effort
 
 pytestmark = pytest.mark.phase("reach")
 _STRANGE = Node(clark("urn:example:strange", "no_such_operation"))

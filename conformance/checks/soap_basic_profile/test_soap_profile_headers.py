@@ -1,24 +1,18 @@
 """Header blocks and versions: what a SOAP 1.1 node has to understand, may let be, and in which order it looks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import pytest
 
 from conformance.documents.xml_names import ENVELOPE, NEXT_ACTOR, clark
 from conformance.documents.xml_node import Node
-from conformance.soap.callable_services import callable_services, repetitions
+from conformance.soap.callable_services import SoapServices, callable_services, repetitions
 from conformance.soap.calls import SoapResponse, call, send
 from conformance.soap.envelope import envelope
+from conformance.soap.service import SoapService
 from conformance.soap.valid_messages import example, quiet_example
-
-if TYPE_CHECKING:
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("delivery")
 _STRANGE = "urn:example:strange"

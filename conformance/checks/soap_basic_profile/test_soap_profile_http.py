@@ -1,26 +1,18 @@
 """SOAP over HTTP by the Basic Profile: methods, media types, SOAPAction, and bodies that are no XML."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xml_node import Node
-from conformance.soap.callable_services import callable_services, repetitions
+from conformance.soap.callable_services import SoapServices, callable_services, repetitions
 from conformance.soap.calls import SoapResponse, call, read_exchange, send
 from conformance.soap.envelope import envelope
+from conformance.soap.service import SoapService
 from conformance.soap.valid_messages import quiet_example
-from conformance.transport.exchange import NoAnswer, NoAnswerError
-
-if TYPE_CHECKING:
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("delivery")
 _ANY = Node(clark("urn:example:strange", "no_such_operation"))

@@ -1,27 +1,21 @@
 """Messages by the Basic Profile: dispatch, encodings, and what becomes of those that are not what the WSDL says."""
 
-from __future__ import annotations
-
 import codecs
-from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.documents.wsdl import Operation
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
-from conformance.soap.callable_services import callable_services
+from conformance.soap.callable_services import SoapServices, callable_services
 from conformance.soap.calls import call, send
 from conformance.soap.envelope import envelope
 from conformance.soap.mutations import invalid_ones, mutations
+from conformance.soap.service import SoapService
 from conformance.soap.valid_messages import candidates, example, typed
 from conformance.soap.xml_style import XmlStyle, serialize
-
-if TYPE_CHECKING:
-    from conformance.documents.wsdl import Operation
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("delivery")
 _STRANGE = "urn:example:strange"

@@ -1,9 +1,5 @@
 """The publishers service of RoAAS's own contract: both operations, and what their answers are."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 from hypothesis import strategies as st
 
@@ -16,14 +12,11 @@ from conformance.soap.calls import SoapResponse, call, send
 from conformance.soap.envelope import envelope
 from conformance.soap.forms import written_integer
 from conformance.soap.messages import variants, with_text
-from conformance.soap.xml_style import serialize, single_changes, xml_styles
-
-if TYPE_CHECKING:
-    from conformance.soap.service import SoapService
-    from conformance.soap.xml_style import XmlStyle
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
-    from conformance.verdict.explorer import Explorer
+from conformance.soap.service import SoapService
+from conformance.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+from conformance.verdict.explorer import Explorer
 
 pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("publishers"), pytest.mark.motion]
 _BOTH = ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest")

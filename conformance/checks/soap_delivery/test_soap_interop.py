@@ -1,23 +1,17 @@
 """Interoperability: zeep, the common SOAP client for Python, is made from the description and calls everything."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from conformance.contract.delivery import COFFEE, COURIER, EXAMPLE
-from conformance.soap.callable_services import repetitions
+from conformance.soap.callable_services import SoapServices, repetitions
+from conformance.soap.service import SoapService
 from conformance.soap.valid_messages import example
+from conformance.soap.zeep_client import ZeepCaller
 from conformance.transport.exchange import NoAnswerError
-
-if TYPE_CHECKING:
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
-    from conformance.soap.zeep_client import ZeepCaller
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
-
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 # What a user would look for in what zeep returns.
 _VALUES = {

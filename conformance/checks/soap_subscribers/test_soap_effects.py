@@ -1,9 +1,7 @@
 """What a SOAP message does beside being answered: seen in the robot's list of deliveries, and in the goal it shows."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import pytest
 
@@ -13,20 +11,16 @@ from conformance.documents.xml_node import Node
 from conformance.robot import delivery_messages
 from conformance.robot.geometry import Pose
 from conformance.robot.goal import goal_body
+from conformance.robot.interfaces import Interfaces
 from conformance.robot.message_shapes import DELIVERIES, read_as
 from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
 from conformance.soap import content
 from conformance.soap.calls import call
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.robot.interfaces import Interfaces
-    from conformance.soap.service import SoapService
-    from conformance.transport.client import HttpClient
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.soap.service import SoapService
+from conformance.transport.client import HttpClient
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 _LIST = "/robot/app/delivery/"
 # A delivery with these coordinates is none that any other check sends.

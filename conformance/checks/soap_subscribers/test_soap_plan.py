@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import pytest
 
 from conformance.documents.xml_names import clark, local
+from conformance.documents.xsd_shapes import Element
 from conformance.robot import delivery_messages, soap_services
 from conformance.robot.geometry import Pose
 from conformance.robot.plan import START_OFF
 from conformance.soap import content
+from conformance.soap.callable_services import SoapServices
 from conformance.soap.calls import SoapResponse, call
+from conformance.soap.service import SoapService
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from lxml import etree
-
-    from conformance.documents.xsd_shapes import Element
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
 _PLAN = "soap-subscribers/plan"

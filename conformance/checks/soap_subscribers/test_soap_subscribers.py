@@ -9,17 +9,16 @@ import pytest
 from conformance.documents.xml import text_of
 from conformance.documents.xml_names import clark, local
 from conformance.documents.xml_node import Node
+from conformance.documents.xsd_shapes import Element
 from conformance.robot import delivery_messages
 from conformance.soap import content
 from conformance.soap.calls import SoapResponse, call
+from conformance.soap.service import SoapService
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 if TYPE_CHECKING:
     from lxml import etree
-
-    from conformance.documents.xsd_shapes import Element
-    from conformance.soap.service import SoapService
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
 _VALID = "soap-subscribers/response-valid"

@@ -1,13 +1,12 @@
 """What the contract does not allow changes nothing: neither the velocity, nor the goal, nor what the robot delivers."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import pytest
 
 from conformance.documents.openapi import operations_of
 from conformance.rest.calls import JSON
+from conformance.rest.interface import RestInterface
 from conformance.rest.mutations import near_misses
 from conformance.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.robot.delivery import Delivery, path_of
@@ -16,20 +15,16 @@ from conformance.robot.drive import Drive
 from conformance.robot.goal import await_goal, await_none, difference, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.message_shapes import body_of
-from conformance.robot.probe.client import ProbeError
+from conformance.robot.probe.client import ProbeError, RosProbe
 from conformance.robot.robot import GOAL_PATH, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.robot.soap_services import send_delivery
 from conformance.robot.stopping import bring_to_rest
+from conformance.soap.callable_services import SoapServices
 from conformance.soap.calls import call
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.robot.probe.client import RosProbe
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.soap.service import SoapService
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.needs("rest"), pytest.mark.motion]
 _WATCH_S: Final = 0.3

@@ -1,29 +1,22 @@
 """Contract-invalid SOAP input is refused: a valid message broken in one way, which lxml and xmlschema both see."""
 
-from __future__ import annotations
-
 import random
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import strategies as st
 
-from conformance.soap.callable_services import callable_services
+from conformance.documents.wsdl import Operation
+from conformance.documents.xml_node import Node
+from conformance.documents.xsd_shapes import Element
+from conformance.soap.callable_services import SoapServices, callable_services
 from conformance.soap.calls import SoapResponse, call
 from conformance.soap.messages import ordinary, variants
 from conformance.soap.mutations import Mutation, invalid_ones, mutations
+from conformance.soap.service import SoapService
 from conformance.soap.valid_messages import example
-from conformance.verdict.evidence import RefutedError
-
-if TYPE_CHECKING:
-    from conformance.documents.wsdl import Operation
-    from conformance.documents.xml_node import Node
-    from conformance.documents.xsd_shapes import Element
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
-    from conformance.verdict.explorer import Explorer
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge, RefutedError
+from conformance.verdict.explorer import Explorer
 
 pytestmark = pytest.mark.phase("delivery")
 _KINDS = ("missing", "unknown", "duplicate", "order", "namespace", "lexical", "range", "non-finite", "nil", "body")

@@ -1,24 +1,18 @@
 """JSON bodies that break the contract in one way each, confirmed to be invalid as they are sent, are refused."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.documents.openapi import Operation
 from conformance.rest.applicable import applicable_operations
-from conformance.rest.calls import JSON, example_call
+from conformance.rest.calls import JSON, Call, example_call
+from conformance.rest.interface import RestInterface
 from conformance.rest.mutations import MUTATED, Mutation, mutations
 from conformance.rest.refusals import judge_refusal
 from conformance.robot.stopping import stop_robot
-
-if TYPE_CHECKING:
-    from conformance.documents.openapi import Operation
-    from conformance.rest.calls import Call
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
 _IDS = tuple(f"strict-input/{name}" for name in MUTATED)

@@ -1,22 +1,17 @@
 """Parameters that break the contract are refused, and so is leaving out those that are required."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.documents.openapi import Operation
 from conformance.rest.applicable import applicable_operations, readable
 from conformance.rest.calls import Call, example_call
+from conformance.rest.interface import RestInterface
 from conformance.rest.parameters import Wrong, wrong_texts
 from conformance.rest.refusals import judge_refusal
 from conformance.robot.stopping import stop_robot
-
-if TYPE_CHECKING:
-    from conformance.documents.openapi import Operation
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
 _QUERY = "strict-input/query-parameter"
@@ -58,12 +53,7 @@ def test_missing_query_parameters(api: RestInterface, judge: Judge) -> None:
             if item.required:
                 lacking = call.having(item.name, None)
                 judge_refusal(
-                    api,
-                    partial(lacking.send, api),
-                    _MISSING,
-                    f"no parameter {item.name}",
-                    field=item.name,
-                    json=False,
+                    api, partial(lacking.send, api), _MISSING, f"no parameter {item.name}", field=item.name, json=False
                 )
         judge_refusal(api, partial(bare.send, api), _MISSING, "no parameter at all", json=False)
 

@@ -1,21 +1,16 @@
 """XML bodies that break the contract are refused, by robots that take XML."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pytest
 
 from conformance.rest.applicable import applicable_operations
 from conformance.rest.calls import XML, example_call, root_name
+from conformance.rest.interface import RestInterface
 from conformance.rest.refusals import judge_refusal
 from conformance.rest.xml_mutations import xml_mutations
 from conformance.robot.stopping import stop_robot
-
-if TYPE_CHECKING:
-    from conformance.rest.interface import RestInterface
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
 _ID = "strict-input/xml-body"

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import statistics
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.contract.files import Contract
 from conformance.contract.interfaces import Interface
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
 from conformance.documents.xml_node import Node
+from conformance.rest.interface import RestInterface
+from conformance.robot.interfaces import Interfaces
 from conformance.soap.attack_runner import AttackRunner, judge_calls, outcome
 from conformance.soap.attacks import VALUE_SLOT, Attack, Template, attacks
 from conformance.soap.callback_server import CallbackServer
 from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Attempt, Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from lxml import etree
-
-    from conformance.contract.files import Contract
-    from conformance.rest.interface import RestInterface
-    from conformance.robot.interfaces import Interfaces
-    from conformance.transport.exchange import Attempt, Exchange
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("attack")
 _REST = "xml-security/rest"

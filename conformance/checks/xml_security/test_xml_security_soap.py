@@ -1,10 +1,8 @@
 """Attacks on the SOAP services by XML: refused, nothing leaked, nobody called, and the robot still well."""
 
-from __future__ import annotations
-
 import statistics
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -12,20 +10,15 @@ from conformance.documents.xml_names import ADDRESSING, clark
 from conformance.documents.xml_node import Node
 from conformance.soap.attack_runner import AttackRunner, judge_calls, outcome
 from conformance.soap.attacks import IGNORED_SLOT, VALUE_SLOT, Attack, Template, attacks
-from conformance.soap.callable_services import callable_services
+from conformance.soap.callable_services import SoapServices, callable_services
 from conformance.soap.callback_server import CallbackServer
 from conformance.soap.envelope import envelope
 from conformance.soap.messages import simple_leaves, with_text
+from conformance.soap.service import SoapService
 from conformance.soap.valid_messages import example
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
-    from conformance.transport.exchange import Attempt, Exchange
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Attempt, Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("attack")
 _NAMES = (

@@ -5,8 +5,6 @@ Says in one line of JSON that it is ready, or what its problem is; then answers 
 loses no bit.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

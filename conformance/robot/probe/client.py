@@ -1,7 +1,5 @@
 """The suite's end of the ROS probe: starts its process, asks it, and never waits for ever."""
 
-from __future__ import annotations
-
 import atexit
 import json
 import os
@@ -10,13 +8,11 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from conformance.contract.statement import Ros
 from conformance.robot.delivery import Delivery
 from conformance.robot.robot import Velocity
-
-if TYPE_CHECKING:
-    from conformance.contract.statement import Ros
 
 # Importing rclpy and finding the robot on the graph takes seconds on a small machine, s.
 _START_S: Final = 20.0

@@ -1,7 +1,5 @@
 """The ROS node of the probe: listens to deliveries and velocity commands, and looks at the graph."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import deque

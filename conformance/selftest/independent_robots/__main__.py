@@ -1,7 +1,5 @@
 """Starts one of the independent robots: ``python -m conformance.selftest.independent_robots NAME``."""
 
-from __future__ import annotations
-
 import argparse
 import signal
 import sys

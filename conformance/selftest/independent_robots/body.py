@@ -1,7 +1,5 @@
 """A differential-drive robot as arithmetic: its state is computed when somebody asks, from the time that has passed."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time

@@ -1,9 +1,5 @@
 """Every mutant, by subject."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from conformance.selftest.mutants import (
     attacks,
     delivery,
@@ -28,9 +24,7 @@ from conformance.selftest.mutants import (
     velocity,
     wsdl,
 )
-
-if TYPE_CHECKING:
-    from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import Mutant
 
 _SUBJECTS = (
     reach,

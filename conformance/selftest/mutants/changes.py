@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from lxml import etree
 
-from conformance.selftest.change import HangUpError
-from conformance.selftest.messages import Response
+from conformance.selftest.change import Change, Forward, HangUpError
+from conformance.selftest.messages import Request, Response
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Change, Forward
-    from conformance.selftest.messages import Request
-
-    Where = Callable[[Request], bool]
-    When = Callable[[Response], bool]
-    Make = Callable[[], Change]
+Where = Callable[[Request], bool]
+When = Callable[[Response], bool]
+Make = Callable[[], Change]
 
 POSE, VELOCITY, LINEAR = "/robot/pose/", "/robot/velocity/", "/robot/velocity/linear/"
 SENSORS, SERVICES = "/robot/sensors/", "/robot/navigation/services/"

@@ -1,10 +1,10 @@
 """Robots that mistreat the delivery PUT."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     altered,
     becomes,
@@ -16,12 +16,6 @@ from conformance.selftest.mutants.changes import (
     rewritten,
 )
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NON_FINITE = re.compile(r"[+-]?(nan|inf|infinity|1e400|\d+e\d{3,})", re.IGNORECASE)
@@ -111,12 +105,7 @@ MUTANTS = (
         "put-range",
         altered(deliveries, becomes(500), nth=50),
     ),
-    _mutant(
-        "delivery-talks",
-        "A delivery is answered 200 with a page.",
-        "put-no-content",
-        altered(deliveries, _page),
-    ),
+    _mutant("delivery-talks", "A delivery is answered 200 with a page.", "put-no-content", altered(deliveries, _page)),
     _mutant(
         "delivery-positive-only",
         "Negative coordinates are refused.",

@@ -1,10 +1,10 @@
 """Robots whose REST descriptions do not agree with what they do."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
+from conformance.selftest.messages import Request
 from conformance.selftest.mutants.changes import (
     SENSORS,
     altered,
@@ -18,11 +18,6 @@ from conformance.selftest.mutants.changes import (
     values,
 )
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.messages import Request
 
 _OPENAPI, _WADL = rest("GET", "/openapi.json"), rest("GET", "/application.wadl")
 

@@ -1,19 +1,14 @@
 """Ways to lose, double, reorder and distort deliveries and velocities between a client and ROS."""
 
-from __future__ import annotations
-
 import re
 import struct
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import deliveries, plain, soap
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _COFFEE = soap("ExecuteCoffeeRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")

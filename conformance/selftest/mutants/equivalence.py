@@ -1,8 +1,7 @@
 """Robots whose interfaces tell different stories, of what was asked for and of what is."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from conformance.selftest.mutants.changes import (
     SENSORS,
@@ -33,10 +32,6 @@ from conformance.selftest.mutants.distortion import (
 )
 from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.mutants.soap_responses import enveloped
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")

@@ -1,11 +1,11 @@
 """Robots whose formats do not agree, or are not what was asked for."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
-from conformance.selftest.messages import Request
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     LINEAR,
@@ -22,12 +22,6 @@ from conformance.selftest.mutants.changes import (
     tree,
 )
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Response
 
 _GET = rest("GET")
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)

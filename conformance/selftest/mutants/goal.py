@@ -1,10 +1,11 @@
 """Robots that mistreat a goal."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     altered,
@@ -32,12 +33,6 @@ from conformance.selftest.mutants.goal_memory import (
     position,
 )
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 

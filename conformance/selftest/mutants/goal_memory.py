@@ -1,18 +1,13 @@
 """What goals look like to a proxy, and robots that remember the wrong thing of them."""
 
-from __future__ import annotations
-
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from conformance.selftest.messages import Response
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import GOAL, parsed, plain, problem, rest, success
 from conformance.selftest.mutants.in_background import later
-
-if TYPE_CHECKING:
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request
 
 _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 

@@ -1,11 +1,12 @@
 """Robots whose HTTP messages, problems and JSON are not well made, and which mistake those of others."""
 
-from __future__ import annotations
-
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     JSON,
     POSE,
@@ -21,12 +22,6 @@ from conformance.selftest.mutants.changes import (
     values,
 )
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _ANY, _GET, _POSE = rest(), rest("GET"), rest("GET", POSE)
 _INPUT = rest("PUT", *RESOURCES)

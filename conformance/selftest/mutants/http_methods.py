@@ -1,9 +1,9 @@
 """Robots that break HTTP's rules of methods, negotiation and statuses."""
 
-from __future__ import annotations
+from collections.abc import Callable
 
-from typing import TYPE_CHECKING
-
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     JSON,
@@ -27,12 +27,6 @@ from conformance.selftest.mutants.changes import (
     values,
 )
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _ANY, _GET, _HEAD, _OPTIONS = rest(), rest("GET"), rest("HEAD"), rest("OPTIONS")
 _INPUT = rest("PUT", *RESOURCES)

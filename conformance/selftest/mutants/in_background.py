@@ -1,14 +1,10 @@
 """What a mutant does by itself, after the response: in a thread, and for as long as the run lasts."""
 
-from __future__ import annotations
-
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from conformance.selftest.wire import IncompleteMessageError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 def later(delay_s: float, act: Callable[..., object], *arguments: Any) -> None:

@@ -1,18 +1,13 @@
 """Robots that refuse what is invalid, and do it all the same."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import DELIVERIES, GOAL, LINEAR, POSE, VELOCITY, deliveries, parsed, rest
 from conformance.selftest.mutants.mutant import Mutant
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 _INVALID = {400, 415, 422}

@@ -1,13 +1,14 @@
 """Robots that take garbage over REST: what is invalid is repaired before it is looked at."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     LINEAR,
@@ -26,12 +27,6 @@ from conformance.selftest.mutants.changes import (
 )
 from conformance.selftest.mutants.delivery import any_code, finite, lenient, segments
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
@@ -65,10 +60,7 @@ def _filled(value: Any, pattern: Any) -> Any:
     """Missing fields become zero."""
     if not isinstance(pattern, dict) or not isinstance(value, dict):
         return value
-    return {
-        **value,
-        **{key: _filled(value.get(key, pattern[key]), pattern[key]) for key in pattern},
-    }
+    return {**value, **{key: _filled(value.get(key, pattern[key]), pattern[key]) for key in pattern}}
 
 
 def _known(value: Any, pattern: Any) -> Any:
@@ -251,12 +243,7 @@ MUTANTS = (
         "query-parameter",
         rewritten(rest("GET", PLAN), _query(_numbers)),
     ),
-    _mutant(
-        "input-query-complete",
-        "A missing x or y is the one of the query before.",
-        "query-missing",
-        _Remembered,
-    ),
+    _mutant("input-query-complete", "A missing x or y is the one of the query before.", "query-missing", _Remembered),
     _mutant("input-xml-fine", "XML of the wrong shape is answered 204.", "xml-body", _swallowed(_xml)),
     _mutant(
         "input-malformed-422",

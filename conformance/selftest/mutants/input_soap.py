@@ -1,21 +1,16 @@
 """Robots that take garbage over SOAP: each repairs one kind of it before it is looked at."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from lxml import etree
 
 from conformance.contract.delivery import XSD_FIELDS
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import SOAP, TNS, altered, named, rewritten, soap, xml
 from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.mutants.soap_responses import is_fault
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.messages import Request, Response
 
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 _ANY = soap()

@@ -1,7 +1,5 @@
 """Robots whose lists of sensors and services are not what they should be."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from conformance.selftest.mutants.changes import SENSORS, SERVICES, altered, rest, values

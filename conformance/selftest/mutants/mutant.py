@@ -1,14 +1,10 @@
 """What a mutant is: one change between a client and a good robot, and what must notice it."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Change, IncompleteRequest
+from conformance.selftest.change import Change, IncompleteRequest
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,13 @@
 """Robots whose plans lead elsewhere."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import PLAN, altered, becomes, rest, rewritten, status, values
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.messages import Request, Response
 
 _GET = rest("GET", PLAN)
 

@@ -1,28 +1,14 @@
 """Robots that do not know, or do not say, where they are."""
 
-from __future__ import annotations
-
 import copy
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
-from conformance.selftest.mutants.changes import (
-    POSE,
-    altered,
-    instead,
-    parsed,
-    plain,
-    problem,
-    rest,
-    values,
-)
+from conformance.selftest.change import Change, Forward
+from conformance.selftest.messages import Request, Response
+from conformance.selftest.mutants.changes import POSE, altered, instead, parsed, plain, problem, rest, values
 from conformance.selftest.mutants.mutant import Mutant
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Change, Forward
-    from conformance.selftest.messages import Request, Response
 
 _AT = rest("GET", POSE)
 
@@ -222,11 +208,5 @@ MUTANTS = (
         "rest",
         instead(_AT, problem(404, "there is no pose")),
     ),
-    Mutant(
-        "pose-no-content",
-        "The pose is 204.",
-        ("rest-resources/pose-type",),
-        "rest",
-        instead(_AT, plain(204)),
-    ),
+    Mutant("pose-no-content", "The pose is 204.", ("rest-resources/pose-type",), "rest", instead(_AT, plain(204))),
 )

@@ -1,17 +1,11 @@
 """Robots of which an interface is not there."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from conformance.selftest.change import HangUpError
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import hanging_up, instead, plain, rest
 from conformance.selftest.mutants.mutant import Mutant
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.messages import Request, Response
 
 _REST_CLASSES = ("rest-resources", "rest-delivery", "http", "safety", "equivalence", "strict-input")
 _LOST = plain(404, b"<html><body>It works!</body></html>", "text/html")

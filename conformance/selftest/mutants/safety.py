@@ -1,11 +1,11 @@
 """Robots that are dangerous: they go on, go too fast, or start by themselves."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
-from conformance.selftest.messages import Request
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     LINEAR,
@@ -23,12 +23,6 @@ from conformance.selftest.mutants.goal_memory import active
 from conformance.selftest.mutants.in_background import later
 from conformance.selftest.mutants.input_effects import drive, goal_ahead, sent
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Response
 
 _PUT = rest("PUT", VELOCITY)
 _PUTS = rest("PUT", VELOCITY, LINEAR)

@@ -1,21 +1,16 @@
 """Robots that process envelopes, headers and encodings as SOAP 1.1 does not have it."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from lxml import etree
 
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, posted, rewritten, soap, xml
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import coded, enveloped, fault, is_fault
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 
 def _foreign(request: Request) -> bool:

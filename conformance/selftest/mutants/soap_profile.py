@@ -1,21 +1,10 @@
 """Robots that break WS-I Basic Profile 1.1 and SOAP 1.1 in their messages and faults."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from lxml import etree
 
-from conformance.selftest.mutants.changes import (
-    altered,
-    anything,
-    header,
-    posted,
-    soap,
-    status,
-    text,
-    tree,
-)
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
+from conformance.selftest.mutants.changes import altered, anything, header, posted, soap, status, text, tree
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import (
     bare_500,
@@ -39,10 +28,6 @@ from conformance.selftest.mutants.soap_responses import (
     unqualified,
     wrapper_as_asked,
 )
-
-if TYPE_CHECKING:
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _ANY = soap()
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")

@@ -1,17 +1,12 @@
 """Robots whose subscribers service gives wrong values, wrong plans, or values in a wrong form."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
+from conformance.selftest.messages import Request
 from conformance.selftest.mutants.changes import altered, named, rewritten, soap, text, tree
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.messages import Request
 
 _POSE, _VELOCITY, _PLAN = soap("GetPose"), soap("GetVelocity"), soap("GetPlan")
 
@@ -80,24 +75,14 @@ MUTANTS = (
         "sensors",
         altered(soap("GetSensors"), text("/msg/", "/")),
     ),
-    _mutant(
-        "soap-read-order",
-        "Responses have y before x.",
-        "response-valid",
-        altered(_POSE, tree(_swapped)),
-    ),
+    _mutant("soap-read-order", "Responses have y before x.", "response-valid", altered(_POSE, tree(_swapped))),
     _mutant(
         "soap-read-empty",
         "Responses hold nothing that a client finds.",
         "interop",
         altered(soap("Get[A-Z][A-Za-z]+"), tree(_emptied)),
     ),
-    _mutant(
-        "soap-plan-reversed",
-        "GetPlan gives the way back.",
-        "plan",
-        altered(_PLAN, tree(_reversed_path)),
-    ),
+    _mutant("soap-plan-reversed", "GetPlan gives the way back.", "plan", altered(_PLAN, tree(_reversed_path))),
     _mutant(
         "soap-plan-other-frame",
         "GetPlan's path is in another frame.",

@@ -4,20 +4,14 @@ Each edits a response, for ``altered``, or an XML tree in it, for ``tree`` and `
 its own, for ``instead``.
 """
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from lxml import etree
 
-from conformance.selftest.messages import Response
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import SOAP, TNS, named, tree
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.messages import Request
 
 _TRACE = (
     "java.lang.NullPointerException\n\tat org.mybot.turtlebot.soap.Publishers.execute(Publishers.java:41)\n"

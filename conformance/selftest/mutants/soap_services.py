@@ -1,11 +1,11 @@
 """Robots whose SOAP services answer something else than they were asked."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
-from conformance.selftest.messages import Response
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     SOAP,
     TNS,
@@ -28,12 +28,6 @@ from conformance.selftest.mutants.soap_responses import (
     with_content,
     without,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _ACT, _READ = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"), soap("Get[A-Z][A-Za-z]+")

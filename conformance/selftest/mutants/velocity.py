@@ -1,10 +1,11 @@
 """Robots that do not drive as they are told, or do not say how they drive."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     LINEAR,
@@ -22,12 +23,6 @@ from conformance.selftest.mutants.changes import (
     values,
 )
 from conformance.selftest.mutants.mutant import Mutant
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _GET, _PUT = rest("GET", VELOCITY), rest("PUT", VELOCITY)
 _GET_LINEAR, _PUT_LINEAR = rest("GET", LINEAR), rest("PUT", LINEAR)

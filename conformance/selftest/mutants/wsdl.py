@@ -1,20 +1,15 @@
 """Robots whose WSDL is not the contract's, or breaks WS-I Basic Profile 1.1."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from lxml import etree
 
+from conformance.selftest.change import Forward
+from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import TNS, altered, hanging_up, instead, named, plain, text, tree, wsdls
 from conformance.selftest.mutants.mutant import of_class
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.change import Forward
-    from conformance.selftest.messages import Request, Response
 
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _XSD = "http://www.w3.org/2001/XMLSchema"
@@ -197,12 +192,7 @@ MUTANTS = (
         "wsdl-names",
         _edited(_set("targetNamespace", "http://ros-ws.org")),
     ),
-    _mutant(
-        "wsdl-operation-lost",
-        "The WSDL lacks an operation.",
-        "wsdl-operations",
-        _edited(_operation_lost),
-    ),
+    _mutant("wsdl-operation-lost", "The WSDL lacks an operation.", "wsdl-operations", _edited(_operation_lost)),
     _mutant(
         "wsdl-part-name",
         "A message's part has another name.",

@@ -1,14 +1,10 @@
 """Bearer tokens (RFC 6750): with a token file, both interfaces ask for the token in it."""
 
-from __future__ import annotations
-
 import hmac
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
 from reference_robot.webservices.representation.problems import Problem
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _CHALLENGE: Final = ((b"www-authenticate", b'Bearer realm="robot"'),)
 _INVALID: Final = ((b"www-authenticate", b'Bearer realm="robot", error="invalid_token"'),)

@@ -1,12 +1,12 @@
 """The ASGI side of an interface: time it, ask for the token, answer, and never show a traceback."""
 
-from __future__ import annotations
-
 import logging
 from abc import ABC, abstractmethod
+from collections.abc import Awaitable
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from reference_robot.webservices.http.authorization import Authorization
 from reference_robot.webservices.http.messages import (
     ClientVanishedError,
     Message,
@@ -18,11 +18,6 @@ from reference_robot.webservices.http.messages import (
 )
 from reference_robot.webservices.http.negotiation import problem_format
 from reference_robot.webservices.representation.problems import Problem
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable
-
-    from reference_robot.webservices.http.authorization import Authorization
 
 _LOGGER: Final = logging.getLogger(__name__)
 

@@ -1,7 +1,5 @@
 """A request as a resource or service sees it, and its answer. Plain ASGI: the paths here are the hot ones."""
 
-from __future__ import annotations
-
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any, Final
 

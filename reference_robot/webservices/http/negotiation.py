@@ -1,15 +1,10 @@
 """Which format a client wants: the Accept field (RFC 9110 12.5.1)."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from reference_robot.webservices.representation.problems import PROBLEM_JSON, PROBLEM_XML, Problem
 from reference_robot.webservices.representation.writing import JSON, XML
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 @lru_cache(maxsize=256)

@@ -5,19 +5,15 @@ to send it, a method that nobody registered. This protocol bounds the first two 
 says.
 """
 
-from __future__ import annotations
-
 import contextlib
 import re
-from typing import TYPE_CHECKING, Any, Final
+from asyncio import Transport
+from typing import Any, Final
 
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol, RequestResponseCycle
 
 from reference_robot.webservices.http.messages import BODY_LIMIT
 from reference_robot.webservices.representation.problems import PROBLEM_JSON, Problem
-
-if TYPE_CHECKING:
-    from asyncio import Transport
 
 TARGET_LIMIT: Final = 8000  # octets (RFC 9110 4.1 asks for at least that)
 HEAD_LIMIT: Final = 64 * 1024  # octets: request line and fields (RFC 6585 5)

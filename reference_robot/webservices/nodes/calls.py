@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from reference_robot.webservices.representation.problems import not_yet
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rclpy.executors import Executor
     from rclpy.task import Future
 

@@ -12,12 +12,12 @@ from rclpy.action import ActionClient
 from rclpy.qos import HistoryPolicy, QoSProfile
 from unique_identifier_msgs.msg import UUID
 
+from reference_robot.names import RosNames
+from reference_robot.ros import RosRuntime
+
 if TYPE_CHECKING:
     from rclpy.publisher import Publisher
     from rclpy.task import Future
-
-    from reference_robot.names import RosNames
-    from reference_robot.ros import RosRuntime
 
 # Each accepted request is exactly one message (contract, ROS side): nothing gives way before it is acknowledged.
 _DELIVERY_QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL)

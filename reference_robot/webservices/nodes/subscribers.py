@@ -11,11 +11,11 @@ from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from std_msgs.msg import String
 
+from reference_robot.names import RosNames
+from reference_robot.ros import RosRuntime
+
 if TYPE_CHECKING:
     from rclpy.task import Future
-
-    from reference_robot.names import RosNames
-    from reference_robot.ros import RosRuntime
 
 _LATCHED_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NAVIGATION_PACKAGES: Final = frozenset({"nav_msgs", "nav2_msgs", "map_msgs", "slam_toolbox"})

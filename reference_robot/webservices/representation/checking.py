@@ -1,15 +1,10 @@
 """Whether plain data that came over the wire has the shape that the contract asks for."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from reference_robot.webservices.representation.problems import Problem
-from reference_robot.webservices.representation.shapes import Real, Record, Series, Text, Truth, Whole
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.representation.shapes import Shape
+from reference_robot.webservices.representation.shapes import Real, Record, Series, Shape, Text, Truth, Whole
 
 _SHOWN: Final = 120
 

@@ -1,18 +1,12 @@
 """Between ROS messages and plain data."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from reference_robot.webservices.representation.problems import not_yet
-from reference_robot.webservices.representation.shapes import Record, Series, shape_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from reference_robot.webservices.representation.shapes import Shape
+from reference_robot.webservices.representation.shapes import Record, Series, Shape, shape_of
 
 
 def reader_of(message: Any) -> Callable[[Any], dict[str, Any]]:

@@ -1,7 +1,5 @@
 """Refusals, as RFC 9457 describes them."""
 
-from __future__ import annotations
-
 from http import HTTPStatus
 from typing import Final
 

@@ -7,13 +7,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Final
 
-from rosidl_parser.definition import (
-    AbstractNestedType,
-    AbstractString,
-    Array,
-    BasicType,
-    NamespacedType,
-)
+from rosidl_parser.definition import AbstractNestedType, AbstractString, Array, BasicType, NamespacedType
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,6 @@ All three print a double with the fewest digits that read back as the same doubl
 values in every format (contract, class ``equivalence``).
 """
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any, Final

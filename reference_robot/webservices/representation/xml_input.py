@@ -8,8 +8,6 @@ libxml2 keeps every name that it has met for as long as the thread lives that me
 parsed in a thread of their own once there have been many: strangers cannot fill the robot's memory with names.
 """
 
-from __future__ import annotations
-
 import codecs
 import re
 from concurrent.futures import ThreadPoolExecutor

@@ -1,24 +1,15 @@
 """The delivery application's resources: the paper's PUT, and the list of what was accepted."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import ClassVar, Final
 from urllib.parse import unquote_to_bytes
 
+from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import NUMBER
-from reference_robot.webservices.resources.resource import (
-    NO_CONTENT,
-    Resource,
-    represented,
-    wanted_format,
-)
+from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, wanted_format
 from reference_robot.webservices.robot.deliveries import Deliveries, DeliveryRequest, UnusableFieldError
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.http.messages import Request, Response
 
 # The values of the path, in the order of the message's fields and by the path template's names.
 _COORDINATES: Final = ("depot_x", "depot_y", "dest_x", "dest_y", "source_x", "source_y")
@@ -51,13 +42,7 @@ class Delivery(Resource):
         sent = _spelled_out(request.path) if match is None else match.groups()
         code, depot_x, depot_y, dest_x, dest_y, source_x, source_y = sent
         delivery = DeliveryRequest(
-            int(code),
-            float(depot_x),
-            float(depot_y),
-            float(dest_x),
-            float(dest_y),
-            float(source_x),
-            float(source_y),
+            int(code), float(depot_x), float(depot_y), float(dest_x), float(dest_y), float(source_x), float(source_y)
         )
         try:
             self._deliveries.accept(delivery, "rest")

@@ -1,9 +1,8 @@
 """/openapi.json and /application.wadl: the contract's files, with the address under which they were asked for."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from collections.abc import Callable
+from typing import Any, ClassVar, Final
 
 import yaml
 from lxml import etree
@@ -11,9 +10,6 @@ from lxml import etree
 from conformance.contract.files import CONTRACT_DIR
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.resources.resource import Resource
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _WADL_NAMESPACE: Final = "{http://wadl.dev.java.net/2009/02}"
 

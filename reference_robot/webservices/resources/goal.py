@@ -1,21 +1,11 @@
 """/robot/navigation/action/goal/: sending and cancelling a goal location."""
 
-from __future__ import annotations
+from typing import ClassVar, Final
 
-from typing import TYPE_CHECKING, ClassVar, Final
-
+from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.problems import Problem
-from reference_robot.webservices.resources.resource import (
-    NO_CONTENT,
-    Resource,
-    represented,
-    sent,
-    wanted_format,
-)
+from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, sent, wanted_format
 from reference_robot.webservices.robot.goals import GOAL, Goals
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.http.messages import Request, Response
 
 _CREATED: Final = 201
 

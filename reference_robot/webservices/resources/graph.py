@@ -1,14 +1,10 @@
 """/robot/sensors/ and /robot/navigation/services/: what is on the robot's graph."""
 
-from __future__ import annotations
+from typing import ClassVar
 
-from typing import TYPE_CHECKING, ClassVar
-
+from reference_robot.webservices.http.messages import Request, Response
+from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.http.messages import Request, Response
-    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
 
 class Sensors(Resource):

@@ -1,20 +1,16 @@
 """/robot/navigation/service/plan: a plan to a given pose."""
 
-from __future__ import annotations
-
 import math
 import re
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import Any, ClassVar, Final
 from urllib.parse import unquote_to_bytes
 
+from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.http.messages import Request, Response
 
 _NUMBER: Final = re.compile(NUMBER)
 _REQUIRED: Final = ("x", "y")

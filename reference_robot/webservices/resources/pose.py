@@ -1,14 +1,10 @@
 """/robot/pose/: the robot's pose."""
 
-from __future__ import annotations
+from typing import Any, ClassVar
 
-from typing import TYPE_CHECKING, Any, ClassVar
-
+from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.http.messages import Request, Response
-    from reference_robot.webservices.robot.odometry import LatestOdometry
+from reference_robot.webservices.robot.odometry import LatestOdometry
 
 
 class Pose(Resource):

@@ -1,25 +1,13 @@
 """What all REST resources share."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from collections.abc import Awaitable, Callable
+from typing import Any, ClassVar, Final
 
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.http.negotiation import chosen
 from reference_robot.webservices.representation.reading import read
-from reference_robot.webservices.representation.writing import (
-    JSON,
-    TEXT,
-    XML,
-    write_json,
-    write_text,
-    write_xml,
-)
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
-
-    from reference_robot.webservices.representation.shapes import Record
+from reference_robot.webservices.representation.shapes import Record
+from reference_robot.webservices.representation.writing import JSON, TEXT, XML, write_json, write_text, write_xml
 
 FORMATS: Final = (JSON, XML, TEXT)
 NO_CONTENT: Final = Response(204)

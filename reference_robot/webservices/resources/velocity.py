@@ -1,17 +1,13 @@
 """/robot/velocity/ and /robot/velocity/linear/."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from geometry_msgs.msg import Twist, Vector3
 
+from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.shapes import shape_of
 from reference_robot.webservices.resources.resource import Resource, represented, sent, wanted_format
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.http.messages import Request, Response
-    from reference_robot.webservices.robot.velocity import Velocity as RobotVelocity
+from reference_robot.webservices.robot.velocity import Velocity as RobotVelocity
 
 
 class Velocity(Resource):

@@ -1,21 +1,17 @@
 """The delivery application as both interfaces see it: hand a request to ROS, remember it, tell what became of it."""
 
-from __future__ import annotations
-
 import json
 import math
 import time
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from mybot_delivery_app.msg import DeliveryRequestMsg
 
+from reference_robot.webservices.nodes.publishers import RobotPublishersNode
+from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem, not_yet
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.nodes.publishers import RobotPublishersNode
-    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
 COFFEE: Final[int] = DeliveryRequestMsg.COFFEE_DELIVERY_MESSAGE_CODE
 _CODES: Final = frozenset({DeliveryRequestMsg.COURIER_DELIVERY_MESSAGE_CODE, COFFEE})

@@ -1,13 +1,11 @@
 """The life of a goal: sent, repeated, preempted, cancelled, ended. One goal is current at a time, or none."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import uuid
 from collections import deque
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
@@ -15,16 +13,14 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Header
 
+from reference_robot.names import Frames
+from reference_robot.webservices.nodes.calls import RosCalls
+from reference_robot.webservices.nodes.publishers import RobotPublishersNode
+from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import message_from, reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import Record, Text, shape_of
 from reference_robot.webservices.robot.target_poses import require_pose
-
-if TYPE_CHECKING:
-    from reference_robot.names import Frames
-    from reference_robot.webservices.nodes.calls import RosCalls
-    from reference_robot.webservices.nodes.publishers import RobotPublishersNode
-    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
 _GOAL_ID: Final = Record("GoalID", (("stamp", shape_of(Time)), ("id", Text(1, 255))), optional=frozenset({"stamp"}))
 # move_base_msgs/MoveBaseActionGoal, a type of ROS 1 that only the web interface still knows.
@@ -73,11 +69,7 @@ class Goals:
     """
 
     def __init__(
-        self,
-        publishers: RobotPublishersNode,
-        subscribers: RobotSubscribersNode,
-        calls: RosCalls,
-        frames: Frames,
+        self, publishers: RobotPublishersNode, subscribers: RobotSubscribersNode, calls: RosCalls, frames: Frames
     ) -> None:
         self._publishers = publishers
         self._subscribers = subscribers

@@ -1,16 +1,12 @@
 """The odometry received last: where the robot is and how fast it moves, as it measures itself."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nav_msgs.msg import Odometry
 
+from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import not_yet
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
 
 class LatestOdometry:

@@ -11,17 +11,16 @@ from nav2_msgs.action import ComputePathToPose
 from nav_msgs.msg import Path
 from nav_msgs.srv import GetPlan
 
+from reference_robot.names import Frames
+from reference_robot.webservices.nodes.calls import RosCalls
+from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
+from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.target_poses import planar_pose, require_known_frame
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import Pose
-
-    from reference_robot.names import Frames
-    from reference_robot.webservices.nodes.calls import RosCalls
-    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
-    from reference_robot.webservices.robot.odometry import LatestOdometry
 
 _LARGEST_TOLERANCE: Final = 3.4e38  # nav_msgs/GetPlan carries it as a float32
 

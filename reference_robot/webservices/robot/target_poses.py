@@ -1,17 +1,13 @@
 """Poses that clients send: heading, unit quaternions, and frames that the robot knows."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from geometry_msgs.msg import Pose
 
+from reference_robot.names import Frames
 from reference_robot.webservices.representation.checking import refused, shown
 from reference_robot.webservices.representation.problems import Problem
-
-if TYPE_CHECKING:
-    from reference_robot.names import Frames
 
 _UNIT_TOLERANCE: Final = 1e-3  # contract, fine print
 

@@ -1,23 +1,18 @@
 """The robot's velocity: what it measures, and what clients may ask for."""
 
-from __future__ import annotations
-
 import asyncio
 import time
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from typing import Any, Final
 
 from geometry_msgs.msg import Twist
 
+from reference_robot.webservices.configuration import WebSettings
+from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.representation.messages import message_from, reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import shape_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from reference_robot.webservices.configuration import WebSettings
-    from reference_robot.webservices.nodes.publishers import RobotPublishersNode
-    from reference_robot.webservices.robot.odometry import LatestOdometry
+from reference_robot.webservices.robot.odometry import LatestOdometry
 
 _DISCOVERY: Final = 1.0  # seconds that a robot just found may take to be connected
 _DISCOVERY_STEP: Final = 0.02

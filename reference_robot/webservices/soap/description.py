@@ -1,7 +1,5 @@
 """A service's WSDL and XSD: served with the robot's own address, and the judge of what comes in."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 from lxml import etree

@@ -1,7 +1,5 @@
 """SOAP 1.1 faults (SOAP 1.1, 4.4)."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 from typing import Final
 

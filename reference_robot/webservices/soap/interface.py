@@ -1,18 +1,13 @@
 """The SOAP interface: from a request to the service at its path."""
 
-from __future__ import annotations
+from collections.abc import Awaitable, Callable, Iterable
+from typing import Final
 
-from typing import TYPE_CHECKING, Final
-
+from reference_robot.webservices.http.authorization import Authorization
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.representation.problems import Problem
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable
-
-    from reference_robot.webservices.http.authorization import Authorization
-    from reference_robot.webservices.soap.service import SoapService
+from reference_robot.webservices.soap.service import SoapService
 
 _ALLOW: Final = (b"allow", b"POST, OPTIONS")
 _ALLOW_DESCRIPTION: Final = (b"allow", b"GET, HEAD, POST, OPTIONS")
@@ -29,10 +24,7 @@ class SoapInterface(Interface):
     """
 
     def __init__(
-        self,
-        services: Iterable[SoapService],
-        address: Callable[[Request], str],
-        authorization: Authorization,
+        self, services: Iterable[SoapService], address: Callable[[Request], str], authorization: Authorization
     ) -> None:
         super().__init__(authorization)
         self._services = {service.path.encode(): service for service in services}

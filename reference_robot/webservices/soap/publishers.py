@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING, Final
 from reference_robot.webservices.robot.deliveries import COFFEE, Deliveries, DeliveryRequest, UnusableFieldError
 from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import SoapService
+from reference_robot.webservices.soap.service import Operation, SoapService
 
 if TYPE_CHECKING:
     from lxml import etree
-
-    from reference_robot.webservices.soap.service import Operation
 
 PATH: Final = "/turtlesim_publisher_ws"
 
@@ -33,10 +31,7 @@ class PublishersWebService(SoapService):
 
     def operations(self) -> dict[str, Operation]:
         """Return the two operations."""
-        return {
-            "ExecuteDeliveryRequest": self._execute_delivery,
-            "ExecuteCoffeeRequest": self._execute_coffee,
-        }
+        return {"ExecuteDeliveryRequest": self._execute_delivery, "ExecuteCoffeeRequest": self._execute_coffee}
 
     def _execute_delivery(self, wrapper: etree._Element) -> bytes:
         self._accept(wrapper)

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Final
+from collections.abc import Awaitable, Callable
+from typing import Final
+
+from lxml import etree
 
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import parsed_content_type
 from reference_robot.webservices.representation.xml_input import parsed
+from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.envelope import operation_element
 from reference_robot.webservices.soap.faults import Fault, FaultCode, client_fault
 
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
-
-    from lxml import etree
-
-    from reference_robot.webservices.soap.description import ServiceDescription
-
-    Operation = Callable[[etree._Element], bytes | Awaitable[bytes]]  # noqa: SLF001 - lxml's only name for the class
+Operation = Callable[[etree._Element], bytes | Awaitable[bytes]]  # noqa: SLF001 - lxml's only name for the class
 
 _LOGGER: Final = logging.getLogger(__name__)
 _MEDIA_TYPE: Final = "text/xml"

@@ -1,24 +1,19 @@
 """RobotSubscribersWebService: the web methods that tell the robot's state, each as its REST resource does."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from lxml import etree
 
+from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.writing import element_of
+from reference_robot.webservices.robot.goals import Goals
+from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
+from reference_robot.webservices.robot.velocity import Velocity
 from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import SoapService
-
-if TYPE_CHECKING:
-    from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
-    from reference_robot.webservices.robot.goals import Goals
-    from reference_robot.webservices.robot.odometry import LatestOdometry
-    from reference_robot.webservices.robot.velocity import Velocity
-    from reference_robot.webservices.soap.service import Operation
+from reference_robot.webservices.soap.service import Operation, SoapService
 
 PATH: Final = "/turtlesim_subscriber_ws"
 
@@ -76,9 +71,7 @@ class SubscribersWebService(SoapService):
         namespace = self.description.namespace
         root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
         wrapper = etree.SubElement(
-            etree.SubElement(root, f"{{{SOAP}}}Body"),
-            f"{{{namespace}}}{operation}Response",
-            nsmap={"tns": namespace},
+            etree.SubElement(root, f"{{{SOAP}}}Body"), f"{{{namespace}}}{operation}Response", nsmap={"tns": namespace}
         )
         wrapper.extend([element_of(value, "return") for value in returned])
         return etree.tostring(root, encoding="utf-8", xml_declaration=True)

@@ -54,10 +54,7 @@ def density(series: Mapping[Key, Series]) -> Picture | None:
         )
 
 
-def difference(
-    series: Mapping[Key, Series],
-    comparisons: Sequence[Mapping[str, Any]],
-) -> Picture | None:
+def difference(series: Mapping[Key, Series], comparisons: Sequence[Mapping[str, Any]]) -> Picture | None:
     """One panel for each client and operation: SOAP minus REST at each quantile, with its band."""
     panels = []
     with drawing():

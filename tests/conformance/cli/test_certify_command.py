@@ -1,7 +1,5 @@
 """``roaas certify`` against what is no robot: a verdict and an exit code, never a traceback."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The delivery's fields are those of the contract's files."""
 
-from __future__ import annotations
-
 import re
 
 from lxml import etree

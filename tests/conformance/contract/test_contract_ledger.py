@@ -1,7 +1,5 @@
 """The ledger has every class, and every requirement can be told from every other."""
 
-from __future__ import annotations
-
 import pytest
 
 from conformance.contract.classes import CLASSES, PROFILES

@@ -1,7 +1,5 @@
 """The contract's OpenAPI description is valid, and has all of Table 1."""
 
-from __future__ import annotations
-
 import pytest
 from openapi_spec_validator import OpenAPIV31SpecValidator
 

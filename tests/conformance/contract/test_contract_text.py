@@ -1,7 +1,5 @@
 """Requirements cite sections of the contract's text that exist, and no section of it is left out."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -21,8 +19,7 @@ _NOT_YET_JUDGED = {"several-clients"}
 
 
 @pytest.mark.parametrize(
-    ("title", "anchor"),
-    [("Goals", "goals"), ("ROS side", "ros-side"), ("What? `a/b`, and_c", "what-ab-and_c")],
+    ("title", "anchor"), [("Goals", "goals"), ("ROS side", "ros-side"), ("What? `a/b`, and_c", "what-ab-and_c")]
 )
 def test_an_anchor_is_githubs(title, anchor):
     assert anchor_of(title) == anchor

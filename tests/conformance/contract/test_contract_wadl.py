@@ -1,7 +1,5 @@
 """The contract's two descriptions of REST name the same resources, methods and parameters."""
 
-from __future__ import annotations
-
 from conformance.contract.files import Contract
 from conformance.documents.openapi import operations_of
 from conformance.rest.description import described_by_wadl, differences

@@ -1,7 +1,5 @@
 """The contract's WSDLs load in zeep, are what the paper prints, and their XSD is valid by itself."""
 
-from __future__ import annotations
-
 import pytest
 import xmlschema
 from lxml import etree

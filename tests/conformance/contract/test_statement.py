@@ -1,7 +1,5 @@
 """A statement is read as it stands, and refused with the offending value."""
 
-from __future__ import annotations
-
 import pytest
 
 from conformance.contract.classes import CLASSES

@@ -1,7 +1,5 @@
 """The one XML parser: nothing is expanded or fetched, a DOCTYPE is refused, and what is no XML says why."""
 
-from __future__ import annotations
-
 import pytest
 
 from conformance.documents.xml import NotXmlError, elements, has_doctype, parse, text_of

@@ -1,7 +1,5 @@
 """What an exception in a check says of the requirements that it was to judge."""
 
-from __future__ import annotations
-
 from conformance.engine.record_exception import record_exception
 from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
 from conformance.verdict.run import Run

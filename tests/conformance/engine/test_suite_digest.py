@@ -1,7 +1,5 @@
 """Two runs with the same digest asked the same: it covers what judges, and nothing else."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest

@@ -1,11 +1,11 @@
 """A lending library as a web service, by the contract in data/library-contract; with some faults on request."""
 
-from __future__ import annotations
-
 import json
 import re
+from collections.abc import Callable
+from email.message import Message
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import parse_qsl
 
 import yaml
@@ -14,10 +14,6 @@ from conformance.selftest.independent_robots.plain import reading
 from conformance.selftest.independent_robots.plain.reading import MalformedError, RefusedError, fit_element, parse_xml
 from conformance.selftest.independent_robots.plain.server import Answer, start
 from conformance.selftest.independent_robots.plain.writing import as_json, choose, element, written
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from email.message import Message
 
 CONTRACT = Path(__file__).parent.parent / "data" / "library-contract"
 _BOOK = {"title": "id", "year": "int32", "price": "double", "shelf": {"room": "id", "row": "int32"}}

@@ -1,19 +1,14 @@
 """``roaas certify --contract DIR`` judges a service of another domain, and finds what is wrong with a broken one."""
 
-from __future__ import annotations
-
 import json
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
 
 import pytest
 from click.testing import CliRunner
 from lending_library import CONTRACT, Library, open_library
 
 from roaas import main
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """What the suite makes of answers of a live service: what is steady, what agrees, what may be sent."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """What is said of drives that nobody drove: traces made by hand, and no robot."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

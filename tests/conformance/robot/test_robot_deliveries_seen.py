@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import math
 import re
 import struct
@@ -105,10 +103,7 @@ def narrowed(seen: Seen) -> Seen:
         (lambda number, seen: [narrowed(seen)] if number == 3 else [seen], {"coffee-soap"}),
         (lambda number, seen: [] if number == 5 else [seen], {"delivery-same"}),
         (lambda _, seen: [Seen(seen.delivery, "rest")], {"delivery-soap", "coffee-soap", "delivery-same"}),
-        (
-            lambda _, seen: [Seen(seen.delivery._replace(message_code=3), seen.interface)],
-            {"coffee-soap"},
-        ),
+        (lambda _, seen: [Seen(seen.delivery._replace(message_code=3), seen.interface)], {"coffee-soap"}),
     ],
 )
 def test_what_does_not_arrive_as_it_was_sent_is_found(fault, requirements):

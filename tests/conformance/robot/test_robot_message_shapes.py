@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -61,8 +59,7 @@ def test_what_is_no_list_of_sensors_has_a_fault(value):
 
 
 @pytest.mark.parametrize(
-    "body",
-    [b"", b"{", b'{"linear": NaN}', b"\xff\xfe", b"[" * 100_000, b'{"a": Infinity}', b"<Twist/>", b"1" * 5000],
+    "body", [b"", b"{", b'{"linear": NaN}', b"\xff\xfe", b"[" * 100_000, b'{"a": Infinity}', b"<Twist/>", b"1" * 5000]
 )
 def test_hostile_bodies_are_told_and_never_raised(body):
     value, problem = read_as(answer(body), TWIST)

@@ -1,7 +1,5 @@
 """Which addresses of a robot's own WSDL are followed."""
 
-from __future__ import annotations
-
 import pytest
 
 from conformance.soap.address import is_http, may_be_followed, split

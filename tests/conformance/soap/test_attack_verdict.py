@@ -1,7 +1,5 @@
 """What becomes of attacks is judged rightly, whatever a robot does with them."""
 
-from __future__ import annotations
-
 import pytest
 
 from conformance.soap.attack_verdict import attack_verdict

@@ -1,7 +1,5 @@
 """Which services a check may call: nothing is sent to the one that acts without permission, and that is put down."""
 
-from __future__ import annotations
-
 import pytest
 
 from conformance.contract.files import CONTRACT_DIR

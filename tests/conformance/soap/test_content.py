@@ -1,7 +1,5 @@
 """What an answer holds: complete or not, whatever the elements around it are called."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """Descriptions of any layout come to the same."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """Messages made from a schema: valid to both validators, or invalid to both, and the same however they are written."""
 
-from __future__ import annotations
-
 from decimal import Decimal
 
 import pytest

@@ -1,7 +1,5 @@
 """What is watched in every SOAP answer: each breach is held against its requirement, and a good answer against none."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

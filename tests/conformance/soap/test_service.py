@@ -1,7 +1,5 @@
 """Where a service is, whatever its WSDL is; a bad robot is never a reason to give up."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

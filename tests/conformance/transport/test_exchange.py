@@ -1,7 +1,5 @@
 """A finding's command sends the request again, octet by octet."""
 
-from __future__ import annotations
-
 import subprocess
 
 import pytest

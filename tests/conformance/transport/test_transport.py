@@ -1,7 +1,5 @@
 """Every exchange ends at its deadline, and what came instead of an answer is told."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

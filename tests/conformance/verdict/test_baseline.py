@@ -1,7 +1,5 @@
 """A baseline accepts known failures for a while, and is itself judged."""
 
-from __future__ import annotations
-
 import datetime as dt
 
 import pytest

@@ -1,7 +1,5 @@
 """The rules by which evidence becomes verdicts."""
 
-from __future__ import annotations
-
 import pytest
 
 from conformance.contract.ledger import Requirement

@@ -93,10 +93,7 @@ def test_the_actions_are_nav2s():
         "pose": "geometry_msgs/PoseStamped",
         "behavior_tree": "string",
     }
-    assert NavigateToPose.Result.get_fields_and_field_types() == {
-        "error_code": "uint16",
-        "error_msg": "string",
-    }
+    assert NavigateToPose.Result.get_fields_and_field_types() == {"error_code": "uint16", "error_msg": "string"}
     assert NavigateToPose.Feedback.get_fields_and_field_types() == {
         "current_pose": "geometry_msgs/PoseStamped",
         "navigation_time": "builtin_interfaces/Duration",

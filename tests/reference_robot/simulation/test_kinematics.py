@@ -31,12 +31,7 @@ def test_velocity_never_exceeds_the_limits(commands):
         assert -math.pi <= motion.yaw <= math.pi
 
 
-@given(
-    st.floats(-0.7, 0.7),
-    st.floats(-0.7, 0.7),
-    st.floats(-2.5, 2.5),
-    st.floats(-2.5, 2.5),
-)
+@given(st.floats(-0.7, 0.7), st.floats(-0.7, 0.7), st.floats(-2.5, 2.5), st.floats(-2.5, 2.5))
 def test_any_velocity_follows_any_other_within_the_settle_time(from_v, to_v, from_w, to_w):
     motion = Motion(0, 0, 0, from_v, from_w)
     for _ in range(23):  # 0.46 s at 50 Hz

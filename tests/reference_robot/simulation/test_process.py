@@ -50,11 +50,7 @@ def test_it_ends_cleanly(domain_id, end):
 
 @pytest.mark.parametrize(
     ("arguments", "named"),
-    [
-        (["--names", "missing.toml"], "missing.toml"),
-        (["--domain-id", "102"], "102"),
-        (["--time-scale", "0"], "0"),
-    ],
+    [(["--names", "missing.toml"], "missing.toml"), (["--domain-id", "102"], "102"), (["--time-scale", "0"], "0")],
 )
 def test_what_it_cannot_use_it_names(arguments, named):
     done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, check=False)

@@ -1,15 +1,10 @@
 """Fixtures: one server in front of a robot that is not ours, shared by the session."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import pytest
 from web_messages import delivery_path, twist
 from web_robot import ForeignRobot, Served, eventually, running_robot
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 @pytest.fixture(scope="session")

@@ -7,8 +7,6 @@ Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent] [planner]``.
 ``{"tell_next_goal_as": …}`` tells of the next one that comes, and of no later one.
 """
 
-from __future__ import annotations
-
 import json
 import struct
 import sys

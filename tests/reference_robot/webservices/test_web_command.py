@@ -1,7 +1,5 @@
 """The command: its one line, its signals, its errors; tokens; the simulation as its child."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

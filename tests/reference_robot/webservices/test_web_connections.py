@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import select
+import socket
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -12,8 +13,6 @@ from typing import TYPE_CHECKING
 from web_messages import delivery_envelope, delivery_path, twist
 
 if TYPE_CHECKING:
-    import socket
-
     from web_robot import ForeignRobot, Served
 
 BODY = b'{"linear": {"x": 0.1, "y": 0, "z": 0},'

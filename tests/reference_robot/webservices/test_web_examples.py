@@ -1,7 +1,5 @@
 """The two short clients in ``examples/`` deliver the paper's coffee."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

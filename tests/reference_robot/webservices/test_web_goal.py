@@ -1,7 +1,5 @@
 """The life of a goal, seen by an action server of another process."""
 
-from __future__ import annotations
-
 import pytest
 from lxml import etree
 from web_messages import goal, query_envelope, twist

@@ -1,7 +1,5 @@
 """Plans of a robot that plans as Nav2 does, by an action; those of a GetPlan service are our simulated robot's."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

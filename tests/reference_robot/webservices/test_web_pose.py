@@ -1,7 +1,5 @@
 """What ROS publishes is what both interfaces show, in every format."""
 
-from __future__ import annotations
-
 import yaml
 from lxml import etree
 from web_messages import query_envelope

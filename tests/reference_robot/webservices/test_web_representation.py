@@ -1,7 +1,5 @@
 """Messages to the wire and back, without a server: nothing is lost on any way."""
 
-from __future__ import annotations
-
 import json
 import math
 import resource

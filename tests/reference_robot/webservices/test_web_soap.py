@@ -41,8 +41,7 @@ def fault_of(answer: httpx.Response) -> str:
 CLIENTS_FAULTS = {
     "no arg0": query_envelope("ExecuteDeliveryRequest"),
     "nil arg0": query_envelope(
-        "ExecuteDeliveryRequest",
-        '<arg0 xmlns:i="http://www.w3.org/2001/XMLSchema-instance" i:nil="true"/>',
+        "ExecuteDeliveryRequest", '<arg0 xmlns:i="http://www.w3.org/2001/XMLSchema-instance" i:nil="true"/>'
     ),
     "missing": GOOD.replace("<source_y>41.35</source_y>", ""),
     "order": GOOD.replace("<depot_x>68.269</depot_x>", "").replace("</arg0>", "<depot_x>1</depot_x></arg0>"),

@@ -1,7 +1,5 @@
 """PUT velocity: what reaches cmd_vel, and what is refused and does not."""
 
-from __future__ import annotations
-
 import pytest
 from web_messages import goal, twist
 from web_robot import ForeignRobot, Served, eventually, running_robot

@@ -1,7 +1,5 @@
 """What tests send."""
 
-from __future__ import annotations
-
 from typing import Any
 
 ENVELOPE = '<s:Envelope xmlns:s="http://schemas.xmlsoap.org/soap/envelope/">{}<s:Body>{}</s:Body></s:Envelope>'

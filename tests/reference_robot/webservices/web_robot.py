@@ -1,7 +1,5 @@
 """The real server in front of real ROS, and a robot that is not ours behind it."""
 
-from __future__ import annotations
-
 import json
 import os
 import queue
@@ -10,17 +8,15 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 _PATIENCE = 20.0  # seconds
 

@@ -119,12 +119,7 @@ def test_ratio_interval_covers_the_true_ratio():
 
 @pytest.mark.parametrize(
     ("old", "old_bounds", "new", "new_bounds"),
-    [
-        (None, [1, 2], 1.0, [1, 2]),
-        (1.0, None, 1.0, [1, 2]),
-        (0.0, [0, 0], 1.0, [1, 2]),
-        (1.0, [0, 2], 1.0, [1, 2]),
-    ],
+    [(None, [1, 2], 1.0, [1, 2]), (1.0, None, 1.0, [1, 2]), (0.0, [0, 0], 1.0, [1, 2]), (1.0, [0, 2], 1.0, [1, 2])],
 )
 def test_no_interval_without_four_figures(old, old_bounds, new, new_bounds):
     assert ratio_interval(old, old_bounds, new, new_bounds) is None

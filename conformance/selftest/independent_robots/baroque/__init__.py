@@ -17,17 +17,12 @@ Freedoms that it takes:
   and in WADL with nested resources.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from conformance.selftest.independent_robots.baroque.rest import Rest
 from conformance.selftest.independent_robots.baroque.server import Loop
 from conformance.selftest.independent_robots.baroque.soap import Soap
 from conformance.selftest.independent_robots.body import Body, Build
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 BUILD = Build(
     linear_m_s=0.3,

@@ -1,7 +1,5 @@
 """Input judged by the contract's own OpenAPI schemas, with jsonschema."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

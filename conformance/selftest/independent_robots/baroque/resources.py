@@ -1,16 +1,11 @@
 """What the robot shows: its values in the form of ROS types, with fields of its own, and its descriptions."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from conformance.selftest.independent_robots.baroque.judging import NotTakenError
-from conformance.selftest.independent_robots.body import NoPlanError, pose, stamp, yaw_of
-
-if TYPE_CHECKING:
-    from conformance.selftest.independent_robots.body import Body, Goal
+from conformance.selftest.independent_robots.body import Body, Goal, NoPlanError, pose, stamp, yaw_of
 
 SENSORS = [
     {"name": "front laser", "topic": "/front/scan", "type": "sensor_msgs/msg/LaserScan"},

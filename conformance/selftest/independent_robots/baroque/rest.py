@@ -1,22 +1,16 @@
 """REST, by a table of resources."""
 
-from __future__ import annotations
-
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 from urllib.parse import parse_qsl, unquote
 
 from conformance.selftest.independent_robots.baroque import resources
 from conformance.selftest.independent_robots.baroque.judging import NotTakenError, from_json, from_xml, judged, number
 from conformance.selftest.independent_robots.baroque.server import Ask, Reply, problem
 from conformance.selftest.independent_robots.baroque.writing import as_json, as_text, as_xml
-from conformance.selftest.independent_robots.body import ConflictError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.selftest.independent_robots.body import Body
+from conformance.selftest.independent_robots.body import Body, ConflictError
 
 _WRITERS: dict[str, Callable[[str, Any], bytes]] = {
     "application/json": lambda root, value: as_json(value),  # noqa: ARG005 - one signature for the three

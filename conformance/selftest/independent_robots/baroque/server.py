@@ -1,17 +1,12 @@
 """HTTP/1.1 on asyncio's streams, framed by h11."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from email.utils import formatdate
-from typing import TYPE_CHECKING
 
 import h11
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _MAX_HEAD = 48 * 1024
 _MAX_BODY = 1024 * 1024

@@ -1,11 +1,9 @@
 """SOAP, judged by the service's own schema with lxml."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.sax.saxutils import escape
 
 from lxml import etree
@@ -14,9 +12,7 @@ from conformance.selftest.independent_robots.baroque import resources
 from conformance.selftest.independent_robots.baroque.judging import NotTakenError, safe_xml
 from conformance.selftest.independent_robots.baroque.server import Ask, Reply
 from conformance.selftest.independent_robots.baroque.writing import fill
-
-if TYPE_CHECKING:
-    from conformance.selftest.independent_robots.body import Body
+from conformance.selftest.independent_robots.body import Body
 
 _ENV = "http://schemas.xmlsoap.org/soap/envelope/"
 _OURS = "http://soap.turtlebot.mybot.org/"

@@ -1,7 +1,5 @@
 """Output in three formats, none of them as anyone else would write it."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -11,15 +11,10 @@ It claims ``rest-delivery`` and ``soap-delivery`` alone, which the contract lets
 - A GET of the service without ``?wsdl`` is a page for people.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from conformance.selftest.independent_robots.legacy.server import start
 from conformance.selftest.independent_robots.legacy.services import Delivery, Soap
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 def serve(rest_port: int, soap_port: int) -> tuple[str, str, Callable[[], None]]:

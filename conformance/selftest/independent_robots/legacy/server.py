@@ -1,14 +1,10 @@
 """WSGI on wsgiref, a thread for each request."""
 
-from __future__ import annotations
-
 import threading
+from collections.abc import Callable
 from socketserver import ThreadingMixIn
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 class _Handler(WSGIRequestHandler):

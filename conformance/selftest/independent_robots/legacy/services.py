@@ -1,16 +1,12 @@
 """The delivery over Jersey's REST and over JAX-WS RI's SOAP, with their leniency."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import unquote
 from xml.etree import ElementTree as ET
 from xml.sax.saxutils import escape
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
 
 _SOAP = "http://schemas.xmlsoap.org/soap/envelope/"
 _TNS = "http://soap.turtlebot.mybot.org/"

@@ -15,17 +15,12 @@ Freedoms that it takes:
 - It declares nothing: neither limits nor hold time.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from conformance.selftest.independent_robots.body import Body, Build
 from conformance.selftest.independent_robots.plain.rest import Rest
 from conformance.selftest.independent_robots.plain.server import start
 from conformance.selftest.independent_robots.plain.soap import Soap
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 BUILD = Build(
     linear_m_s=0.4,

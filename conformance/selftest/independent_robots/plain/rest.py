@@ -1,27 +1,21 @@
 """The resources of Table 1 and the delivery, without the list of deliveries."""
 
-from __future__ import annotations
-
 import json
 import re
+from collections.abc import Callable
+from email.message import Message
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 import yaml
 
 import conformance.contract
-from conformance.selftest.independent_robots.body import BusyError, ConflictError, Goal, NoPlanError, stamp
+from conformance.selftest.independent_robots.body import Body, BusyError, ConflictError, Goal, NoPlanError, stamp
 from conformance.selftest.independent_robots.plain import reading
 from conformance.selftest.independent_robots.plain.reading import RefusedError
 from conformance.selftest.independent_robots.plain.server import Answer
 from conformance.selftest.independent_robots.plain.writing import as_json, choose, element, written
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from email.message import Message
-
-    from conformance.selftest.independent_robots.body import Body
 
 _FRAMES = ("map", "odom")
 # The contract's own descriptions: what a vendor who builds contract-first serves.

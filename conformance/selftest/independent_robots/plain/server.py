@@ -1,16 +1,12 @@
 """HTTP/1.0 on http.server, one thread and one connection for each request."""
 
-from __future__ import annotations
-
 import json
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from email.message import Message
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import TYPE_CHECKING, Any, Protocol
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from email.message import Message
+from typing import Any, Protocol
 
 MAX_BODY = 256 * 1024
 MAX_TARGET = 8000

@@ -1,10 +1,10 @@
 """The two SOAP services, on expat."""
 
-from __future__ import annotations
-
+from email.message import Message
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from conformance.selftest.independent_robots.body import Body
 from conformance.selftest.independent_robots.plain import reading, rest
 from conformance.selftest.independent_robots.plain.reading import (
     Element,
@@ -15,11 +15,6 @@ from conformance.selftest.independent_robots.plain.reading import (
 )
 from conformance.selftest.independent_robots.plain.server import Answer
 from conformance.selftest.independent_robots.plain.writing import element
-
-if TYPE_CHECKING:
-    from email.message import Message
-
-    from conformance.selftest.independent_robots.body import Body
 
 _SOAP = "http://schemas.xmlsoap.org/soap/envelope/"
 _TNS = "http://soap.turtlebot.mybot.org/"

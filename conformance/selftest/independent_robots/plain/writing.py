@@ -1,7 +1,5 @@
 """Output: one value as JSON, XML or YAML, and which of them a client wants."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 from xml.sax.saxutils import escape
