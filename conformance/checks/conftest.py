@@ -4,10 +4,13 @@ from collections.abc import Iterator
 
 import pytest
 
+from conformance.rest.interface import RestInterface
 from conformance.rest.observers import Observer as RestObserver
 from conformance.robot.interfaces import Interfaces
 from conformance.robot.observer import Observer as RobotObserver
 from conformance.robot.probe.client import RosProbe
+from conformance.robot.robot import Robot
+from conformance.robot.stopping import bring_to_rest
 from conformance.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.transport.client import Connection
 from conformance.verdict.run import Run
@@ -32,3 +35,12 @@ def probe(run: Run) -> Iterator[RosProbe]:
     started.start()
     yield started
     started.close()
+
+
+@pytest.fixture
+def robot(request: pytest.FixtureRequest, api: RestInterface) -> Robot:
+    """The robot; at rest for a check that moves it."""
+    reason = bring_to_rest(api) if request.node.get_closest_marker("motion") else ""
+    if reason:
+        pytest.skip(reason)
+    return Robot(api)

@@ -7,9 +7,8 @@ import pytest
 
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element, projected
-from conformance.rest.interface import RestInterface
 from conformance.robot.agreement import Slack, disagreement, entries_of, stamp_of
-from conformance.robot.drive import BusyError, Drive
+from conformance.robot.drive import Drive
 from conformance.robot.geometry import Pose
 from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals, make_room
@@ -19,7 +18,6 @@ from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.robot.plan import plan_of, query, reachable
 from conformance.robot.robot import POSE, SENSORS, SERVICES, STILL, VELOCITY, Robot, Velocity
 from conformance.robot.soap_services import ask, returned
-from conformance.robot.stopping import bring_to_rest
 from conformance.soap.service import SoapService
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
@@ -34,12 +32,6 @@ _STATES: Final[dict[str, tuple[str, str, Shape]]] = {
     "pose": (POSE, "GetPose", ODOMETRY),
     "velocity": (VELOCITY, "GetVelocity", TWIST),
 }
-
-
-@pytest.fixture
-def robot(api: RestInterface) -> Robot:
-    """The robot."""
-    return Robot(api)
 
 
 def _answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
@@ -84,28 +76,22 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge,
 @pytest.mark.phase("motion")
 @pytest.mark.motion
 @pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
-def test_pose_and_velocity_in_motion(api: RestInterface, robot: Robot, subscribers: SoapService, judge: Judge) -> None:
+def test_pose_and_velocity_in_motion(robot: Robot, subscribers: SoapService, judge: Judge) -> None:
     """On an arc, where no component of the velocity that a robot has is zero."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
     make_room(robot)
     drive = Drive(robot)
     arc = Velocity(
         linear_x=0.3 * robot.limits.linear_m_s if robot.actuated(0) else 0.0,
         angular_z=-0.4 * robot.limits.angular_rad_s if robot.actuated(5) else 0.0,
     )
-    try:
+    drive.command(arc)
+    drive.reach(arc)
+    for _ in range(5):
         drive.command(arc)
-        drive.reach(arc)
-        for _ in range(5):
-            drive.command(arc)
-            for name in _STATES:
-                _compare(robot, subscribers, judge, name)
-        drive.command(STILL)
-        drive.reach(STILL)
-    except BusyError as busy:
-        pytest.skip(str(busy))
+        for name in _STATES:
+            _compare(robot, subscribers, judge, name)
+    drive.command(STILL)
+    drive.reach(STILL)
 
 
 @pytest.mark.phase("reading")
@@ -189,11 +175,8 @@ def _compare_plans(
 @pytest.mark.phase("motion")
 @pytest.mark.motion
 @pytest.mark.requirement("equivalence/goal")
-def test_goal(api: RestInterface, robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+def test_goal(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """The active goal is the same one, and when there is none, both say so."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
     _compare_goals(robot, subscribers, judge)
     goals = choose_goals(robot, 1.5, 2)
     for index in range(effort.cases(10)):

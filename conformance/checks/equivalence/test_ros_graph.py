@@ -5,12 +5,10 @@ from typing import Final
 
 import pytest
 
-from conformance.rest.interface import RestInterface
-from conformance.robot.drive import BusyError, Drive
+from conformance.robot.drive import Drive
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.probe.client import Probe, ProbeError, RosProbe
 from conformance.robot.robot import SENSORS, STILL, Robot, Velocity
-from conformance.robot.stopping import bring_to_rest
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
@@ -35,9 +33,9 @@ def _seeing(probe: RosProbe) -> Probe:
 
 @pytest.mark.phase("motion")
 @pytest.mark.requirement("equivalence/sensors-graph")
-def test_sensors_are_on_the_graph(api: RestInterface, seeing: Probe, judge: Judge) -> None:
+def test_sensors_are_on_the_graph(robot: Robot, seeing: Probe, judge: Judge) -> None:
     """Every entry is a topic that is published, with its type; and no plain sensor is left out."""
-    entries, exchange = Robot(api).read(SENSORS, SENSORS_SHAPE)
+    entries, exchange = robot.read(SENSORS, SENSORS_SHAPE)
     if entries is None:
         pytest.skip("the robot's list of sensors cannot be read")
     listed = {("/" + entry["topic"].lstrip("/"), entry["type"]) for entry in entries}
@@ -65,12 +63,8 @@ def test_sensors_are_on_the_graph(api: RestInterface, seeing: Probe, judge: Judg
 @pytest.mark.phase("motion")
 @pytest.mark.motion
 @pytest.mark.requirement("equivalence/velocity-message")
-def test_velocity_is_published(api: RestInterface, seeing: Probe, judge: Judge, effort: Effort) -> None:
+def test_velocity_is_published(robot: Robot, seeing: Probe, judge: Judge, effort: Effort) -> None:
     """A velocity that was accepted is on the velocity topic, with all its digits."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    robot = Robot(api)
     drive = Drive(robot)
     try:
         seeing.velocities()
@@ -87,8 +81,6 @@ def test_velocity_is_published(api: RestInterface, seeing: Probe, judge: Judge, 
         drive.command(STILL)
     except ProbeError as error:
         pytest.skip(str(error))
-    except BusyError as busy:
-        pytest.skip(str(busy))
 
 
 def _judge_one(robot: Robot, seeing: Probe, judge: Judge, wanted: Velocity) -> bool:

@@ -5,7 +5,6 @@ from typing import Any, Final
 
 import pytest
 
-from conformance.rest.interface import RestInterface
 from conformance.robot.drive import Drive
 from conformance.robot.goal import (
     CANCELLED,
@@ -20,7 +19,6 @@ from conformance.robot.goal import (
 )
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import STILL, Robot, Velocity
-from conformance.robot.stopping import bring_to_rest
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
@@ -28,15 +26,6 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
 _ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
 # For so long after a cancelled goal the robot has to stay where it is: longer than second thoughts take, s.
 _STAYS_S: Final = 1.3
-
-
-@pytest.fixture
-def robot(api: RestInterface) -> Robot:
-    """The robot, at rest."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    return Robot(api)
 
 
 def _judge_new(robot: Robot, judge: Judge, exchange: Exchange, body: dict[str, Any], *ids: str) -> bool:

@@ -7,11 +7,9 @@ import pytest
 from hypothesis import strategies as st
 
 from conformance.documents.json_text import shown
-from conformance.rest.interface import RestInterface
 from conformance.robot.goal import NEW, arrived, await_goal, await_none, difference, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import Robot
-from conformance.robot.stopping import bring_to_rest
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
@@ -34,12 +32,8 @@ _KNOWN: Final = (
 
 
 @pytest.mark.requirement("rest-resources/goal-id", "rest-resources/goal-preempt", "rest-resources/goal-get")
-def test_goal_ids(api: RestInterface, judge: Judge, explore: Explorer) -> None:
+def test_goal_ids(robot: Robot, judge: Judge, explore: Explorer) -> None:
     """Whatever its id, a goal is taken, becomes current and comes back under that id."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    robot = Robot(api)
     goals = itertools.cycle(choose_goals(robot, 1.5, 2))
     frame = robot.statement.motion.frame
     used: list[str] = []
@@ -82,12 +76,8 @@ def test_goal_ids(api: RestInterface, judge: Judge, explore: Explorer) -> None:
 
 
 @pytest.mark.requirement("rest-resources/goal-get")
-def test_the_goal_shown_is_the_goal_put(api: RestInterface, judge: Judge, explore: Explorer) -> None:
+def test_the_goal_shown_is_the_goal_put(robot: Robot, judge: Judge, explore: Explorer) -> None:
     """Positions and headings come back as they were put, however long the goal is looked at."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    robot = Robot(api)
     goals = choose_goals(robot, 1.5, 2)
     numbers = itertools.count()
     strange: list[str] = []

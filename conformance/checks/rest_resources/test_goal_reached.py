@@ -12,7 +12,6 @@ from conformance.robot.goal import NEW, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.plan import ask, judge_start
 from conformance.robot.robot import Robot
-from conformance.robot.stopping import bring_to_rest
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
@@ -22,15 +21,6 @@ _NO_PROGRESS_S: Final = 5.0
 _REACHED_M: Final = 0.3
 _LONGEST_S: Final = {"quick": 12.0}
 _LONGEST_DEFAULT_S: Final = 30.0
-
-
-@pytest.fixture
-def robot(api: RestInterface) -> Robot:
-    """The robot, at rest."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    return Robot(api)
 
 
 @pytest.mark.requirement(

@@ -4,12 +4,10 @@ from typing import Final
 
 import pytest
 
-from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import Pose
 from conformance.robot.goal import await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import Robot
-from conformance.robot.stopping import bring_to_rest
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
@@ -23,12 +21,8 @@ _FRAMES: Final = ("no_such_frame", "map2")
 @pytest.mark.requirement(
     "rest-resources/goal-unreachable", "rest-resources/goal-frame", "rest-resources/goal-quaternion"
 )
-def test_goals_that_cannot_be_taken(api: RestInterface, judge: Judge) -> None:
+def test_goals_that_cannot_be_taken(robot: Robot, judge: Judge) -> None:
     """Outside the map, in an unknown frame, with an orientation that is none."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    robot = Robot(api)
     frame = robot.statement.motion.frame
     (near,) = choose_goals(robot, 1.0, 1)
     for length in _LENGTHS:

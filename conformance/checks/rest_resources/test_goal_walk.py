@@ -2,11 +2,9 @@
 
 import pytest
 
-from conformance.rest.interface import RestInterface
 from conformance.robot.goal_walk import machine
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import Robot
-from conformance.robot.stopping import bring_to_rest
 from conformance.robot.walk import Walk
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
@@ -24,12 +22,9 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
     "rest-resources/goal-delete",
     "rest-resources/goal-delete-none-success",
 )
-def test_goal_walk(api: RestInterface, effort: Effort, explore: Explorer) -> None:
+def test_goal_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
     """Whatever clients do with goals, in whatever order, the one that was put last is the active one."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    walk = Walk(Robot(api), 0.4 * effort.budget_s)
+    walk = Walk(robot, 0.4 * effort.budget_s)
     poses = choose_goals(walk.robot, 1.5, 2)
     explore.machine(machine(walk, poses), cases=20, steps=effort.cases(12))
     if walk.unreachable:

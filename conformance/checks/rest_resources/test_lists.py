@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from conformance.documents.json_schema import Shape
-from conformance.rest.interface import RestInterface
 from conformance.robot.message_shapes import MESSAGE_TYPE, SERVICE_TYPE, read_as
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
@@ -25,9 +24,9 @@ pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
     "rest-resources/sensors-named-in-full",
     "rest-resources/sensors-stable",
 )
-def test_sensors(api: RestInterface, judge: Judge, effort: Effort) -> None:
+def test_sensors(robot: Robot, judge: Judge, effort: Effort) -> None:
     """Each reading is a list of {name, topic, type}, without repetition, and the same as the one before."""
-    _read_often(Robot(api), judge, "sensors", SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, effort.cases(100))
+    _read_often(robot, judge, "sensors", SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, effort.cases(100))
 
 
 @pytest.mark.requirement(
@@ -36,9 +35,9 @@ def test_sensors(api: RestInterface, judge: Judge, effort: Effort) -> None:
     "rest-resources/services-named-in-full",
     "rest-resources/services-stable",
 )
-def test_services(api: RestInterface, judge: Judge, effort: Effort) -> None:
+def test_services(robot: Robot, judge: Judge, effort: Effort) -> None:
     """Each reading is a list of {name, type}, without repetition, and the same as the one before."""
-    _read_often(Robot(api), judge, "services", SERVICES, SERVICES_SHAPE, SERVICE_TYPE, effort.cases(100))
+    _read_often(robot, judge, "services", SERVICES, SERVICES_SHAPE, SERVICE_TYPE, effort.cases(100))
 
 
 def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, full: Shape, times: int) -> None:

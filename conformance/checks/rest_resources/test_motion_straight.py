@@ -2,11 +2,9 @@
 
 import pytest
 
-from conformance.rest.interface import RestInterface
-from conformance.robot.drive import BusyError, Drive
+from conformance.robot.drive import Drive
 from conformance.robot.goals import make_room
 from conformance.robot.robot import Robot, Velocity
-from conformance.robot.stopping import bring_to_rest
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 
@@ -20,26 +18,19 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
     "safety/stop",
     "safety/limits-hold",
 )
-def test_straight_drive(api: RestInterface) -> None:
+def test_straight_drive(robot: Robot) -> None:
     """Ahead for less than a second, and a stop."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    robot = Robot(api)
     if not robot.actuated(0):
         pytest.skip("the statement says that the robot cannot drive straight ahead")
     make_room(robot)
     drive = Drive(robot)
-    try:
-        drive.look()
-        ahead = Velocity(_direction(robot) * 0.6 * robot.limits.linear_m_s)
-        if not drive.command(ahead):
-            return
-        reached = drive.reach(ahead, "rest-resources/velocity-converges")
-        drive.keep(0.4 if reached else 0.0)
-        drive.stop(ahead)
-    except BusyError as busy:
-        pytest.skip(str(busy))
+    drive.look()
+    ahead = Velocity(_direction(robot) * 0.6 * robot.limits.linear_m_s)
+    if not drive.command(ahead):
+        return
+    reached = drive.reach(ahead, "rest-resources/velocity-converges")
+    drive.keep(0.4 if reached else 0.0)
+    drive.stop(ahead)
     drive.judge_motion()
 
 

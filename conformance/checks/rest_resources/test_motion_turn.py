@@ -5,11 +5,9 @@ from typing import Final
 
 import pytest
 
-from conformance.rest.interface import RestInterface
-from conformance.robot.drive import BusyError, Drive
+from conformance.robot.drive import Drive
 from conformance.robot.goals import make_room
 from conformance.robot.robot import STILL, Robot, Velocity
-from conformance.robot.stopping import bring_to_rest
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
@@ -37,20 +35,13 @@ _SLOW_S: Final = 0.05
     "safety/watchdog",
     "safety/limits-hold",
 )
-def test_turn(api: RestInterface, judge: Judge) -> None:
+def test_turn(robot: Robot, judge: Judge) -> None:
     """One turn of about three seconds; the robot ends it by itself."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    robot = Robot(api)
     if not robot.actuated(5):
         pytest.skip("the statement says that the robot cannot turn on the spot")
     make_room(robot)
     drive = Drive(robot)
-    try:
-        _turn(robot, drive, judge)
-    except BusyError as busy:
-        pytest.skip(str(busy))
+    _turn(robot, drive, judge)
     drive.judge_motion()
 
 

@@ -6,7 +6,6 @@ import math
 import pytest
 from hypothesis import strategies as st
 
-from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import Pose, pose_of, wrapped
 from conformance.robot.message_shapes import GET_PLAN, ODOMETRY, read_as
 from conformance.robot.plan import START_OFF, Plan, ask, judge_start, plan_of, query, reachable
@@ -21,12 +20,6 @@ _LONGEST_STEP = 1.0
 _YAW_OFF = 0.2
 _EXPECTED = "status 200 with a complete nav_msgs/GetPlan response of one pose at least"
 _CANDIDATES = 8
-
-
-@pytest.fixture
-def robot(api: RestInterface) -> Robot:
-    """The robot."""
-    return Robot(api)
 
 
 @pytest.fixture

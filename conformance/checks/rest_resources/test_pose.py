@@ -4,7 +4,6 @@ import time
 
 import pytest
 
-from conformance.rest.interface import RestInterface
 from conformance.robot.drive import Drive
 from conformance.robot.robot import POSE, Robot
 from conformance.transport.exchange import Exchange
@@ -22,9 +21,8 @@ _PATIENCE_S = 5.0
     "rest-resources/pose-quaternion",
     "rest-resources/pose-stamp",
 )
-def test_pose(api: RestInterface, judge: Judge, effort: Effort) -> None:
+def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
     """Each reading is a whole odometry, and from one to the next time goes on; the observer judges them one by one."""
-    robot = Robot(api)
     stamps: set[float] = set()
     exchange: Exchange | None = None
     until = time.monotonic() + _PATIENCE_S
@@ -60,9 +58,8 @@ def test_pose(api: RestInterface, judge: Judge, effort: Effort) -> None:
     "rest-resources/linear-type",
     "rest-resources/linear-agrees",
 )
-def test_velocity_and_odometry(api: RestInterface, effort: Effort) -> None:
+def test_velocity_and_odometry(robot: Robot, effort: Effort) -> None:
     """Velocity, its linear part and the odometry agree; observer and drive judge each reading."""
-    robot = Robot(api)
     drive = Drive(robot)
     until = time.monotonic() + 0.4 * robot.watchfulness
     readings = 0

@@ -2,10 +2,8 @@
 
 import pytest
 
-from conformance.rest.interface import RestInterface
 from conformance.robot.goals import make_room
 from conformance.robot.robot import Robot
-from conformance.robot.stopping import bring_to_rest
 from conformance.robot.velocity_walk import machine
 from conformance.robot.walk import Walk
 from conformance.verdict.effort import Effort
@@ -24,12 +22,8 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
     "safety/refused-keeps",
     "safety/limits-hold",
 )
-def test_velocity_walk(api: RestInterface, effort: Effort, explore: Explorer) -> None:
+def test_velocity_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
     """Whatever is asked for, in whatever order, is what the robot does, and its pose follows."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    robot = Robot(api)
     make_room(robot)
     walk = Walk(robot, 0.8 * effort.budget_s)
     explore.machine(machine(walk), cases=10, steps=effort.cases(12))

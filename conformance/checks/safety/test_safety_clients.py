@@ -27,12 +27,8 @@ _USUAL_S: Final = 1.0
 @pytest.mark.phase("motion")
 @pytest.mark.motion
 @pytest.mark.requirement("safety/client-vanished")
-def test_client_vanished(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+def test_client_vanished(api: RestInterface, robot: Robot, rest: HttpClient, judge: Judge) -> None:
     """A velocity of which not all octets came is none, also where those that came would make one."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    robot = Robot(api)
     fast = Velocity(linear_x=0.3 * robot.limits.linear_m_s, angular_z=0.5 * robot.limits.angular_rad_s)
     body, linear = body_of(fast.twist), body_of(fast.linear)
     drive = Drive(robot)
@@ -77,9 +73,8 @@ def test_client_vanished(api: RestInterface, rest: HttpClient, judge: Judge) -> 
 
 @pytest.mark.phase("reading")
 @pytest.mark.requirement("safety/half-request")
-def test_half_requests(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+def test_half_requests(robot: Robot, rest: HttpClient, judge: Judge) -> None:
     """While three clients do not come to an end of their requests, others are answered in the usual time."""
-    robot = Robot(api)
     patience_s = max(_USUAL_S, 20 * robot.usual_s)
     judge.at_risk = ("safety/half-request",)
     # A client of its own: what hangs here, for once, need not hang later.

@@ -35,15 +35,6 @@ _BAD_PARTS: Final = (
 )
 
 
-@pytest.fixture
-def robot(api: RestInterface) -> Robot:
-    """The robot, at rest."""
-    reason = bring_to_rest(api)
-    if reason:
-        pytest.skip(reason)
-    return Robot(api)
-
-
 def _invalid_bodies(api: RestInterface, path: str, valid: dict[str, Any], number: str) -> list[tuple[str, str, bytes]]:
     """Each would move the robot if it were taken: what is wrong with it, media type, body."""
     put = next(item for item in operations_of(api.run.contract) if (item.method, item.template) == ("PUT", path))
