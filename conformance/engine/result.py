@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
-import tempfile
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
 
+from conformance.contract.atomic_write import write_atomically
 from conformance.contract.classes import CLASS_TITLES
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
 from conformance.contract.interfaces import Interface
@@ -216,13 +215,5 @@ def write_result(document: dict[str, Any], directory: Path) -> Path:
         OSError: it cannot be written.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    target = directory / "result.json"
-    with tempfile.NamedTemporaryFile("w", dir=directory, delete=False, encoding="utf-8", suffix=".tmp") as file:
-        json.dump(document, file, indent=1, ensure_ascii=False)
-        file.write("\n")
-    # A temporary file is for its owner only; a result is for whoever may read the folder.
-    mask = os.umask(0)
-    os.umask(mask)
-    Path(file.name).chmod(0o666 & ~mask)
-    Path(file.name).replace(target)
-    return target
+    text = json.dumps(document, indent=1, ensure_ascii=False)
+    return write_atomically(directory / "result.json", text + "\n")

@@ -27,6 +27,9 @@ UNREACHABLE = frozenset({"refused", "resolve", "network", "tls"})
 _FAULT_STRING = re.compile(rb"<(?:\w+:)?faultstring[^>]*>\s*(.*?)\s*</", re.DOTALL)
 _FAULT = re.compile(rb"<(?:\w+:)?Fault[\s>/]")
 _SHOWN = 160
+# As plain integers: every request compares with them, and to compare with a member of HTTPStatus takes longer.
+_OK = int(HTTPStatus.OK)
+_MULTIPLE_CHOICES = int(HTTPStatus.MULTIPLE_CHOICES)
 
 
 def connect_error(error: OSError, where: str) -> CallError:
@@ -50,7 +53,7 @@ def connect_error(error: OSError, where: str) -> CallError:
 
 def is_success(status: int) -> bool:
     """Whether a status is a success (RFC 9110 section 15.3)."""
-    return HTTPStatus.OK <= status < HTTPStatus.MULTIPLE_CHOICES
+    return _OK <= status < _MULTIPLE_CHOICES
 
 
 def answer_error(status: int, location: str | None, body: bytes, expects: bytes) -> CallError | None:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 _READ = 1  # libev's EV_READ
 _CHUNK = 65_536
 _IDLE_NS = 500_000_000  # servers close idle connections after seconds: look before sending into one
+_FINAL = int(HTTPStatus.OK)  # RFC 9110 section 15.2: what is below is interim
 _MAX_ANSWER = 16 * 1024 * 1024  # a robot that streams without end must not fill the generator's memory
 
 now_ns = time.monotonic_ns  # CLOCK_MONOTONIC, the clock of timerfd
@@ -232,7 +233,7 @@ class Connection:
 
     def on_message_complete(self) -> None:
         """Note the end of an answer, or of an interim one (1xx), which is passed over."""
-        if self._parser.get_status_code() < HTTPStatus.OK:  # RFC 9110 section 15.2: interim
+        if self._parser.get_status_code() < _FINAL:
             self._headers = {}
             return
         self._complete = True

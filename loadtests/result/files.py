@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
 from hdrh.histogram import HdrHistogram
+
+from conformance.contract.atomic_write import write_atomically
 
 FORMAT = "roaas-latency/1"
 _TICKS = 5  # percentiles reported for each halving of the distance to 100 %
@@ -22,23 +22,8 @@ def write(folder: Path, result: dict[str, Any]) -> Path:
     for series in result["series"]:
         stem = f"{series['operation']}-{series['interface']}-{series['client']}"
         for time, key in (("service", "histogram"), ("response", "response_histogram")):
-            _replace(folder / f"{stem}-{time}.hgrm", percentile_distribution(series[key]))
-    path = folder / "latency.json"
-    _replace(path, json.dumps(result, indent=1, allow_nan=False) + "\n")
-    return path
-
-
-def _replace(path: Path, text: str) -> None:
-    """Put a file in place at once: a reader sees the old one or the new one, whole."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+            write_atomically(folder / f"{stem}-{time}.hgrm", percentile_distribution(series[key]))
+    return write_atomically(folder / "latency.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
 
 
 def percentile_distribution(encoded: str) -> str:
