@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+_ROAAS = (sys.executable, "-m", "roaas")
 _START_S = 60
 _STOP_S = 10
 _STATEMENT = Path(__file__).parent / "reference_robot" / "statement.toml"
@@ -44,18 +45,7 @@ def main() -> int:
 @contextmanager
 def _robot(domain: int) -> Iterator[tuple[str, str]]:
     """The reference robot on free ports; yields its REST base URL and its publishers' WSDL."""
-    command = [
-        sys.executable,
-        "-m",
-        "roaas",
-        "robot",
-        "--rest-port",
-        "0",
-        "--soap-port",
-        "0",
-        "--domain-id",
-        str(domain),
-    ]
+    command = [*_ROAAS, "robot", "--rest-port", "0", "--soap-port", "0", "--domain-id", str(domain)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - ours
     # A robot that never gets ready must not keep the demo waiting.
     watchdog = threading.Timer(_START_S, process.kill)
@@ -78,10 +68,9 @@ def _robot(domain: int) -> Iterator[tuple[str, str]]:
 
 
 def _roaas(*arguments: str) -> int:
-    command = [sys.executable, "-m", "roaas", *arguments]
     # The robot's libraries set up their own environment; each command is to start from a clean one.
     environment = {key: value for key, value in os.environ.items() if key != "ROS_DOMAIN_ID"}
-    return subprocess.run(command, env=environment, check=False).returncode  # noqa: S603 - our own command
+    return subprocess.run([*_ROAAS, *arguments], env=environment, check=False).returncode  # noqa: S603 - our own command
 
 
 def _say(step: str, text: str) -> None:

@@ -6,16 +6,12 @@ Rooms are imported when their command is used, so that ``roaas certify`` needs n
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from conformance.contract.command import ResultCommand
-
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.contract.command import CommandResult
+    from pathlib import Path
 
 _COMMANDS = {
     "robot": ("reference_robot.cli", "robot"),
@@ -66,33 +62,16 @@ class _Rooms(click.Group):
             ) from missing
         if not isinstance(command, click.Command):
             raise TypeError(f"{module}.{name} is no command")
-        if isinstance(command, ResultCommand):
-            render_afterwards(command)
         return command
 
 
-def render_afterwards(command: click.Command) -> None:
-    """Have the reports room render what the command says it wrote, also when it failed or was interrupted."""
-    run = command.callback
-    if run is not None and not isinstance(run, _RunAndRender):
-        command.callback = _RunAndRender(run)
+def render(written: Path) -> None:
+    """Have the reports room render what a command wrote, also when it failed or was interrupted."""
+    for path in import_module("reports").render(written.parent):
+        click.echo(f"report: {path}")
 
 
-class _RunAndRender:
-    """A command's callback that has the reports room render what it left."""
-
-    def __init__(self, run: Callable[..., CommandResult]) -> None:
-        self._run = run
-
-    def __call__(self, *args: Any, **options: Any) -> CommandResult:
-        result = self._run(*args, **options)
-        if result.file is not None:
-            for path in import_module("reports").render(result.file.parent):
-                click.echo(f"report: {path}")
-        return result
-
-
-@click.command(cls=_Rooms, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(cls=_Rooms, context_settings={"help_option_names": ["-h", "--help"], "obj": render})
 @click.version_option(package_name="roaas", prog_name="roaas")
 def main() -> None:
     """Conformance and load tests for robots that are web services."""

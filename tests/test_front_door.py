@@ -20,10 +20,7 @@ def rendered(monkeypatch):
 
 
 def run(callback) -> int:
-    command = ResultCommand("certify", callback=callback, params=[])
-    roaas.render_afterwards(command)
-    roaas.render_afterwards(command)
-    return CliRunner().invoke(command, []).exit_code
+    return CliRunner().invoke(ResultCommand("certify", callback=callback, params=[]), [], obj=roaas.render).exit_code
 
 
 @pytest.mark.parametrize("code", list(ExitCode))

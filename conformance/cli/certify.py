@@ -23,16 +23,8 @@ if TYPE_CHECKING:
     from conformance.engine.certification import Certification
     from conformance.verdict.run import Run
 
-_ENDPOINTS = (
-    "rest",
-    "publishers_wsdl",
-    "subscribers_wsdl",
-    "publishers_endpoint",
-    "subscribers_endpoint",
-    "ca_file",
-    "token_file",
-    "request_rate",
-)
+_POSITIVE = click.FloatRange(min=0, min_open=True)
+_FILE = click.Path(exists=True, dir_okay=False)
 
 
 @click.command(cls=ResultCommand, context_settings={"help_option_names": ["-h", "--help"]})
@@ -73,27 +65,16 @@ _ENDPOINTS = (
     show_default=True,
     help="Of everything random: same seed, same cases.",
 )
-@click.option(
-    "--timeout",
-    type=click.FloatRange(min=0, min_open=True),
-    metavar="S",
-    help="Deadline of one request.  [default: 10]",
-)
-@click.option(
-    "--request-rate", type=click.FloatRange(min=0, min_open=True), metavar="R", help="At most R requests per second."
-)
-@click.option(
-    "--ca-file",
-    type=click.Path(exists=True, dir_okay=False),
-    help="Authorities to trust for HTTPS instead of the system's.",
-)
+@click.option("--timeout", "timeout_s", type=_POSITIVE, metavar="S", help="Deadline of one request.  [default: 10]")
+@click.option("--request-rate", type=_POSITIVE, metavar="R", help="At most R requests per second.")
+@click.option("--ca-file", type=_FILE, help="Authorities to trust for HTTPS instead of the system's.")
 @click.option(
     "--ros-domain-id", type=click.IntRange(0, 232), help="Watch the robot's ROS side with a probe (needs rclpy)."
 )
 @click.option(
     "--baseline", type=click.Path(path_type=Path), help="Failures that are expected, with reason and expiry (TOML)."
 )
-@click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="Holds the bearer token to send.")
+@click.option("--token-file", type=_FILE, help="Holds the bearer token to send.")
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
@@ -128,15 +109,13 @@ def certify(statement: Path | None, **options: Any) -> CommandResult:
 
 def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
     """Options win over the statement."""
-    given = {key: options[key] for key in _ENDPOINTS if options[key] is not None}
-    if options["timeout"] is not None:
-        given["timeout_s"] = options["timeout"]
+    given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options[key] is not None}
     where = msgspec.structs.replace(declared.endpoints, **given)
     for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
         url = getattr(where, key)
         if url is not None and not url.startswith(("http://", "https://")):
             raise StatementError(f"{key.replace('_', '-')} {url!r} is no URL: it has to start with http:// or https://")
-    if not (where.rest or where.publishers or where.subscribers):
+    if not where.interfaces:
         raise StatementError("no robot is named: give a STATEMENT, --rest, --publishers-wsdl or --subscribers-wsdl")
     claims = declared.claims
     if options["profile"] or options["classes"]:

@@ -23,7 +23,10 @@ class CommandResult(NamedTuple):
 
 
 class ResultCommand(click.Command):
-    """A command whose callback returns a CommandResult, and which ends with its exit code."""
+    """A command whose callback returns a CommandResult, and which ends with its exit code.
+
+    The context's object, where there is one, is called with the file that was written.
+    """
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the callback.
@@ -32,4 +35,6 @@ class ResultCommand(click.Command):
             click.exceptions.Exit: always, with the exit code.
         """
         result: CommandResult = super().invoke(ctx)
+        if result.file is not None and ctx.obj is not None:
+            ctx.obj(result.file)
         ctx.exit(result.exit_code)

@@ -9,15 +9,9 @@ import msgspec
 
 from conformance.contract.toml_file import NotNegative
 
-_UNDECLARED_LINEAR_M_S = 0.35
-_UNDECLARED_ANGULAR_RAD_S = 1.25
-_UNDECLARED_SETTLE_S = 2.0
-_UNDECLARED_TOLERANCE = 0.05
-_UNDECLARED_TOLERANCE_ABS = 0.02
-
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True):
-    """What judging uses.
+    """What judging uses; each default is the figure for what is not declared.
 
     Attributes:
         linear_m_s: greatest speed, m/s.
@@ -29,12 +23,12 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
             likewise angular_declared.
     """
 
-    linear_m_s: float
-    angular_rad_s: float
-    settle_s: float
-    hold_s: float | None
-    tolerance: float
-    tolerance_abs: float
+    linear_m_s: float = 0.35
+    angular_rad_s: float = 1.25
+    settle_s: float = 2.0
+    hold_s: float | None = None
+    tolerance: float = 0.05
+    tolerance_abs: float = 0.02
     linear_declared: bool
     angular_declared: bool
 
@@ -62,17 +56,7 @@ class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def resolved(self) -> Limits:
         """What the robot is judged by."""
-
-        def given(value: float | None, otherwise: float) -> float:
-            return otherwise if value is None else value
-
+        declared = {name: figure for name, figure in msgspec.structs.asdict(self).items() if figure is not None}
         return Limits(
-            linear_m_s=given(self.linear_m_s, _UNDECLARED_LINEAR_M_S),
-            angular_rad_s=given(self.angular_rad_s, _UNDECLARED_ANGULAR_RAD_S),
-            settle_s=given(self.settle_s, _UNDECLARED_SETTLE_S),
-            hold_s=self.hold_s,
-            tolerance=given(self.tolerance, _UNDECLARED_TOLERANCE),
-            tolerance_abs=given(self.tolerance_abs, _UNDECLARED_TOLERANCE_ABS),
-            linear_declared=self.linear_m_s is not None,
-            angular_declared=self.angular_rad_s is not None,
+            **declared, linear_declared="linear_m_s" in declared, angular_declared="angular_rad_s" in declared
         )

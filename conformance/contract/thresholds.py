@@ -33,7 +33,7 @@ class Operation(StrEnum):
     POSE = "pose"
 
 
-class Interface(StrEnum):
+class ApiStyle(StrEnum):
     """The two that are compared."""
 
     REST = "rest"
@@ -74,7 +74,7 @@ class Threshold(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One limit on one series. It is met only if the upper bound of the 95 % interval lies below it."""
 
     operation: Operation
-    interface: Interface
+    interface: ApiStyle
     quantile: Quantile
     below_ms: Positive
     time: Time = Time.RESPONSE

@@ -104,7 +104,7 @@ def draw_verdicts(run: Run, baseline: tuple[Expectation, ...]) -> list[Verdict]:
     judge = run.judge
     for requirement in run.contract.ledger.values():
         evidence = judge.evidence[requirement.id]
-        if run.aborted and not evidence.cases and not evidence.skips and not evidence.errors:
+        if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.error(requirement.id, run.aborted)
     verdicts = [
         verdict_of(requirement, judge.evidence[requirement.id], run.claims)
@@ -115,38 +115,18 @@ def draw_verdicts(run: Run, baseline: tuple[Expectation, ...]) -> list[Verdict]:
 
 def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str]) -> bool:
     """Run pytest over the checks, and nothing of the folder that the user happens to be in; True when interrupted."""
-    before = os.environ.get("PYTEST_DISABLE_PLUGIN_AUTOLOAD")
-    os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
-    addopts = os.environ.pop("PYTEST_ADDOPTS", None)
     teller = Progress(robot, progress)
+    options = [f"--config-file={os.devnull}", f"--rootdir={_CHECKS}", "--import-mode=importlib", "--capture=no"]
+    options += ["-Wignore", *(f"-pno:{name}" for name in ("terminal", "cacheprovider", "logging", "junitxml"))]
     try:
-        code = pytest.main(
-            [
-                str(_CHECKS),
-                f"--config-file={os.devnull}",
-                f"--rootdir={_CHECKS}",
-                "--import-mode=importlib",
-                "--capture=no",
-                "-Wignore",
-                *(
-                    word
-                    for name in ("terminal", "cacheprovider", "logging", "junitxml")
-                    for word in ("-p", f"no:{name}")
-                ),
-            ],
-            plugins=[ChecksPlugin(lambda: robot), teller],
-        )
+        with pytest.MonkeyPatch.context() as environment:
+            environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+            environment.delenv("PYTEST_ADDOPTS", raising=False)
+            code = pytest.main([str(_CHECKS), *options], plugins=[ChecksPlugin(lambda: robot), teller])
     except Exception as error:  # noqa: BLE001 - whatever breaks, what was judged until then is not lost
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
         robot.run.aborted = robot.run.aborted or "the suite itself failed"
         return False
-    finally:
-        if before is None:
-            del os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"]
-        else:
-            os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = before
-        if addopts is not None:
-            os.environ["PYTEST_ADDOPTS"] = addopts
     teller.tell("done")
     if code in {pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR}:
         remarks.append("The suite itself failed: please report this with the command and the robot's answers.")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from conformance.contract.classes import Level
 from conformance.contract.interfaces import Interface
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ class ChecksPlugin:
             record_exception(robot.run, robot.alive, ids, judged, error)
             result = None
         ours = {id_: count for id_, count in judge.refuted().items() if count > refuted.get(id_, 0)}
-        musts = [id_ for id_ in ours if robot.run.contract.ledger[id_].level == "MUST"]
+        musts = [id_ for id_ in ours if robot.run.contract.ledger[id_].level is Level.MUST]
         if musts:
             pytest.fail("\n".join(judge.told(id_) for id_ in musts), pytrace=False)
         return result

@@ -80,8 +80,8 @@ def write_first_statement(path: Path, known: Statement) -> str:
         return "; ".join(f"{name}: {why}" for name, why in robot.run.unreachable.items())
     info = _openapi(robot.rest.client).get("info", {}) if robot.rest else {}
     info = info if isinstance(info, dict) else {}
-    claims, doubts = _claims(robot)
-    lines = [f'  "{name}",' if name not in doubts else f'  # "{name}",  # {doubts[name]}' for name in claims]
+    doubts = _doubts(robot)
+    lines = [f'  "{name}",' if name not in doubts else f'  # "{name}",  # {doubts[name]}' for name in CLASSES]
     path.write_text(
         _TEMPLATE.format(
             file=path.name,
@@ -124,8 +124,8 @@ def _endpoints(robot: RobotUnderTest) -> list[str]:
     return lines
 
 
-def _claims(robot: RobotUnderTest) -> tuple[list[str], dict[str, str]]:
-    """All classes, and a doubt for each that the robot does not look as if it had."""
+def _doubts(robot: RobotUnderTest) -> dict[str, str]:
+    """A doubt for each class that the robot does not look as if it had."""
     claimed = robot.run.statement.claimed()
     doubts: dict[str, str] = {
         name: "no address for an interface that it needs" for name in CLASSES if name not in claimed
@@ -138,4 +138,4 @@ def _claims(robot: RobotUnderTest) -> tuple[list[str], dict[str, str]]:
             xml = False
         if not xml:
             doubts["rest-formats"] = "the robot did not send XML when asked for it"
-    return list(CLASSES), doubts
+    return doubts

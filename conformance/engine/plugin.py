@@ -26,7 +26,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--robot-allow-motion", action="store_true", help="the robot may be moved")
     group.addoption("--robot-effort", default="standard", help="quick, standard or deep")
     group.addoption("--robot-seed", type=int, default=0, help="seed of all random cases")
-    group.addoption("--robot-timeout", type=float, default=None, help="deadline of one request, s")
+    group.addoption("--robot-timeout", dest="robot_timeout_s", type=float, help="deadline of one request, s")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -38,7 +38,7 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
             raise pytest.UsageError(f"--robot-class {unknown[0]}: there are {', '.join(CLASSES)}")
         statement = msgspec.structs.replace(statement, claims=tuple(map(ConformanceClass, classes)))
     where = statement.endpoints
-    if not (where.rest or where.publishers or where.subscribers):
+    if not where.interfaces:
         raise pytest.UsageError("name a robot: --robot-rest, --robot-publishers-wsdl or --robot-subscribers-wsdl")
     effort = config.getoption("robot_effort")
     if effort not in EFFORTS:
@@ -58,12 +58,8 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
 
 
 def _endpoints(config: pytest.Config, declared: Endpoints) -> Endpoints:
-    options = {
-        "rest": config.getoption("robot_rest"),
-        "publishers_wsdl": config.getoption("robot_publishers_wsdl"),
-        "subscribers_wsdl": config.getoption("robot_subscribers_wsdl"),
-        "timeout_s": config.getoption("robot_timeout"),
-    }
+    names = ("rest", "publishers_wsdl", "subscribers_wsdl", "timeout_s")
+    options = {name: config.getoption(f"robot_{name}") for name in names}
     return msgspec.structs.replace(declared, **{key: value for key, value in options.items() if value is not None})
 
 

@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import Any
 
 import conformance.checks
-from conformance.contract.classes import CLASSES
+from conformance.contract.classes import CLASSES, Level
 from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import Requirement, load_ledger
 from conformance.selftest.mutants import MUTANTS
@@ -99,7 +99,7 @@ def disagreements() -> list[str]:
     for id_, binding in known.items():
         if not binding.checks and binding.requirement.untestable is None:
             problems.append(f"{id_} has no check")
-        if not binding.mutants and binding.requirement.level != "MAY" and binding.requirement.untestable is None:
+        if not binding.mutants and binding.requirement.level != Level.MAY and binding.requirement.untestable is None:
             problems.append(f"{id_} is {binding.requirement.level}, and no faulty robot shows that it is judged")
     for id_, checks in checks_by_requirement().items():
         if id_ not in known:
@@ -119,8 +119,8 @@ def disagreements() -> list[str]:
 def page() -> str:
     """The page, as Markdown."""
     found = bindings()
-    musts = sum(binding.requirement.level == "MUST" for binding in found)
-    shoulds = sum(binding.requirement.level == "SHOULD" for binding in found)
+    musts = sum(binding.requirement.level is Level.MUST for binding in found)
+    shoulds = sum(binding.requirement.level is Level.SHOULD for binding in found)
     checks = {check for binding in found for check in binding.checks}
     figures = (
         f"{len(found)} requirements ({musts} MUST, {shoulds} SHOULD, {len(found) - musts - shoulds} MAY), "

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import datetime as dt
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from conformance.contract.toml_file import Text, TomlFileError, read_toml
-from conformance.verdict.verdicts import Verdict, broken_baseline, expected_failure
+from conformance.verdict.verdicts import Value, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -61,20 +62,13 @@ def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation],
 
 
 def _applied(verdict: Verdict, entry: Expectation, today: dt.date) -> Verdict:
-    if verdict.value == "not-claimed":
-        return verdict
     day = entry.expires.isoformat()
-    if verdict.value in {"fail", "warn"}:
-        if entry.expires >= today:
-            return expected_failure(verdict, entry.reason, day)
-        return Verdict(
-            verdict.requirement,
-            verdict.value,
-            f"its baseline entry expired on {day}: {verdict.reason}",
-            verdict.evidence,
-        )
-    if verdict.value == "pass":
-        return broken_baseline(
-            verdict, f"the baseline expects it to fail ({entry.reason}), and it passes: take the entry out"
-        )
+    if verdict.value in {Value.FAIL, Value.WARN}:
+        if entry.expires < today:
+            return replace(verdict, reason=f"its baseline entry expired on {day}: {verdict.reason}")
+        told = f"expected until {day} ({entry.reason}): {verdict.reason}"
+        return replace(verdict, value=Value.WARN, reason=told, expected_failure=(entry.reason, day))
+    if verdict.value is Value.PASS:
+        told = f"the baseline expects it to fail ({entry.reason}), and it passes: take the entry out"
+        return replace(verdict, value=Value.ERROR, reason=told)
     return verdict

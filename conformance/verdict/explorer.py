@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import zlib
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
@@ -22,13 +23,7 @@ if TYPE_CHECKING:
 
 
 class Explorer:
-    """Runs properties with cases that depend on nothing but the seed and the check's name.
-
-    Args:
-        run_seed: the run's seed.
-        name: of the check.
-        effort: how much to try.
-    """
+    """Runs properties with cases that depend on nothing but the run's seed and the check's name."""
 
     def __init__(self, run_seed: int, name: str, effort: Effort) -> None:
         self._run_seed = run_seed
@@ -70,9 +65,9 @@ class Explorer:
             NoAnswerError: the robot did not answer.
         """
         # Walks are not made smaller: with a robot that moves, each try would cost seconds.
-        # Walks are not made smaller: with a robot that moves, each try would cost seconds.
         chosen = settings(self._settings(cases), stateful_step_count=steps, phases=(Phase.generate,))
-        seeded: Any = seed(self._next_seed())(_Machine(factory))
+        # A factory that may be a class, which is not to carry this walk's seed to the next one.
+        seeded: Any = seed(self._next_seed())(partial(factory))
         _swallow_refuted(lambda: run_state_machine_as_test(seeded, settings=chosen))
 
     def _next_seed(self) -> int:
@@ -93,16 +88,6 @@ class Explorer:
         )
 
 
-class _Machine:
-    """A factory that Hypothesis can put a seed on."""
-
-    def __init__(self, factory: Callable[[], RuleBasedStateMachine]) -> None:
-        self._factory = factory
-
-    def __call__(self) -> RuleBasedStateMachine:
-        return self._factory()
-
-
 def _swallow_refuted(run: Callable[[], object]) -> None:
     """Run a property whose failures the judge has seen.
 
@@ -110,9 +95,7 @@ def _swallow_refuted(run: Callable[[], object]) -> None:
     """
     try:
         run()
-    except RefutedError:
-        return
-    except Flaky:
+    except (RefutedError, Flaky):
         return
     except BaseExceptionGroup as group:
         _, rest = group.split((RefutedError, Flaky))

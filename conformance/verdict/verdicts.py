@@ -1,4 +1,4 @@
-"""From evidence to verdicts. The rules are here, and nowhere else.
+"""From evidence to verdicts. The rules are here; a baseline may change what they say.
 
 MUST fails, SHOULD warns, MAY informs. Skip outranks pass: a class with a MUST that could not be judged is
 inconclusive, never passed; so is one of which nothing was judged.
@@ -6,9 +6,11 @@ inconclusive, never passed; so is one of which nothing was judged.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
+
+from conformance.contract.classes import Level, Prerequisite
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -78,7 +80,7 @@ def verdict_of(requirement: Requirement, evidence: Evidence, claims: Iterable[st
         first = next(iter(evidence.findings.values()))
         more = f" (and {len(evidence.findings) - 1} more)" if len(evidence.findings) > 1 else ""
         reason = f"{first.expected}; found: {first.message}{more}"
-        value = {"MUST": Value.FAIL, "SHOULD": Value.WARN}.get(requirement.level)
+        value = {Level.MUST: Value.FAIL, Level.SHOULD: Value.WARN}.get(requirement.level)
         return verdict(value, reason) if value else verdict(Value.PASS, f"not so, as it may be: {reason}")
     for value, reasons in (
         (Value.SKIP, [requirement.untestable] if requirement.untestable else []),
@@ -104,10 +106,8 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
         return ClassValue.NOT_CLAIMED, ""
     failed = [item for item in verdicts if item.value is Value.FAIL]
     if failed:
-        return (
-            ClassValue.FAIL,
-            f"{len(failed)} of {len(verdicts)} requirements failed, first {failed[0].requirement.id}",
-        )
+        told = f"{len(failed)} of {len(verdicts)} requirements failed, first {failed[0].requirement.id}"
+        return ClassValue.FAIL, told
     unjudged = [
         item
         for item in verdicts
@@ -115,13 +115,8 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
     ]
     if unjudged:
         first = unjudged[0]
-        return (
-            ClassValue.INCONCLUSIVE,
-            (
-                f"{len(unjudged)} of {len(verdicts)} requirements could not be judged, first {first.requirement.id}: "
-                f"{first.reason}"
-            ),
-        )
+        told = f"{len(unjudged)} of {len(verdicts)} requirements could not be judged, first {first.requirement.id}"
+        return ClassValue.INCONCLUSIVE, f"{told}: {first.reason}"
     if not any(item.evidence.cases for item in verdicts):
         return ClassValue.INCONCLUSIVE, "nothing was executed"
     return ClassValue.PASS, ""
@@ -132,7 +127,11 @@ def _holds_back(requirement: Requirement) -> bool:
 
     What only a ROS probe can see is judged when there is one; a robot without ROS at hand is not held back by it.
     """
-    return requirement.level == "MUST" and requirement.untestable is None and "probe" not in requirement.needs
+    return (
+        requirement.level is Level.MUST
+        and requirement.untestable is None
+        and Prerequisite.PROBE not in requirement.needs
+    )
 
 
 def overall(classes: Mapping[str, tuple[ClassValue, str]]) -> Overall:
@@ -143,14 +142,3 @@ def overall(classes: Mapping[str, tuple[ClassValue, str]]) -> Overall:
     if ClassValue.INCONCLUSIVE in values or not values:
         return Overall.INCONCLUSIVE
     return Overall.CONFORMANT
-
-
-def expected_failure(verdict: Verdict, reason: str, expires: str) -> Verdict:
-    """The verdict of a requirement whose failure a baseline expects."""
-    told = f"expected until {expires} ({reason}): {verdict.reason}"
-    return replace(verdict, value=Value.WARN, reason=told, expected_failure=(reason, expires))
-
-
-def broken_baseline(verdict: Verdict, problem: str) -> Verdict:
-    """The verdict of a requirement whose baseline entry is wrong."""
-    return replace(verdict, value=Value.ERROR, reason=problem)

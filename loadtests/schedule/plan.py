@@ -15,9 +15,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from conformance.contract.thresholds import Client, Interface, Operation
+from conformance.contract.thresholds import ApiStyle, Client, Operation
 
-INTERFACES = tuple(map(str, Interface))
+INTERFACES = tuple(map(str, ApiStyle))
 CLIENTS = tuple(map(str, Client))
 OPERATIONS = tuple(map(str, Operation))
 MOVES = frozenset({"delivery", "coffee"})

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.contract.classes import Level
 from conformance.contract.files import Contract
 from conformance.contract.interfaces import Interface
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
@@ -121,7 +122,7 @@ def _runner(api: RestInterface, method: str, path: str, *, alone: bool) -> Attac
     def ids(attack: Attack) -> tuple[str, ...]:
         own = f"xml-security/{attack.name}"
         ledger = api.run.contract.ledger
-        must = own in ledger and ledger[own].level == "MUST" and attack.name not in _NOT_HERE
+        must = own in ledger and ledger[own].level is Level.MUST and attack.name not in _NOT_HERE
         return (*((own,) if alone else ()), *((_REST,) if must else ()))
 
     times = [ask().response.elapsed_ms for _ in range(5)]

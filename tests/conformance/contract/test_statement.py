@@ -4,7 +4,7 @@ import pytest
 
 from conformance.contract.classes import CLASSES
 from conformance.contract.statement import Endpoints, Statement, StatementError, load_statement
-from conformance.contract.thresholds import Interface, Operation, Quantile, Threshold
+from conformance.contract.thresholds import ApiStyle, Operation, Quantile, Threshold
 
 
 def _load(tmp_path, text):
@@ -52,7 +52,7 @@ def test_a_full_statement(tmp_path):
     assert statement.motion.arena == (0.0, 0.0, 10.0, 5.0)
     assert statement.ros.domain_id == 7
     assert statement.load.max_rate == 100
-    assert statement.load.thresholds == (Threshold(Operation.POSE, Interface.REST, Quantile.P99, 5.0),)
+    assert statement.load.thresholds == (Threshold(Operation.POSE, ApiStyle.REST, Quantile.P99, 5.0),)
 
 
 @pytest.mark.parametrize(

@@ -4,18 +4,19 @@ import datetime as dt
 
 import pytest
 
+from conformance.contract.classes import Level
 from conformance.contract.ledger import Requirement
 from conformance.verdict.baseline import BaselineError, Expectation, apply_baseline, load_baseline
 from conformance.verdict.evidence import Evidence
-from conformance.verdict.verdicts import Verdict
+from conformance.verdict.verdicts import Value, Verdict
 
 _TODAY = dt.date(2026, 11, 20)
 
 
 def _applied(value, expires):
-    requirement = Requirement("http/date", "http", "MUST", "A text.", "RFC")
+    requirement = Requirement("http/date", "http", Level.MUST, "A text.", "RFC")
     entry = Expectation("http/date", "ticket 7", dt.date.fromisoformat(expires))
-    return apply_baseline([Verdict(requirement, value, "why", Evidence())], [entry], _TODAY)[0]
+    return apply_baseline([Verdict(requirement, Value(value), "why", Evidence())], [entry], _TODAY)[0]
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conformance.contract.thresholds import Interface, Operation, Quantile, Threshold
+from conformance.contract.thresholds import ApiStyle, Operation, Quantile, Threshold
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
 from loadtests.statistics.figures import Measured, quantiles, series, time_series
@@ -97,7 +97,7 @@ def test_a_threshold_is_judged_by_what_is_certain(values, below, outcome):
     for number, value in enumerate(values):
         recorder.record(blocks[number % len(blocks)], 0, 0, 0, 0, 0, int(value * 1e6), -1)
     recorder.flush()
-    (found,) = judge(Measured(STALL, recorder), [Threshold(Operation.POSE, Interface.REST, Quantile.P99, below)])
+    (found,) = judge(Measured(STALL, recorder), [Threshold(Operation.POSE, ApiStyle.REST, Quantile.P99, below)])
     assert found["outcome"] == outcome, found
     assert found["reason"] if outcome != "met" else not found["reason"]
 
