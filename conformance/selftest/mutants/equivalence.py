@@ -10,6 +10,7 @@ from conformance.selftest.mutants.changes import (
     altered,
     deliveries,
     inputs,
+    instead,
     named,
     plain,
     rest,
@@ -30,7 +31,7 @@ from conformance.selftest.mutants.distortion import (
     rounded_soap,
     swapped_soap,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
@@ -63,161 +64,89 @@ def _one_more(items: Any) -> Any:
     return [*items, {"name": "ghost", "topic": "/ghost", "type": "sensor_msgs/msg/Range"}]
 
 
-def _mutant(
-    name: str,
-    says: str,
-    ids: tuple[str, ...],
-    make: Any,
-    interface: str = "both",
-    *,
-    observer: bool = False,
-    probe: bool = False,
-) -> Mutant:
-    return Mutant(
-        name, says, tuple(f"equivalence/{id_}" for id_ in ids), interface, make, observer=observer, probe=probe
-    )
-
-
+_rest_delivery = of_class("equivalence", "rest", observer=True)
+_soap_delivery = of_class("equivalence", "soap", observer=True)
+_rest_state = of_class("equivalence", "rest", probe=True)
+_soap_state = of_class("equivalence", "soap")
 _NO_GOAL = enveloped(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
 
 
 MUTANTS = (
-    _mutant(
-        "same-rest-doubled",
-        "A REST delivery is published twice.",
-        ("delivery-rest",),
-        doubled(deliveries),
-        "rest",
-        observer=True,
-    ),
-    _mutant(
+    _rest_delivery("same-rest-doubled", "A REST delivery is published twice.", "delivery-rest", doubled(deliveries)),
+    _rest_delivery(
         "same-rest-lost",
         "Each third REST delivery is never published.",
-        ("delivery-rest",),
+        "delivery-rest",
         lambda: EveryNth(deliveries, plain(204), 3),
-        "rest",
-        observer=True,
     ),
-    _mutant(
+    _rest_delivery(
         "same-rest-narrow",
         "REST deliveries go through 32-bit floats.",
-        ("delivery-same",),
+        "delivery-same",
         rewritten(deliveries, segments(narrow)),
-        "rest",
-        observer=True,
     ),
-    _mutant(
-        "same-soap-doubled",
-        "A SOAP delivery is published twice.",
-        ("delivery-soap",),
-        doubled(_DELIVERY),
-        "soap",
-        observer=True,
-    ),
-    _mutant(
+    _soap_delivery("same-soap-doubled", "A SOAP delivery is published twice.", "delivery-soap", doubled(_DELIVERY)),
+    _soap_delivery(
         "same-soap-swapped",
         "Over SOAP, source_x and destination_x are exchanged.",
         ("delivery-soap", "delivery-same"),
         rewritten(_BOTH, swapped_soap),
-        "soap",
-        observer=True,
     ),
-    _mutant(
+    _soap_delivery(
         "same-soap-narrow",
         "SOAP deliveries go through 32-bit floats.",
-        ("delivery-soap",),
+        "delivery-soap",
         rewritten(_DELIVERY, narrow_soap),
-        "soap",
-        observer=True,
     ),
-    _mutant(
-        "same-coffee-code",
-        "A coffee is published with code 3.",
-        ("coffee-soap",),
-        lambda: as_delivery,
-        "soap",
-        observer=True,
-    ),
-    _mutant(
+    _soap_delivery("same-coffee-code", "A coffee is published with code 3.", "coffee-soap", lambda: as_delivery),
+    _soap_delivery(
         "same-coffee-lost",
         "Each second coffee is never published.",
-        ("coffee-soap",),
+        "coffee-soap",
         lambda: EveryNth(_COFFEE, enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>'), 2),
-        "soap",
-        observer=True,
     ),
-    _mutant(
+    _soap_delivery(
         "same-soap-rounded",
         "SOAP rounds to three digits, REST does not.",
-        ("delivery-same",),
+        "delivery-same",
         rewritten(_BOTH, rounded_soap),
-        "soap",
-        observer=True,
     ),
-    _mutant(
-        "same-order",
-        "A REST delivery is overtaken by the one after it.",
-        ("delivery-order",),
-        OutOfOrder,
-        "rest",
-        observer=True,
-    ),
-    _mutant(
+    _rest_delivery("same-order", "A REST delivery is overtaken by the one after it.", "delivery-order", OutOfOrder),
+    _rest_state(
         "same-velocity-narrow",
         "Velocities go through 32-bit floats.",
-        ("velocity-message",),
+        "velocity-message",
         rewritten(rest("PUT", VELOCITY), inputs(narrow_twist)),
-        "rest",
-        probe=True,
     ),
-    _mutant(
+    _rest_state(
         "same-sensor-ghost",
         "A sensor is listed that nobody publishes.",
-        ("sensors-graph",),
+        "sensors-graph",
         altered(rest("GET", SENSORS), values(_one_more)),
-        "rest",
-        probe=True,
     ),
-    _mutant(
+    _soap_state(
         "same-pose",
         "SOAP's pose is 37 cm ahead of REST's.",
-        ("pose",),
+        "pose",
         altered(soap("GetPose"), tree(_shift("position", 0.37))),
-        "soap",
     ),
-    _mutant(
+    _soap_state(
         "same-velocity",
         "SOAP's velocity is never zero.",
-        ("velocity",),
+        "velocity",
         altered(soap("GetVelocity"), tree(_shift("linear", 0.1))),
-        "soap",
     ),
-    _mutant(
-        "same-sensors",
-        "SOAP lacks the last sensor.",
-        ("sensors",),
-        altered(soap("GetSensors"), tree(_without_last)),
-        "soap",
+    _soap_state(
+        "same-sensors", "SOAP lacks the last sensor.", "sensors", altered(soap("GetSensors"), tree(_without_last))
     ),
-    _mutant(
+    _soap_state(
         "same-services",
         "SOAP lacks the last service.",
-        ("services",),
+        "services",
         altered(soap("GetNavigationServices"), tree(_without_last)),
-        "soap",
     ),
-    _mutant(
-        "same-goal",
-        "SOAP never has a goal.",
-        ("goal",),
-        lambda: lambda request, forward: _NO_GOAL(request) if soap("GetGoal")(request) else forward(request),
-        "soap",
-    ),
-    _mutant(
-        "same-plan",
-        "SOAP's plan is another one than REST's.",
-        ("plan",),
-        altered(soap("GetPlan"), tree(_straighter)),
-        "soap",
+    _soap_state("same-goal", "SOAP never has a goal.", "goal", instead(soap("GetGoal"), _NO_GOAL)),
+    _soap_state(
+        "same-plan", "SOAP's plan is another one than REST's.", "plan", altered(soap("GetPlan"), tree(_straighter))
     ),
 )

@@ -7,7 +7,7 @@ from typing import Any
 from conformance.selftest.change import Forward
 from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import DELIVERIES, GOAL, LINEAR, POSE, VELOCITY, deliveries, parsed, rest
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 _INVALID = {400, 415, 422}
@@ -71,35 +71,34 @@ def _soap_refusal(request: Request, forward: Forward) -> Response:
     return response
 
 
+_mutant = of_class("strict-input", "rest")
+
 MUTANTS = (
-    Mutant(
+    _mutant(
         "input-velocity-refused-and-driven",
         "An invalid velocity is refused, and the robot drives.",
-        ("strict-input/velocity-refused",),
-        "rest",
+        "velocity-refused",
         _after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)),
     ),
-    Mutant(
+    _mutant(
         "input-goal-refused-and-taken",
         "An invalid goal is refused, and the robot has a goal.",
-        ("strict-input/goal-refused",),
-        "rest",
+        "goal-refused",
         _after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)),
     ),
-    Mutant(
+    _mutant(
         "input-delivery-refused-and-made",
         "An invalid delivery is refused, and published.",
-        ("strict-input/delivery-refused",),
-        "rest",
+        "delivery-refused",
         _after_refusal(deliveries, _deliver),
         observer=True,
     ),
-    Mutant(
+    _mutant(
         "input-soap-refused-and-made",
         "An invalid SOAP delivery is refused, and published.",
-        ("strict-input/delivery-refused",),
-        "soap",
+        "delivery-refused",
         lambda: _soap_refusal,
         observer=True,
+        interface="soap",
     ),
 )

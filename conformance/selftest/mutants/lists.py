@@ -1,9 +1,10 @@
 """Robots whose lists of sensors and services are not what they should be."""
 
+import re
 from typing import Any
 
 from conformance.selftest.mutants.changes import SENSORS, SERVICES, altered, rest, values
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import Mutant, of_class
 
 
 def _first(edit: Any) -> Any:
@@ -14,52 +15,44 @@ def _first(edit: Any) -> Any:
     return values(apply)
 
 
-def _both(name: str, path: str, requirement: str) -> tuple[Mutant, ...]:
+_mutant = of_class("rest-resources", "rest")
+
+
+def _both(name: str, path: str) -> tuple[Mutant, ...]:
     at = rest("GET", path)
+    in_full = re.compile("/(msg|srv|action)/")
     return (
-        Mutant(
+        _mutant(
             f"{name}-without-type",
             f"An entry of the {name} has no type.",
-            (f"rest-resources/{requirement}-type",),
-            "rest",
+            f"{name}-type",
             altered(at, _first(lambda item: item.pop("type"))),
         ),
-        Mutant(
+        _mutant(
             f"{name}-in-an-object",
             f"The {name} are an object with a list in it.",
-            (f"rest-resources/{requirement}-type",),
-            "rest",
+            f"{name}-type",
             altered(at, values(lambda items: {"items": items})),
         ),
-        Mutant(
+        _mutant(
             f"{name}-twice",
             f"The first of the {name} is listed twice.",
-            (f"rest-resources/{requirement}-unique",),
-            "rest",
+            f"{name}-unique",
             altered(at, values(lambda items: [*items, *items[:1]])),
         ),
-        Mutant(
+        _mutant(
             f"{name}-short-names",
             f"Types of the {name} are not named in full.",
-            (f"rest-resources/{requirement}-named-in-full",),
-            "rest",
-            altered(
-                at,
-                _first(
-                    lambda item: item.update(
-                        type=item["type"].replace("/msg/", "/").replace("/srv/", "/").replace("/action/", "/")
-                    )
-                ),
-            ),
+            f"{name}-named-in-full",
+            altered(at, _first(lambda item: item.update(type=in_full.sub("/", item["type"])))),
         ),
-        Mutant(
+        _mutant(
             f"{name}-flicker",
             f"Every other time the last of the {name} is missing.",
-            (f"rest-resources/{requirement}-stable",),
-            "rest",
+            f"{name}-stable",
             altered(at, values(lambda items: items[:-1]), nth=2),
         ),
     )
 
 
-MUTANTS = (*_both("sensors", SENSORS, "sensors"), *_both("services", SERVICES, "services"))
+MUTANTS = (*_both("sensors", SENSORS), *_both("services", SERVICES))

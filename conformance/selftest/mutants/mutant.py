@@ -36,12 +36,17 @@ class Mutant:
     serial: bool = False
 
 
-def of_class(class_: str, interface: str) -> Callable[..., Mutant]:
-    """A maker of mutants that requirements of one class catch: their names in the class, or the only one's."""
+def of_class(class_: str, interface: str, **common: Any) -> Callable[..., Mutant]:
+    """A maker of mutants that requirements of one class catch: their names in the class, or the only one's.
+
+    A requirement of another class is named with it; ``common`` are settings of them all.
+    """
 
     def mutant(name: str, says: str, catches: str | tuple[str, ...], make: Callable[[], Change], **more: Any) -> Mutant:
         names = (catches,) if isinstance(catches, str) else catches
-        settings: dict[str, Any] = {"interface": interface, **more}
-        return Mutant(name, says, tuple(f"{class_}/{one}" for one in names), make=make, **settings)
+        settings: dict[str, Any] = {"interface": interface, **common, **more}
+        return Mutant(
+            name, says, tuple(one if "/" in one else f"{class_}/{one}" for one in names), make=make, **settings
+        )
 
     return mutant

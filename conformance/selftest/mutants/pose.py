@@ -8,7 +8,7 @@ from typing import Any
 from conformance.selftest.change import Change, Forward
 from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import POSE, altered, instead, parsed, plain, problem, rest, values
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 _AT = rest("GET", POSE)
 
@@ -102,111 +102,77 @@ def _renewed() -> Change:
     return _Frozen("pose", "twist")
 
 
+_mutant = of_class("rest-resources", "rest")
+
 MUTANTS = (
-    Mutant(
+    _mutant(
         "pose-short-covariance",
         "The pose's covariance has 35 values.",
-        ("rest-resources/pose-type",),
-        "rest",
+        "pose-type",
         altered(_AT, values(lambda value: value["pose"].update(covariance=value["pose"]["covariance"][:35]))),
     ),
-    Mutant(
+    _mutant(
         "pose-without-child-frame",
         "The pose lacks child_frame_id.",
-        ("rest-resources/pose-type",),
-        "rest",
+        "pose-type",
         altered(_AT, values(lambda value: value.pop("child_frame_id") and None)),
     ),
-    Mutant(
+    _mutant(
         "pose-numbers-as-text",
         "One pose in 50 has its x as a string.",
-        ("rest-resources/pose-type",),
-        "rest",
+        "pose-type",
         altered(_AT, values(lambda value: _position(value).update(x=str(_position(value)["x"]))), nth=50),
     ),
-    Mutant(
+    _mutant(
         "pose-without-retry-after",
         "Before the first odometry, the pose is 503 without Retry-After.",
-        ("rest-resources/pose-unavailable",),
-        "rest",
+        "pose-unavailable",
         _NotYet,
     ),
-    Mutant(
+    _mutant(
         "pose-quaternion-long",
         "The orientation's quaternion is 1 percent too long.",
-        ("rest-resources/pose-quaternion",),
-        "rest",
+        "pose-quaternion",
         altered(_AT, values(_lengthened)),
     ),
-    Mutant(
+    _mutant(
         "pose-quaternion-zero",
         "The orientation is four zeros.",
-        ("rest-resources/pose-quaternion",),
-        "rest",
+        "pose-quaternion",
         altered(_AT, values(lambda value: value["pose"]["pose"].update(orientation=dict.fromkeys("xyzw", 0.0)))),
     ),
-    Mutant(
-        "pose-stamp-frozen",
-        "The pose's header is for ever the first one's.",
-        ("rest-resources/pose-stamp",),
-        "rest",
-        (lambda: _Frozen("header")),
+    _mutant(
+        "pose-stamp-frozen", "The pose's header is for ever the first one's.", "pose-stamp", lambda: _Frozen("header")
     ),
-    Mutant(
-        "pose-stamp-backwards",
-        "Each fifth pose has a stamp a second back.",
-        ("rest-resources/pose-stamp",),
-        "rest",
-        _Backwards,
-    ),
-    Mutant(
+    _mutant("pose-stamp-backwards", "Each fifth pose has a stamp a second back.", "pose-stamp", _Backwards),
+    _mutant(
         "pose-stale",
         "The pose is for ever the first one, with a new stamp.",
-        ("rest-resources/pose-motion", "rest-resources/pose-rotation"),
-        "rest",
+        ("pose-motion", "pose-rotation"),
         _renewed,
     ),
-    Mutant(
-        "pose-in-centimetres",
-        "The position is in centimetres.",
-        ("rest-resources/pose-motion",),
-        "rest",
-        altered(_AT, values(_scaled(100))),
+    _mutant(
+        "pose-in-centimetres", "The position is in centimetres.", "pose-motion", altered(_AT, values(_scaled(100)))
     ),
-    Mutant(
-        "pose-mirrored",
-        "The position's x and y are swapped.",
-        ("rest-resources/pose-motion",),
-        "rest",
-        altered(_AT, values(_swapped)),
-    ),
-    Mutant(
+    _mutant("pose-mirrored", "The position's x and y are swapped.", "pose-motion", altered(_AT, values(_swapped))),
+    _mutant(
         "pose-clockwise",
         "The heading counts clockwise.",
-        ("rest-resources/pose-rotation",),
-        "rest",
+        "pose-rotation",
         altered(_AT, values(_turned(lambda yaw: -yaw))),
     ),
-    Mutant(
+    _mutant(
         "pose-half-turn",
         "The heading turns at half the rate.",
-        ("rest-resources/pose-rotation",),
-        "rest",
+        "pose-rotation",
         altered(_AT, values(_turned(lambda yaw: yaw / 2))),
     ),
-    Mutant(
+    _mutant(
         "odometry-in-degrees",
         "The odometry's turning rate is in degrees per second.",
-        ("rest-resources/velocity-odometry",),
-        "rest",
+        "velocity-odometry",
         altered(_AT, values(_in_degrees)),
     ),
-    Mutant(
-        "pose-gone",
-        "There is no pose: 404.",
-        ("rest-resources/pose-type",),
-        "rest",
-        instead(_AT, problem(404, "there is no pose")),
-    ),
-    Mutant("pose-no-content", "The pose is 204.", ("rest-resources/pose-type",), "rest", instead(_AT, plain(204))),
+    _mutant("pose-gone", "There is no pose: 404.", "pose-type", instead(_AT, problem(404, "there is no pose"))),
+    _mutant("pose-no-content", "The pose is 204.", "pose-type", instead(_AT, plain(204))),
 )

@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Callable
-from typing import Any
 
 from conformance.selftest.change import Forward
 from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     SOAP,
     TNS,
+    Make,
     altered,
     instead,
     rewritten,
@@ -18,7 +18,7 @@ from conformance.selftest.mutants.changes import (
     tree,
     wsdls,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import (
     coffee_for_all,
     enveloped,
@@ -36,6 +36,11 @@ _ACT, _READ = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"), soap("Get[
 def _written(pattern: bytes) -> Callable[[Request], bool]:
     compiled = re.compile(pattern)
     return lambda request: _ACT(request) and bool(compiled.search(request.body))
+
+
+def _refused(pattern: bytes, why: str) -> Make:
+    """Requests in which something is written so are Client faults."""
+    return instead(_written(pattern), fault("Client", why))
 
 
 def _code_three(request: Request) -> None:
@@ -61,172 +66,139 @@ def _no_goal_page(request: Request, forward: Forward) -> Response:
     return response
 
 
-def _mutant(name: str, says: str, id_: str, make: Any) -> Mutant:
-    return Mutant(name, says, (id_,), "soap", make)
-
-
 # zeep writes what the description says: here, elements in the namespace, which the robot does not take.
 _QUALIFIED = altered(wsdls, text(r"(<(?:\w+:)?schema\b)(?=[^>]*targetNamespace)", r'\1 elementFormDefault="qualified"'))
 
+_acting, _reading = of_class("soap-delivery", "soap"), of_class("soap-subscribers", "soap")
+
 MUTANTS = (
-    _mutant(
+    _acting(
         "soap-delivery-refused",
         "ExecuteDeliveryRequest is always a fault.",
-        "soap-delivery/delivery",
+        "delivery",
         instead(_DELIVERY, fault("Server", "no deliveries today")),
     ),
-    _mutant(
+    _acting(
         "soap-delivery-cross-answer",
         "ExecuteDeliveryRequest is answered with the coffee's response.",
-        "soap-delivery/delivery",
+        "delivery",
         altered(_DELIVERY, tree(coffee_for_all)),
     ),
-    _mutant(
+    _acting(
         "soap-coffee-unknown",
         "ExecuteCoffeeRequest is not known.",
-        "soap-delivery/coffee",
+        "coffee",
         instead(_COFFEE, fault("Client", "Cannot find dispatch method")),
     ),
-    _mutant(
+    _acting(
         "soap-coffee-sometimes-503",
         "One coffee in ten is refused with 503.",
-        "soap-delivery/coffee",
+        "coffee",
         altered(_COFFEE, unavailable, nth=10),
     ),
-    _mutant(
-        "soap-response-full",
-        "The response wrapper holds a value.",
-        "soap-delivery/response-valid",
-        altered(_ACT, tree(with_content)),
+    _acting(
+        "soap-response-full", "The response wrapper holds a value.", "response-valid", altered(_ACT, tree(with_content))
     ),
-    _mutant(
+    _acting(
         "soap-response-namespace",
         "The response is in the second listing's namespace.",
-        "soap-delivery/response-valid",
+        "response-valid",
         altered(_ACT, tree(other_namespace)),
     ),
-    _mutant(
+    _acting(
         "soap-response-soap12",
         "The response is a SOAP 1.2 envelope.",
-        "soap-delivery/response-valid",
+        "response-valid",
         altered(_ACT, text(re.escape(SOAP), "http://www.w3.org/2003/05/soap-envelope")),
     ),
-    _mutant(
+    _acting(
         "soap-no-exponents",
         "Doubles with an exponent are a fault.",
-        "soap-delivery/range",
-        instead(_written(rb">\s*[+-]?[\d.]+[eE][+-]?\d+\s*<"), fault("Client", "no number")),
+        "range",
+        _refused(rb">\s*[+-]?[\d.]+[eE][+-]?\d+\s*<", "no number"),
     ),
-    _mutant(
-        "soap-no-plus",
-        "Numbers with a plus sign are a fault.",
-        "soap-delivery/range",
-        instead(_written(rb">\s*\+[\d.]"), fault("Client", "plus sign")),
-    ),
-    _mutant(
-        "soap-no-negatives",
-        "Negative doubles are a fault.",
-        "soap-delivery/range",
-        instead(_written(rb">\s*-[\d.]"), fault("Client", "negative")),
-    ),
-    _mutant(
+    _acting("soap-no-plus", "Numbers with a plus sign are a fault.", "range", _refused(rb">\s*\+[\d.]", "plus sign")),
+    _acting("soap-no-negatives", "Negative doubles are a fault.", "range", _refused(rb">\s*-[\d.]", "negative")),
+    _acting(
         "soap-no-white-space",
         "White space around a number is a fault.",
-        "soap-delivery/range",
-        instead(_written(rb"<(?:\w+:)?(?:depot|source|destination)_[xy]>\s+[\d.+-]"), fault("Client", "white space")),
+        "range",
+        _refused(rb"<(?:\w+:)?(?:depot|source|destination)_[xy]>\s+[\d.+-]", "white space"),
     ),
-    _mutant(
+    _acting(
         "soap-wants-prefixes",
         "A default namespace is a fault.",
-        "soap-delivery/syntax",
-        instead(_written(rb"\sxmlns=[\"']http"), fault("Client", "default namespace")),
+        "syntax",
+        _refused(rb"\sxmlns=[\"']http", "default namespace"),
     ),
-    _mutant(
+    _acting(
         "soap-one-prefix",
         "An Envelope of another prefix than soapenv is a fault.",
-        "soap-delivery/syntax",
-        instead(_written(rb"<(?!soapenv:)(?:[\w.-]+:)?Envelope"), fault("Client", "no soapenv:Envelope")),
+        "syntax",
+        _refused(rb"<(?!soapenv:)(?:[\w.-]+:)?Envelope", "no soapenv:Envelope"),
     ),
-    _mutant(
-        "soap-no-cdata",
-        "CDATA is a fault.",
-        "soap-delivery/syntax",
-        instead(_written(rb"<!\[CDATA\["), fault("Client", "CDATA")),
-    ),
-    _mutant(
-        "soap-no-comments",
-        "A comment is a fault.",
-        "soap-delivery/syntax",
-        instead(_written(rb"<!--"), fault("Client", "comment")),
-    ),
-    _mutant(
+    _acting("soap-no-cdata", "CDATA is a fault.", "syntax", _refused(rb"<!\[CDATA\[", "CDATA")),
+    _acting("soap-no-comments", "A comment is a fault.", "syntax", _refused(rb"<!--", "comment")),
+    _acting(
         "soap-description-misleads",
         "The WSDL says that elements are qualified, and they are not.",
-        "soap-delivery/interop",
+        "interop",
         _QUALIFIED,
     ),
-    _mutant(
+    _acting(
         "soap-no-addressing",
         "WS-Addressing headers are a MustUnderstand fault.",
-        "soap-delivery/addressing",
+        "addressing",
         instead(_written(rb"www\.w3\.org/2005/08/addressing"), fault("MustUnderstand", "addressing")),
     ),
-    _mutant(
-        "soap-any-code", "Any code is accepted over SOAP.", "soap-delivery/refuses-code", rewritten(_ACT, _code_three)
+    _acting("soap-any-code", "Any code is accepted over SOAP.", "refuses-code", rewritten(_ACT, _code_three)),
+    _reading(
+        "soap-pose-short", "GetPose has 35 covariances.", "pose", altered(soap("GetPose"), tree(without("covariance")))
     ),
-    _mutant(
-        "soap-pose-short",
-        "GetPose has 35 covariances.",
-        "soap-subscribers/pose",
-        altered(soap("GetPose"), tree(without("covariance"))),
-    ),
-    _mutant(
+    _reading(
         "soap-velocity-half",
         "GetVelocity has no angular part.",
-        "soap-subscribers/velocity",
+        "velocity",
         altered(soap("GetVelocity"), tree(without("angular"))),
     ),
-    _mutant(
+    _reading(
         "soap-sensors-untyped",
         "GetSensors has no types.",
-        "soap-subscribers/sensors",
+        "sensors",
         altered(soap("GetSensors"), tree(without("type"))),
     ),
-    _mutant(
+    _reading(
         "soap-services-fault",
         "GetNavigationServices is a fault.",
-        "soap-subscribers/services",
+        "services",
         instead(soap("GetNavigationServices"), fault("Server", "not today")),
     ),
-    _mutant(
+    _reading(
         "soap-services-unnamed",
         "GetNavigationServices lacks a name.",
-        "soap-subscribers/services",
+        "services",
         altered(soap("GetNavigationServices"), tree(without("name"))),
     ),
-    _mutant("soap-no-goal-page", "Without a goal, GetGoal is a page.", "soap-subscribers/goal", lambda: _no_goal_page),
-    _mutant(
-        "soap-plan-none-empty",
-        "Where there is no plan, GetPlan gives an empty one.",
-        "soap-subscribers/plan-none",
-        lambda: _empty_plan,
+    _reading("soap-no-goal-page", "Without a goal, GetGoal is a page.", "goal", lambda: _no_goal_page),
+    _reading(
+        "soap-plan-none-empty", "Where there is no plan, GetPlan gives an empty one.", "plan-none", lambda: _empty_plan
     ),
-    _mutant(
+    _reading(
         "soap-read-namespace",
         "Responses of the subscribers service are in another namespace.",
-        "soap-subscribers/response-valid",
+        "response-valid",
         altered(_READ, tree(other_namespace)),
     ),
-    _mutant(
+    _reading(
         "soap-read-extra",
         "Responses of the subscribers service hold an element of the robot's own.",
-        "soap-subscribers/response-valid",
+        "response-valid",
         altered(_READ, tree(with_content)),
     ),
-    _mutant(
+    _reading(
         "soap-read-description-misleads",
         "The WSDL says that elements are qualified, and they are not.",
-        "soap-subscribers/interop",
+        "interop",
         _QUALIFIED,
     ),
 )

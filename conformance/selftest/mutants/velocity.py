@@ -22,7 +22,7 @@ from conformance.selftest.mutants.changes import (
     status,
     values,
 )
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.mutants.mutant import of_class
 
 _GET, _PUT = rest("GET", VELOCITY), rest("PUT", VELOCITY)
 _GET_LINEAR, _PUT_LINEAR = rest("GET", LINEAR), rest("PUT", LINEAR)
@@ -124,131 +124,99 @@ def _mirrored(twist: Any) -> None:
     twist["angular"]["z"] = -twist["angular"]["z"]
 
 
+_mutant = of_class("rest-resources", "rest")
+
 MUTANTS = (
-    Mutant(
+    _mutant(
         "velocity-without-angular",
         "GET of the velocity has no angular part.",
-        ("rest-resources/velocity-type",),
-        "rest",
+        "velocity-type",
         altered(_GET, values(lambda twist: twist.pop("angular") and None)),
     ),
-    Mutant(
+    _mutant(
         "velocity-null",
         "One velocity in 50 has null for linear.y.",
-        ("rest-resources/velocity-type",),
-        "rest",
+        "velocity-type",
         altered(_GET, values(lambda twist: twist["linear"].update(y=None)), nth=50),
     ),
-    Mutant(
+    _mutant(
         "velocity-in-kilometres-per-hour",
         "The measured velocity is in km/h.",
-        ("rest-resources/velocity-odometry", "rest-resources/velocity-converges"),
-        "rest",
+        ("velocity-odometry", "velocity-converges"),
         altered(_GET, values(_times(3.6))),
     ),
-    Mutant(
+    _mutant(
         "velocity-stands-still",
         "The measured velocity is always zero.",
-        ("rest-resources/velocity-odometry", "rest-resources/velocity-converges"),
-        "rest",
+        ("velocity-odometry", "velocity-converges"),
         altered(_GET, values(lambda twist: twist.update(_STILL))),
     ),
-    Mutant(
+    _mutant(
         "velocity-swapped",
         "Linear and angular velocity are exchanged in what is read.",
-        ("rest-resources/velocity-converges",),
-        "rest",
+        "velocity-converges",
         altered(_GET, values(_exchanged)),
     ),
-    Mutant(
+    _mutant(
         "velocity-as-commanded",
         "GET shows the velocity that was commanded, although the robot has long stopped.",
-        ("rest-resources/velocity-odometry", "safety/watchdog"),
-        "rest",
+        ("velocity-odometry", "safety/watchdog"),
         _Commanded,
     ),
-    Mutant(
-        "velocity-put-created",
-        "PUT of a velocity is 201.",
-        ("rest-resources/velocity-put",),
-        "rest",
-        altered(_PUT, becomes(201)),
-    ),
-    Mutant(
+    _mutant("velocity-put-created", "PUT of a velocity is 201.", "velocity-put", altered(_PUT, becomes(201))),
+    _mutant(
         "velocity-put-other",
         "PUT of a velocity answers 200 with a Twist that was not asked for.",
-        ("rest-resources/velocity-put",),
-        "rest",
+        "velocity-put",
         altered(_PUT, lambda response: _replaced(response, {**_STILL, "linear": {"x": 0.123, "y": 0.0, "z": 0.0}})),
     ),
-    Mutant(
+    _mutant(
         "velocity-lost",
         "Velocities are accepted and forgotten.",
-        ("rest-resources/velocity-converges",),
-        "rest",
+        "velocity-converges",
         secretly(_PUT, inputs(lambda twist: twist.update(_STILL) if _good(twist) else None)),
     ),
-    Mutant(
+    _mutant(
         "velocity-halved",
         "The robot drives at half of what it is told.",
-        ("rest-resources/velocity-converges",),
-        "rest",
+        "velocity-converges",
         secretly(_PUT, inputs(lambda twist: _times(0.5)(twist) if _good(twist) else None)),
     ),
-    Mutant(
+    _mutant(
         "velocity-reversed",
         "The robot turns the other way.",
-        ("rest-resources/velocity-converges",),
-        "rest",
+        "velocity-converges",
         secretly(_PUT, inputs(lambda twist: _mirrored(twist) if _good(twist) else None)),
     ),
-    Mutant(
+    _mutant(
         "velocity-integers-refused",
         "A velocity written in integers is refused.",
-        ("rest-resources/velocity-integers",),
-        "rest",
+        "velocity-integers",
         instead(_integral, problem(422, "linear.x: an integer is no float")),
     ),
-    Mutant(
-        "velocity-locked-by-goal",
-        "While a goal is active, a velocity is answered 423.",
-        ("rest-resources/velocity-goal",),
-        "rest",
-        _WhileGoal,
+    _mutant(
+        "velocity-locked-by-goal", "While a goal is active, a velocity is answered 423.", "velocity-goal", _WhileGoal
     ),
-    Mutant(
+    _mutant(
         "linear-without-z",
         "GET of the linear velocity has no z.",
-        ("rest-resources/linear-type",),
-        "rest",
+        "linear-type",
         altered(_GET_LINEAR, values(lambda vector: {axis: vector[axis] for axis in "xy"})),
     ),
-    Mutant(
+    _mutant(
         "linear-is-angular",
         "GET of the linear velocity gives the whole Twist's other half.",
-        ("rest-resources/linear-agrees",),
-        "rest",
+        "linear-agrees",
         lambda: _other_half,
     ),
-    Mutant(
-        "linear-lost",
-        "PUT of a linear velocity is accepted and forgotten.",
-        ("rest-resources/linear-put",),
-        "rest",
-        lambda: _stuck,
-    ),
-    Mutant(
+    _mutant("linear-lost", "PUT of a linear velocity is accepted and forgotten.", "linear-put", lambda: _stuck),
+    _mutant(
         "linear-put-created",
         "PUT of a linear velocity is 201.",
-        ("rest-resources/linear-put",),
-        "rest",
+        "linear-put",
         altered(_PUT_LINEAR, becomes(201), status(200, 204)),
     ),
-    Mutant(
-        "linear-stops-turning",
-        "PUT of a linear velocity ends the turning.",
-        ("rest-resources/linear-keeps-angular",),
-        "rest",
-        lambda: _whole,
+    _mutant(
+        "linear-stops-turning", "PUT of a linear velocity ends the turning.", "linear-keeps-angular", lambda: _whole
     ),
 )
