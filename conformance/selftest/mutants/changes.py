@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from typing import Any
+from urllib.parse import parse_qsl, urlencode
 
 from lxml import etree
 
@@ -179,6 +180,16 @@ def problem(status_: int, detail: str, *fields: tuple[str, str]) -> Callable[[Re
     return plain(status_, body, "application/problem+json", *fields)
 
 
+def page(status_: int, body: bytes = b"", media_type: str = "") -> Callable[[Response], object]:
+    """Another status and another body, of this media type (of none, when empty); the other fields stay."""
+
+    def edit(response: Response) -> None:
+        response.status, response.reason, response.body = status_, "", body
+        header("Content-Type", media_type or None)(response)
+
+    return edit
+
+
 def becomes(status_: int) -> Callable[[Response], object]:
     """Another status, in the problem too."""
 
@@ -220,6 +231,17 @@ def inputs(edit: Callable[[Any], Any]) -> Callable[[Request], object]:
         if value is not None:
             made = edit(value)
             request.body = json.dumps(value if made is None else made).encode()
+
+    return apply
+
+
+def query(edit: Callable[[dict[str, str]], object]) -> Callable[[Request], object]:
+    """Alter the parameters of a request's query."""
+
+    def apply(request: Request) -> None:
+        given = dict(parse_qsl(request.query, keep_blank_values=True))
+        edit(given)
+        request.target = f"{request.path}?{urlencode(given)}"
 
     return apply
 

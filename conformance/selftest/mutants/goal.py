@@ -8,10 +8,13 @@ from conformance.selftest.change import Forward
 from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
+    JSON,
+    Make,
     altered,
     becomes,
     inputs,
     instead,
+    page,
     parsed,
     plain,
     problem,
@@ -34,7 +37,12 @@ from conformance.selftest.mutants.goal_memory import (
 )
 from conformance.selftest.mutants.mutant import of_class
 
-_GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
+_AT, _GET, _PUT, _DELETE = rest("", GOAL), rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
+
+
+def _told(edit: Callable[[Any], Any]) -> Make:
+    """The goal is altered on its way to the client."""
+    return altered(_GET, values(edit))
 
 
 def _swap(goal: Any) -> None:
@@ -53,11 +61,8 @@ def _without_id(request: Request) -> bool:
     return _PUT(request) and "goal" in (parsed(request.body) or {}) and identity(request) is None
 
 
-def _cut_id(size: int) -> Callable[[Any], None]:
-    def edit(goal: Any) -> None:
-        goal["goal_id"]["id"] = goal["goal_id"]["id"][:size]
-
-    return edit
+def _renamed(edit: Callable[[str], str]) -> Make:
+    return altered(_AT, values(lambda goal: goal["goal_id"].update(id=edit(goal["goal_id"]["id"]))))
 
 
 def _when_active(
@@ -106,11 +111,6 @@ def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
 _mutant = of_class("rest-resources", "rest")
 
 
-def _nothing(response: Response, status_: int) -> None:
-    response.status, response.reason, response.body = status_, "", b"null"
-    response.put("Content-Type", "application/json")
-
-
 def _delete_conflict(request: Request, forward: Forward) -> Response:
     if _DELETE(request) and active(forward, request) is None:
         return problem(409, "there is no goal")(request)
@@ -118,7 +118,7 @@ def _delete_conflict(request: Request, forward: Forward) -> Response:
 
 
 def _beside(request: Request, forward: Forward) -> Response:
-    if request.side != "rest" or request.path != GOAL:
+    if not _AT(request):
         return forward(request)
     if _PUT(request):
         request = request.copy()
@@ -134,37 +134,37 @@ MUTANTS = (
         "goal-none-empty",
         "Without a goal, GET is 200 with null.",
         "goal-none",
-        altered(_GET, lambda response: _nothing(response, 200), status(404)),
+        altered(_GET, page(200, b"null", JSON), status(404)),
     ),
     _mutant(
         "goal-none-no-content", "Without a goal, GET is 204.", "goal-none", altered(_GET, becomes(204), status(404))
     ),
     _mutant("goal-put-ok", "PUT of a new goal is 200.", "goal-put", altered(_PUT, becomes(200), status(201, 202))),
-    _mutant("goal-get-swapped", "GET gives a goal with x and y exchanged.", "goal-get", altered(_GET, values(_swap))),
+    _mutant("goal-get-swapped", "GET gives a goal with x and y exchanged.", "goal-get", _told(_swap)),
     _mutant(
         "goal-get-frame",
         "GET gives a goal in another frame.",
         "goal-get",
-        altered(_GET, values(lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2"))),
+        _told(lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2")),
     ),
     _mutant("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", Previous),
     _mutant(
         "goal-get-other-id",
         "GET gives the goal under another id.",
         "goal-get",
-        altered(_GET, values(lambda goal: goal["goal_id"].update(id="goal-1"))),
+        _told(lambda goal: goal["goal_id"].update(id="goal-1")),
     ),
     _mutant(
         "goal-without-status",
         "The active goal has no status.",
         "goal-status",
-        altered(_GET, values(lambda goal: goal.pop("status") and None)),
+        _told(lambda goal: goal.pop("status") and None),
     ),
     _mutant(
         "goal-status-succeeded",
         "The active goal has status 4, succeeded.",
         "goal-status",
-        altered(_GET, values(lambda goal: goal["status"].update(code=4))),
+        _told(lambda goal: goal["status"].update(code=4)),
     ),
     _mutant(
         "goal-wants-id",
@@ -176,29 +176,14 @@ MUTANTS = (
         "goal-empty-id",
         "A goal without goal_id gets an empty one.",
         "goal-fills-in",
-        altered(
-            lambda request: request.side == "rest" and request.path == GOAL,
-            values(lambda goal: goal["goal_id"].update(id="") if len(goal["goal_id"]["id"]) >= 32 else None),
-        ),
+        _renamed(lambda id_: "" if len(id_) >= 32 else id_),
     ),
-    _mutant(
-        "goal-id-cut",
-        "Ids are cut after 32 characters.",
-        "goal-id",
-        altered(lambda request: request.side == "rest" and request.path == GOAL, values(_cut_id(32))),
-    ),
+    _mutant("goal-id-cut", "Ids are cut after 32 characters.", "goal-id", _renamed(lambda id_: id_[:32])),
     _mutant(
         "goal-id-ascii",
         "Ids come back in lower case.",
         "goal-id",
-        altered(
-            lambda request: request.side == "rest" and request.path == GOAL,
-            values(
-                lambda goal: goal["goal_id"].update(
-                    id=goal["goal_id"]["id"].lower().encode("ascii", "replace").decode()
-                )
-            ),
-        ),
+        _renamed(lambda id_: id_.lower().encode("ascii", "replace").decode()),
     ),
     _mutant(
         "goal-repeat-refused",

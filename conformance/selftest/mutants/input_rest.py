@@ -5,7 +5,7 @@ import math
 import re
 from collections.abc import Callable
 from typing import Any
-from urllib.parse import parse_qsl, urlencode
+from urllib.parse import parse_qsl
 
 from conformance.selftest.change import Forward
 from conformance.selftest.messages import Request, Response
@@ -19,6 +19,7 @@ from conformance.selftest.mutants.changes import (
     deliveries,
     parsed,
     plain,
+    query,
     refusal,
     rest,
     rewritten,
@@ -162,15 +163,6 @@ def _xml(request: Request) -> bool:
     return _PUT(request) and request.media_type.endswith("xml")
 
 
-def _query(edit: Callable[[dict[str, str]], None]) -> Callable[[Request], None]:
-    def apply(request: Request) -> None:
-        given = dict(parse_qsl(request.query, keep_blank_values=True))
-        edit(given)
-        request.target = f"{request.path}?{urlencode(given)}"
-
-    return apply
-
-
 def _numbers(given: dict[str, str]) -> None:
     for name, text in given.items():
         if name != "frame_id" and not re.fullmatch(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,2})?", text):
@@ -188,7 +180,7 @@ class _Remembered:
         if not rest("GET", PLAN)(request):
             return forward(request)
         request = request.copy()
-        _query(lambda given: given.update({name: value for name, value in self._last.items() if name not in given}))(
+        query(lambda given: given.update({name: value for name, value in self._last.items() if name not in given}))(
             request
         )
         response = forward(request)
@@ -241,7 +233,7 @@ MUTANTS = (
         "input-query-lenient",
         "What is no number in a query counts as 0.",
         "query-parameter",
-        rewritten(rest("GET", PLAN), _query(_numbers)),
+        rewritten(rest("GET", PLAN), query(_numbers)),
     ),
     _mutant("input-query-complete", "A missing x or y is the one of the query before.", "query-missing", _Remembered),
     _mutant("input-xml-fine", "XML of the wrong shape is answered 204.", "xml-body", _swallowed(_xml)),

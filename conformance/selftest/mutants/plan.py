@@ -3,20 +3,34 @@
 import math
 from collections.abc import Callable
 from typing import Any
-from urllib.parse import parse_qsl, urlencode
 
-from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import PLAN, altered, becomes, rest, rewritten, status, values
+from conformance.selftest.mutants.changes import (
+    JSON,
+    PLAN,
+    Make,
+    altered,
+    becomes,
+    page,
+    query,
+    rest,
+    rewritten,
+    status,
+    values,
+)
 from conformance.selftest.mutants.mutant import of_class
 
+_EMPTY = b'{"plan":{"header":{"stamp":{"sec":1,"nanosec":0},"frame_id":"map"},"poses":[]}}'
 _GET = rest("GET", PLAN)
 
 
-def _poses(edit: Callable[[list[Any]], list[Any]]) -> Callable[[Response], object]:
-    def apply(value: Any) -> None:
-        value["plan"]["poses"] = edit(value["plan"]["poses"])
+def _told(edit: Callable[[Any], Any]) -> Make:
+    """The plan is altered on its way to the client."""
+    return altered(_GET, values(edit))
 
-    return values(apply)
+
+def _led(edit: Callable[[list[Any]], list[Any]], **more: int) -> Make:
+    """The plan has other poses."""
+    return altered(_GET, values(lambda value: value["plan"].update(poses=edit(value["plan"]["poses"]))), **more)
 
 
 def _moved(pose: Any, x: float, y: float) -> Any:
@@ -37,15 +51,6 @@ def _turned(poses: list[Any]) -> list[Any]:
     return poses
 
 
-def _ask(edit: Callable[[dict[str, str]], None]) -> Callable[[Request], None]:
-    def apply(request: Request) -> None:
-        given = dict(parse_qsl(request.query, keep_blank_values=True))
-        edit(given)
-        request.target = f"{request.path}?{urlencode(given)}"
-
-    return apply
-
-
 def _no_start(given: dict[str, str]) -> None:
     for name in ("start_x", "start_y", "start_yaw"):
         given.pop(name, None)
@@ -53,12 +58,6 @@ def _no_start(given: dict[str, str]) -> None:
 
 def _quarter(given: dict[str, str]) -> None:
     given.setdefault("yaw", "1.5707963")
-
-
-def _emptied(response: Response) -> None:
-    response.status, response.reason = 200, ""
-    response.body = b'{"plan":{"header":{"stamp":{"sec":1,"nanosec":0},"frame_id":"map"},"poses":[]}}'
-    response.put("Content-Type", "application/json")
 
 
 def _frame(value: Any) -> None:
@@ -73,70 +72,50 @@ MUTANTS = (
         "plan-without-stamps",
         "Poses of a plan have no header.",
         "plan-type",
-        altered(_GET, _poses(lambda poses: [{"pose": one["pose"]} for one in poses])),
+        _led(lambda poses: [{"pose": one["pose"]} for one in poses]),
     ),
     _mutant(
         "plan-bare",
         "The answer is the path, not a response that holds it.",
         "plan-type",
-        altered(_GET, values(lambda value: value["plan"])),
+        _told(lambda value: value["plan"]),
     ),
     _mutant(
         "plan-from-elsewhere",
         "A plan begins 60 cm beside the robot.",
         "plan-start",
-        altered(_GET, _poses(lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])),
+        _led(lambda poses: [_moved(poses[0], -0.36, 0.48), *poses]),
     ),
     _mutant(
-        "plan-ignores-start", "A given start is not looked at.", "plan-given-start", rewritten(_GET, _ask(_no_start))
+        "plan-ignores-start", "A given start is not looked at.", "plan-given-start", rewritten(_GET, query(_no_start))
     ),
     _mutant(
         "plan-falls-short",
         "A plan ends 50 cm before the pose that was asked for.",
         "plan-end",
-        altered(_GET, _poses(lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])),
+        _led(lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)]),
     ),
-    _mutant(
-        "plan-heading-ignored",
-        "A plan ends with a heading that is one radian off.",
-        "plan-yaw",
-        altered(_GET, _poses(_turned)),
-    ),
-    _mutant(
-        "plan-jumps",
-        "In the middle of a plan there is a leap of 35 m.",
-        "plan-continuous",
-        altered(_GET, _poses(_detour)),
-    ),
-    _mutant(
-        "plan-jumps-sometimes",
-        "One plan in 50 has a leap in it.",
-        "plan-continuous",
-        altered(_GET, _poses(_detour), nth=50),
-    ),
-    _mutant(
-        "plan-mixed-frames",
-        "Only the first pose is in the frame of the path.",
-        "plan-frame",
-        altered(_GET, values(_frame)),
-    ),
+    _mutant("plan-heading-ignored", "A plan ends with a heading that is one radian off.", "plan-yaw", _led(_turned)),
+    _mutant("plan-jumps", "In the middle of a plan there is a leap of 35 m.", "plan-continuous", _led(_detour)),
+    _mutant("plan-jumps-sometimes", "One plan in 50 has a leap in it.", "plan-continuous", _led(_detour, nth=50)),
+    _mutant("plan-mixed-frames", "Only the first pose is in the frame of the path.", "plan-frame", _told(_frame)),
     _mutant(
         "plan-frameless",
         "The path's header has no frame.",
         "plan-frame",
-        altered(_GET, values(lambda value: value["plan"]["header"].update(frame_id=""))),
+        _told(lambda value: value["plan"]["header"].update(frame_id="")),
     ),
     _mutant(
         "plan-other-defaults",
         "A yaw that is left out counts as a quarter turn.",
         "plan-defaults",
-        rewritten(_GET, _ask(_quarter)),
+        rewritten(_GET, query(_quarter)),
     ),
     _mutant(
         "plan-none-empty",
         "Where there is no plan, an empty one is sent.",
         "plan-none",
-        altered(_GET, _emptied, status(404, 422)),
+        altered(_GET, page(200, _EMPTY, JSON), status(404, 422)),
     ),
     _mutant(
         "plan-none-crash",

@@ -5,9 +5,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from conformance.selftest.change import Change, Forward
+from conformance.selftest.change import Forward
 from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import POSE, altered, instead, parsed, plain, problem, rest, values
+from conformance.selftest.mutants.changes import POSE, Make, altered, instead, parsed, plain, problem, rest, values
 from conformance.selftest.mutants.mutant import of_class
 
 _AT = rest("GET", POSE)
@@ -15,6 +15,15 @@ _AT = rest("GET", POSE)
 
 def _position(odometry: Any) -> Any:
     return odometry["pose"]["pose"]["position"]
+
+
+def _orientation(odometry: Any) -> Any:
+    return odometry["pose"]["pose"]["orientation"]
+
+
+def _told(edit: Callable[[Any], Any], **more: int) -> Make:
+    """The odometry is altered on its way to the client."""
+    return altered(_AT, values(edit), **more)
 
 
 def _scaled(factor: float) -> Callable[[Any], None]:
@@ -27,17 +36,11 @@ def _scaled(factor: float) -> Callable[[Any], None]:
 
 def _turned(change: Callable[[float], float]) -> Callable[[Any], None]:
     def edit(odometry: Any) -> None:
-        q = odometry["pose"]["pose"]["orientation"]
+        q = _orientation(odometry)
         yaw = change(2 * math.atan2(q["z"], q["w"]))
         q["z"], q["w"] = math.sin(yaw / 2), math.cos(yaw / 2)
 
     return edit
-
-
-def _lengthened(odometry: Any) -> None:
-    q = odometry["pose"]["pose"]["orientation"]
-    for axis in "xyzw":
-        q[axis] *= 1.01
 
 
 def _swapped(odometry: Any) -> None:
@@ -65,21 +68,6 @@ class _Frozen:
         return response
 
 
-class _Backwards:
-    """Each fifth stamp lies a second back."""
-
-    def __init__(self) -> None:
-        self._count = 0
-
-    def __call__(self, request: Request, forward: Forward) -> Response:
-        response = forward(request)
-        if _AT(request) and response.status == 200:
-            self._count += 1
-            if self._count % 5 == 0:
-                values(_earlier)(response)
-        return response
-
-
 def _earlier(odometry: Any) -> None:
     odometry["header"]["stamp"]["sec"] -= 1
 
@@ -97,11 +85,6 @@ class _NotYet:
         return forward(request)
 
 
-def _renewed() -> Change:
-    """Everything of the first pose but its stamp."""
-    return _Frozen("pose", "twist")
-
-
 _mutant = of_class("rest-resources", "rest")
 
 MUTANTS = (
@@ -109,19 +92,19 @@ MUTANTS = (
         "pose-short-covariance",
         "The pose's covariance has 35 values.",
         "pose-type",
-        altered(_AT, values(lambda value: value["pose"].update(covariance=value["pose"]["covariance"][:35]))),
+        _told(lambda value: value["pose"].update(covariance=value["pose"]["covariance"][:35])),
     ),
     _mutant(
         "pose-without-child-frame",
         "The pose lacks child_frame_id.",
         "pose-type",
-        altered(_AT, values(lambda value: value.pop("child_frame_id") and None)),
+        _told(lambda value: value.pop("child_frame_id") and None),
     ),
     _mutant(
         "pose-numbers-as-text",
         "One pose in 50 has its x as a string.",
         "pose-type",
-        altered(_AT, values(lambda value: _position(value).update(x=str(_position(value)["x"]))), nth=50),
+        _told(lambda value: _position(value).update(x=str(_position(value)["x"])), nth=50),
     ),
     _mutant(
         "pose-without-retry-after",
@@ -133,45 +116,37 @@ MUTANTS = (
         "pose-quaternion-long",
         "The orientation's quaternion is 1 percent too long.",
         "pose-quaternion",
-        altered(_AT, values(_lengthened)),
+        _told(
+            lambda value: _orientation(value).update({axis: 1.01 * part for axis, part in _orientation(value).items()})
+        ),
     ),
     _mutant(
         "pose-quaternion-zero",
         "The orientation is four zeros.",
         "pose-quaternion",
-        altered(_AT, values(lambda value: value["pose"]["pose"].update(orientation=dict.fromkeys("xyzw", 0.0)))),
+        _told(lambda value: value["pose"]["pose"].update(orientation=dict.fromkeys("xyzw", 0.0))),
     ),
     _mutant(
         "pose-stamp-frozen", "The pose's header is for ever the first one's.", "pose-stamp", lambda: _Frozen("header")
     ),
-    _mutant("pose-stamp-backwards", "Each fifth pose has a stamp a second back.", "pose-stamp", _Backwards),
+    _mutant("pose-stamp-backwards", "Each fifth pose has a stamp a second back.", "pose-stamp", _told(_earlier, nth=5)),
     _mutant(
         "pose-stale",
         "The pose is for ever the first one, with a new stamp.",
         ("pose-motion", "pose-rotation"),
-        _renewed,
+        lambda: _Frozen("pose", "twist"),
     ),
+    _mutant("pose-in-centimetres", "The position is in centimetres.", "pose-motion", _told(_scaled(100))),
+    _mutant("pose-mirrored", "The position's x and y are swapped.", "pose-motion", _told(_swapped)),
+    _mutant("pose-clockwise", "The heading counts clockwise.", "pose-rotation", _told(_turned(lambda yaw: -yaw))),
     _mutant(
-        "pose-in-centimetres", "The position is in centimetres.", "pose-motion", altered(_AT, values(_scaled(100)))
-    ),
-    _mutant("pose-mirrored", "The position's x and y are swapped.", "pose-motion", altered(_AT, values(_swapped))),
-    _mutant(
-        "pose-clockwise",
-        "The heading counts clockwise.",
-        "pose-rotation",
-        altered(_AT, values(_turned(lambda yaw: -yaw))),
-    ),
-    _mutant(
-        "pose-half-turn",
-        "The heading turns at half the rate.",
-        "pose-rotation",
-        altered(_AT, values(_turned(lambda yaw: yaw / 2))),
+        "pose-half-turn", "The heading turns at half the rate.", "pose-rotation", _told(_turned(lambda yaw: yaw / 2))
     ),
     _mutant(
         "odometry-in-degrees",
         "The odometry's turning rate is in degrees per second.",
         "velocity-odometry",
-        altered(_AT, values(_in_degrees)),
+        _told(_in_degrees),
     ),
     _mutant("pose-gone", "There is no pose: 404.", "pose-type", instead(_AT, problem(404, "there is no pose"))),
     _mutant("pose-no-content", "The pose is 204.", "pose-type", instead(_AT, plain(204))),

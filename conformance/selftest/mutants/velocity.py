@@ -8,12 +8,15 @@ from conformance.selftest.change import Forward
 from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
+    JSON,
     LINEAR,
     VELOCITY,
+    Make,
     altered,
     becomes,
     inputs,
     instead,
+    page,
     parsed,
     plain,
     problem,
@@ -27,6 +30,7 @@ from conformance.selftest.mutants.mutant import of_class
 _GET, _PUT = rest("GET", VELOCITY), rest("PUT", VELOCITY)
 _GET_LINEAR, _PUT_LINEAR = rest("GET", LINEAR), rest("PUT", LINEAR)
 _STILL = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
+_CRAWL = {**_STILL, "linear": {"x": 0.123, "y": 0.0, "z": 0.0}}
 
 
 def _times(factor: float) -> Callable[[Any], None]:
@@ -105,11 +109,6 @@ def _other_half(request: Request, forward: Forward) -> Response:
     return response
 
 
-def _replaced(response: Response, value: Any) -> None:
-    response.status, response.reason, response.body = 200, "", json.dumps(value).encode()
-    response.put("Content-Type", "application/json")
-
-
 def _good(twist: Any) -> bool:
     """Whether a Twist is one that a robot would take; others stay as they are, to be refused."""
     try:
@@ -118,6 +117,16 @@ def _good(twist: Any) -> bool:
         return all(isinstance(one, int | float) for one in numbers) and slow
     except (TypeError, KeyError):
         return False
+
+
+def _told(edit: Callable[[Any], Any], **more: int) -> Make:
+    """The measured velocity is altered on its way to the client."""
+    return altered(_GET, values(edit), **more)
+
+
+def _driven(edit: Callable[[Any], Any]) -> Make:
+    """A good velocity is altered on its way to the robot."""
+    return secretly(_PUT, inputs(lambda twist: edit(twist) if _good(twist) else None))
 
 
 def _mirrored(twist: Any) -> None:
@@ -131,31 +140,31 @@ MUTANTS = (
         "velocity-without-angular",
         "GET of the velocity has no angular part.",
         "velocity-type",
-        altered(_GET, values(lambda twist: twist.pop("angular") and None)),
+        _told(lambda twist: twist.pop("angular") and None),
     ),
     _mutant(
         "velocity-null",
         "One velocity in 50 has null for linear.y.",
         "velocity-type",
-        altered(_GET, values(lambda twist: twist["linear"].update(y=None)), nth=50),
+        _told(lambda twist: twist["linear"].update(y=None), nth=50),
     ),
     _mutant(
         "velocity-in-kilometres-per-hour",
         "The measured velocity is in km/h.",
         ("velocity-odometry", "velocity-converges"),
-        altered(_GET, values(_times(3.6))),
+        _told(_times(3.6)),
     ),
     _mutant(
         "velocity-stands-still",
         "The measured velocity is always zero.",
         ("velocity-odometry", "velocity-converges"),
-        altered(_GET, values(lambda twist: twist.update(_STILL))),
+        _told(lambda twist: twist.update(_STILL)),
     ),
     _mutant(
         "velocity-swapped",
         "Linear and angular velocity are exchanged in what is read.",
         "velocity-converges",
-        altered(_GET, values(_exchanged)),
+        _told(_exchanged),
     ),
     _mutant(
         "velocity-as-commanded",
@@ -168,26 +177,18 @@ MUTANTS = (
         "velocity-put-other",
         "PUT of a velocity answers 200 with a Twist that was not asked for.",
         "velocity-put",
-        altered(_PUT, lambda response: _replaced(response, {**_STILL, "linear": {"x": 0.123, "y": 0.0, "z": 0.0}})),
+        altered(_PUT, page(200, json.dumps(_CRAWL).encode(), JSON)),
     ),
     _mutant(
         "velocity-lost",
         "Velocities are accepted and forgotten.",
         "velocity-converges",
-        secretly(_PUT, inputs(lambda twist: twist.update(_STILL) if _good(twist) else None)),
+        _driven(lambda twist: twist.update(_STILL)),
     ),
     _mutant(
-        "velocity-halved",
-        "The robot drives at half of what it is told.",
-        "velocity-converges",
-        secretly(_PUT, inputs(lambda twist: _times(0.5)(twist) if _good(twist) else None)),
+        "velocity-halved", "The robot drives at half of what it is told.", "velocity-converges", _driven(_times(0.5))
     ),
-    _mutant(
-        "velocity-reversed",
-        "The robot turns the other way.",
-        "velocity-converges",
-        secretly(_PUT, inputs(lambda twist: _mirrored(twist) if _good(twist) else None)),
-    ),
+    _mutant("velocity-reversed", "The robot turns the other way.", "velocity-converges", _driven(_mirrored)),
     _mutant(
         "velocity-integers-refused",
         "A velocity written in integers is refused.",
