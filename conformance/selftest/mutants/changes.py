@@ -282,6 +282,26 @@ def named(root: Any, name: str) -> list[Any]:
     return [node for node in root.iter() if isinstance(node.tag, str) and etree.QName(node).localname == name]
 
 
+def each(name: str, edit: Callable[[Any], object], which: slice = slice(None)) -> Callable[[Any], None]:
+    """Alter the elements of an XML tree that have a local name, or some of them; ``edit`` gets one."""
+
+    def apply(root: Any) -> None:
+        for node in named(root, name)[which]:
+            edit(node)
+
+    return apply
+
+
+def gone(node: Any) -> None:
+    """Take an element out of its tree."""
+    node.getparent().remove(node)
+
+
+def says(value: str) -> Callable[[Any], None]:
+    """Give an element another text."""
+    return lambda node: setattr(node, "text", value)
+
+
 def header(name: str, value: str | None) -> Callable[[Response], object]:
     """Set a header field, or remove it."""
     return lambda response: response.drop(name) if value is None else response.put(name, value)

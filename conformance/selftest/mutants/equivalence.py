@@ -9,6 +9,8 @@ from conformance.selftest.mutants.changes import (
     VELOCITY,
     altered,
     deliveries,
+    each,
+    gone,
     inputs,
     instead,
     named,
@@ -45,11 +47,6 @@ def _shift(name: str, by: float) -> Callable[[Any], None]:
                 axis.text = repr(float(axis.text) + by)
 
     return edit
-
-
-def _without_last(root: Any) -> None:
-    for node in named(root, "return")[-1:]:
-        node.getparent().remove(node)
 
 
 def _straighter(root: Any) -> None:
@@ -137,13 +134,16 @@ MUTANTS = (
         altered(soap("GetVelocity"), tree(_shift("linear", 0.1))),
     ),
     _soap_state(
-        "same-sensors", "SOAP lacks the last sensor.", "sensors", altered(soap("GetSensors"), tree(_without_last))
+        "same-sensors",
+        "SOAP lacks the last sensor.",
+        "sensors",
+        altered(soap("GetSensors"), tree(each("return", gone, slice(-1, None)))),
     ),
     _soap_state(
         "same-services",
         "SOAP lacks the last service.",
         "services",
-        altered(soap("GetNavigationServices"), tree(_without_last)),
+        altered(soap("GetNavigationServices"), tree(each("return", gone, slice(-1, None)))),
     ),
     _soap_state("same-goal", "SOAP never has a goal.", "goal", instead(soap("GetGoal"), _NO_GOAL)),
     _soap_state(

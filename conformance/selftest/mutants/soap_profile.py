@@ -1,27 +1,40 @@
 """Robots that break WS-I Basic Profile 1.1 and SOAP 1.1 in their messages and faults."""
 
+from collections.abc import Callable
+
 from lxml import etree
 
 from conformance.selftest.change import Forward
 from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import altered, anything, header, posted, soap, status, text, tree
+from conformance.selftest.mutants.changes import (
+    Make,
+    altered,
+    anything,
+    becomes,
+    each,
+    gone,
+    header,
+    page,
+    posted,
+    says,
+    soap,
+    status,
+    text,
+    tree,
+)
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import (
-    bare_500,
+    TRACE,
     coded,
     declared,
-    dropped,
-    empty,
     fault_tree,
     hinted,
+    in_body,
     instructed,
     is_fault,
     latin,
     qualified,
-    set_status,
     styled,
-    styled_child,
-    traced,
     trailer,
     unbound,
     understood_true,
@@ -29,16 +42,23 @@ from conformance.selftest.mutants.soap_responses import (
     wrapper_as_asked,
 )
 
+_PAGE = b"<html><body>Internal Server Error</body></html>"
 _ANY = soap()
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 
 
+def _answers(edit: Callable[[Response], object]) -> Make:
+    """Every answer to an operation is altered, faults too."""
+    return altered(_ANY, edit, anything)
+
+
+def _faults(edit: Callable[[Response], object]) -> Make:
+    """Faults are altered."""
+    return altered(posted, edit, is_fault)
+
+
 def _plain_success(response: Response) -> bool:
     return response.status == 200 and not is_fault(response)
-
-
-def _version(response: Response) -> None:
-    response.version = "HTTP/1.2"
 
 
 def _is_malformed(request: Request) -> bool:
@@ -71,98 +91,57 @@ def _any_type(request: Request, forward: Forward) -> Response:
 
 
 MUTANTS = (
+    _mutant("bp-fault-hint", "A Fault has a child of the robot's own.", "R1000", _faults(fault_tree(hinted))),
+    _mutant("bp-fault-qualified", "The children of a Fault are qualified.", "R1001", _faults(fault_tree(qualified))),
     _mutant(
-        "bp-fault-hint",
-        "A Fault has a child of the robot's own.",
-        "R1000",
-        altered(posted, fault_tree(hinted), is_fault),
+        "bp-fault-mute", "A Fault has no faultstring.", "fault-complete", _faults(fault_tree(each("faultstring", gone)))
     ),
     _mutant(
-        "bp-fault-qualified",
-        "The children of a Fault are qualified.",
-        "R1001",
-        altered(posted, fault_tree(qualified), is_fault),
+        "bp-fault-codeless", "A Fault has no faultcode.", "fault-complete", _faults(fault_tree(each("faultcode", gone)))
     ),
     _mutant(
-        "bp-fault-mute",
-        "A Fault has no faultstring.",
-        "fault-complete",
-        altered(posted, fault_tree(dropped("faultstring")), is_fault),
+        "bp-fault-own-code", "faultcode is a code that SOAP's namespace does not have.", "R1004", _faults(coded("Oops"))
     ),
-    _mutant(
-        "bp-fault-codeless",
-        "A Fault has no faultcode.",
-        "fault-complete",
-        altered(posted, fault_tree(dropped("faultcode")), is_fault),
-    ),
-    _mutant(
-        "bp-fault-own-code",
-        "faultcode is a code that SOAP's namespace does not have.",
-        "R1004",
-        altered(posted, coded("Oops"), is_fault),
-    ),
-    _mutant(
-        "bp-fault-unbound",
-        "The prefix of faultcode is not bound.",
-        "faultcode-qualified",
-        altered(posted, unbound, is_fault),
-    ),
+    _mutant("bp-fault-unbound", "The prefix of faultcode is not bound.", "faultcode-qualified", _faults(unbound)),
     _mutant(
         "bp-fault-code-bare",
         "faultcode has no prefix.",
         "faultcode-qualified",
-        altered(posted, text(r"(<faultcode[^>]*>\s*)[\w.-]+:", r"\1"), is_fault),
+        _faults(text(r"(<faultcode[^>]*>\s*)[\w.-]+:", r"\1")),
     ),
-    _mutant("bp-encoding-style", "Envelope carries encodingStyle.", "R1005", altered(_ANY, tree(styled), anything)),
-    _mutant(
-        "bp-encoding-style-child",
-        "The child of Body carries encodingStyle.",
-        "R1006",
-        altered(_ANY, tree(styled_child), anything),
-    ),
-    _mutant("bp-doctype", "Answers have a Document Type Declaration.", "R1008", altered(_ANY, declared, anything)),
-    _mutant("bp-instruction", "Answers have a processing instruction.", "R1009", altered(_ANY, instructed, anything)),
-    _mutant("bp-trailer", "Something follows Body.", "R1011", altered(_ANY, tree(trailer), anything)),
-    _mutant("bp-latin", "Answers are ISO 8859-1.", "R1012", altered(_ANY, latin, anything)),
-    _mutant(
-        "bp-must-understand-true",
-        "mustUnderstand is written true.",
-        "R1013",
-        altered(_ANY, tree(understood_true), anything),
-    ),
+    _mutant("bp-encoding-style", "Envelope carries encodingStyle.", "R1005", _answers(tree(styled))),
+    _mutant("bp-encoding-style-child", "The child of Body carries encodingStyle.", "R1006", _answers(in_body(styled))),
+    _mutant("bp-doctype", "Answers have a Document Type Declaration.", "R1008", _answers(declared)),
+    _mutant("bp-instruction", "Answers have a processing instruction.", "R1009", _answers(instructed)),
+    _mutant("bp-trailer", "Something follows Body.", "R1011", _answers(tree(trailer))),
+    _mutant("bp-latin", "Answers are ISO 8859-1.", "R1012", _answers(latin)),
+    _mutant("bp-must-understand-true", "mustUnderstand is written true.", "R1013", _answers(tree(understood_true))),
     _mutant(
         "bp-body-unqualified",
         "The child of Body is in no namespace.",
         "R1014",
-        altered(_ANY, tree(unqualified), _plain_success),
+        altered(_ANY, in_body(unqualified), _plain_success),
     ),
-    _mutant("bp-status-accepted", "Responses are 202.", "R1111", altered(_ANY, set_status(202), _plain_success)),
+    _mutant("bp-status-accepted", "Responses are 202.", "R1111", altered(_ANY, becomes(202), _plain_success)),
+    _mutant("bp-malformed-422", "Malformed XML is 422.", "R1113", altered(_is_malformed, page(422), anything)),
+    _mutant("bp-status-redirect", "Responses are 500.", "R1124", altered(_ANY, becomes(500), _plain_success)),
     _mutant(
-        "bp-malformed-422",
-        "Malformed XML is 422.",
-        "R1113",
-        altered(_is_malformed, lambda response: empty(response, 422), anything),
-    ),
-    _mutant("bp-status-redirect", "Responses are 500.", "R1124", altered(_ANY, set_status(500), _plain_success)),
-    _mutant(
-        "bp-malformed-page", "Malformed XML is 500 with a page.", "R1125", altered(_is_malformed, bare_500, anything)
-    ),
-    _mutant(
-        "bp-malformed-fine",
-        "Malformed XML is 200.",
+        "bp-malformed-page",
+        "Malformed XML is 500 with a page.",
         "R1125",
-        altered(_is_malformed, lambda response: empty(response, 200), anything),
+        altered(_is_malformed, page(500, _PAGE, "text/html"), anything),
     ),
-    _mutant(
-        "bp-get-200",
-        "GET of the service is 200 with a page.",
-        "R1114",
-        altered(_not_post, lambda response: empty(response, 200), anything),
-    ),
+    _mutant("bp-malformed-fine", "Malformed XML is 200.", "R1125", altered(_is_malformed, page(200), anything)),
+    _mutant("bp-get-200", "GET of the service is 200 with a page.", "R1114", altered(_not_post, page(200), anything)),
     _mutant("bp-any-type", "Any media type is taken for text/xml.", "R1115", lambda: _any_type),
-    _mutant("bp-fault-200", "Faults are 200.", "R1126", altered(posted, set_status(200), is_fault)),
-    _mutant("bp-fault-400", "Faults are 400.", "R1126", altered(posted, set_status(400), is_fault)),
-    _mutant("bp-http-1-2", "Answers say HTTP/1.2.", "R1141", altered(posted, _version, anything)),
+    _mutant("bp-fault-200", "Faults are 200.", "R1126", _faults(becomes(200))),
+    _mutant("bp-fault-400", "Faults are 400.", "R1126", _faults(becomes(400))),
+    _mutant(
+        "bp-http-1-2",
+        "Answers say HTTP/1.2.",
+        "R1141",
+        altered(posted, lambda response: setattr(response, "version", "HTTP/1.2"), anything),
+    ),
     _mutant(
         "bp-soap12-type",
         "Answers are application/soap+xml.",
@@ -173,7 +152,7 @@ MUTANTS = (
         "bp-wrapper-as-asked",
         "The response's wrapper has the request's name.",
         "R2712",
-        altered(_ANY, tree(wrapper_as_asked), _plain_success),
+        altered(_ANY, in_body(wrapper_as_asked), _plain_success),
     ),
     _mutant(
         "bp-server-to-blame",
@@ -185,12 +164,9 @@ MUTANTS = (
         "bp-traceback",
         "Faults show a stack trace.",
         "fault-no-traceback",
-        altered(posted, fault_tree(traced), is_fault),
+        _faults(fault_tree(each("faultstring", says(TRACE)))),
     ),
     _mutant(
-        "bp-fault-sometimes-200",
-        "One fault in 50 is 200.",
-        "R1126",
-        altered(posted, set_status(200), status(500), nth=50),
+        "bp-fault-sometimes-200", "One fault in 50 is 200.", "R1126", altered(posted, becomes(200), status(500), nth=50)
     ),
 )

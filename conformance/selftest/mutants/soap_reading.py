@@ -5,36 +5,19 @@ from collections.abc import Callable
 from typing import Any
 
 from conformance.selftest.messages import Request
-from conformance.selftest.mutants.changes import altered, named, rewritten, soap, text, tree
+from conformance.selftest.mutants.changes import altered, each, gone, named, rewritten, says, soap, text, tree
 from conformance.selftest.mutants.mutant import of_class
 
 _POSE, _VELOCITY, _PLAN = soap("GetPose"), soap("GetVelocity"), soap("GetPlan")
 
 
 def _first_is(parent: str, child: str, value: str) -> Callable[[Any], None]:
-    def edit(root: Any) -> None:
-        for node in named(root, parent)[:1]:
-            named(node, child)[0].text = value
-
-    return edit
+    return each(parent, each(child, says(value), slice(1)), slice(1))
 
 
 def _swapped(root: Any) -> None:
     for node in named(root, "position"):
         node[:2] = [node[1], node[0]]
-
-
-def _emptied(root: Any) -> None:
-    for node in named(root, "return"):
-        node.getparent().remove(node)
-
-
-def _said(name: str, value: str) -> Callable[[Any], None]:
-    def edit(root: Any) -> None:
-        for node in named(root, name):
-            node.text = value
-
-    return edit
 
 
 def _reversed_path(root: Any) -> None:
@@ -80,14 +63,14 @@ MUTANTS = (
         "soap-read-empty",
         "Responses hold nothing that a client finds.",
         "interop",
-        altered(soap("Get[A-Z][A-Za-z]+"), tree(_emptied)),
+        altered(soap("Get[A-Z][A-Za-z]+"), tree(each("return", gone))),
     ),
     _mutant("soap-plan-reversed", "GetPlan gives the way back.", "plan", altered(_PLAN, tree(_reversed_path))),
     _mutant(
         "soap-plan-other-frame",
         "GetPlan's path is in another frame.",
         "plan",
-        altered(_PLAN, tree(_said("frame_id", "base_link"))),
+        altered(_PLAN, tree(each("frame_id", says("base_link")))),
     ),
     _mutant("soap-plan-elsewhere", "GetPlan plans to another place.", "plan", rewritten(_PLAN, _elsewhere)),
     _mutant("soap-plan-any-frame", "GetPlan takes any frame for map.", "plan-none", rewritten(_PLAN, _in_map)),

@@ -11,9 +11,9 @@ from typing import Any
 from lxml import etree
 
 from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import SOAP, TNS, named, tree
+from conformance.selftest.mutants.changes import SOAP, each, tree
 
-_TRACE = (
+TRACE = (
     "java.lang.NullPointerException\n\tat org.mybot.turtlebot.soap.Publishers.execute(Publishers.java:41)\n"
     "\tat com.sun.xml.ws.server.InvokerTube$2.invoke(InvokerTube.java:148)"
 )
@@ -24,23 +24,14 @@ def is_fault(response: Response) -> bool:
     return b"Fault" in response.body and b"faultstring" in response.body
 
 
-def set_status(value: int) -> Callable[[Response], None]:
-    """Another status."""
-
-    def edit(response: Response) -> None:
-        response.status, response.reason = value, ""
-
-    return edit
-
-
 def fault_tree(edit: Callable[[Any], object]) -> Callable[[Response], object]:
     """Alter the Fault element."""
+    return tree(each("Fault", edit))
 
-    def apply(root: Any) -> None:
-        for element in named(root, "Fault"):
-            edit(element)
 
-    return tree(apply)
+def in_body(edit: Callable[[Any], object]) -> Callable[[Response], object]:
+    """Alter the children of Body: a wrapper, as a rule."""
+    return tree(each("Body", lambda body: [edit(child) for child in body]))
 
 
 def hinted(element: Any) -> None:
@@ -54,30 +45,13 @@ def qualified(element: Any) -> None:
         child.tag = etree.QName(SOAP, etree.QName(child).localname).text
 
 
-def dropped(name: str) -> Callable[[Any], None]:
-    """Fault without a child."""
-
-    def edit(element: Any) -> None:
-        for child in named(element, name):
-            child.getparent().remove(child)
-
-    return edit
-
-
 def coded(code: str) -> Callable[[Response], object]:
     """Give every fault another code, in the prefix that it has."""
 
-    def edit(element: Any) -> None:
-        for child in named(element, "faultcode"):
-            child.text = re.sub(r"\w+\s*$", code, child.text or "")
+    def edit(child: Any) -> None:
+        child.text = re.sub(r"\w+\s*$", code, child.text or "")
 
-    return fault_tree(edit)
-
-
-def traced(element: Any) -> None:
-    """A stack trace as faultstring."""
-    for child in named(element, "faultstring"):
-        child.text = _TRACE
+    return fault_tree(each("faultcode", edit))
 
 
 def unbound(response: Response) -> None:
@@ -85,15 +59,9 @@ def unbound(response: Response) -> None:
     response.body = re.sub(rb"(<faultcode[^>]*>\s*)[\w.-]+:", rb"\1nowhere:", response.body)
 
 
-def styled(root: Any) -> None:
-    """EncodingStyle at Envelope."""
-    root.set(f"{{{SOAP}}}encodingStyle", "http://schemas.xmlsoap.org/soap/encoding/")
-
-
-def styled_child(root: Any) -> None:
-    """EncodingStyle at the child of Body."""
-    for child in named(root, "Body")[0]:
-        child.set(f"{{{SOAP}}}encodingStyle", "http://schemas.xmlsoap.org/soap/encoding/")
+def styled(element: Any) -> None:
+    """EncodingStyle at an element."""
+    element.set(f"{{{SOAP}}}encodingStyle", "http://schemas.xmlsoap.org/soap/encoding/")
 
 
 def declared(response: Response) -> None:
@@ -131,28 +99,14 @@ def understood_true(root: Any) -> None:
     root.insert(0, block)
 
 
-def unqualified(root: Any) -> None:
+def unqualified(wrapper: Any) -> None:
     """The child of Body in no namespace."""
-    for child in named(root, "Body")[0]:
-        child.tag = etree.QName(child).localname
+    wrapper.tag = etree.QName(wrapper).localname
 
 
-def wrapper_as_asked(root: Any) -> None:
+def wrapper_as_asked(wrapper: Any) -> None:
     """The request's wrapper in place of the response's."""
-    for child in named(root, "Body")[0]:
-        child.tag = child.tag.removesuffix("Response")
-
-
-def bare_500(response: Response) -> None:
-    """A page with status 500."""
-    response.status, response.reason, response.body = 500, "", b"<html><body>Internal Server Error</body></html>"
-    response.put("Content-Type", "text/html")
-
-
-def empty(response: Response, value: int) -> None:
-    """Another status, without a body."""
-    response.status, response.reason, response.body = value, "", b""
-    response.drop("Content-Type")
+    wrapper.tag = wrapper.tag.removesuffix("Response")
 
 
 def enveloped(content: str, status: int = 200) -> Callable[[Request], Response]:
@@ -166,35 +120,11 @@ def fault(code: str, string: str) -> Callable[[Request], Response]:
     return enveloped(f"<s:Fault><faultcode>s:{code}</faultcode><faultstring>{string}</faultstring></s:Fault>", 500)
 
 
-def without(name: str) -> Callable[[Any], None]:
-    """The first element with a name is gone."""
-
-    def edit(root: Any) -> None:
-        for node in named(root, name)[:1]:
-            node.getparent().remove(node)
-
-    return edit
-
-
-def with_content(root: Any) -> None:
+def with_content(wrapper: Any) -> None:
     """An element in the response's wrapper."""
-    body = named(root, "Body")[0]
-    for wrapper in body:
-        etree.SubElement(wrapper, "accepted").text = "true"
+    etree.SubElement(wrapper, "accepted").text = "true"
 
 
-def other_namespace(root: Any) -> None:
+def other_namespace(wrapper: Any) -> None:
     """The wrapper in another namespace."""
-    for wrapper in named(root, "Body")[0]:
-        wrapper.tag = etree.QName("http://ros-ws.org", etree.QName(wrapper).localname).text
-
-
-def coffee_for_all(root: Any) -> None:
-    """The coffee's response in place of the delivery's."""
-    for wrapper in named(root, "ExecuteDeliveryRequestResponse"):
-        wrapper.tag = f"{{{TNS}}}ExecuteCoffeeRequestResponse"
-
-
-def unavailable(response: Response) -> None:
-    """503 without a body."""
-    response.status, response.reason, response.body = 503, "", b""
+    wrapper.tag = etree.QName("http://ros-ws.org", etree.QName(wrapper).localname).text

@@ -8,8 +8,21 @@ from lxml import etree
 
 from conformance.selftest.change import Forward
 from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import TNS, altered, hanging_up, instead, named, plain, text, tree, wsdls
+from conformance.selftest.mutants.changes import (
+    TNS,
+    Make,
+    altered,
+    gone,
+    hanging_up,
+    instead,
+    named,
+    plain,
+    text,
+    tree,
+    wsdls,
+)
 from conformance.selftest.mutants.mutant import of_class
+from conformance.selftest.mutants.soap_responses import latin
 
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _XSD = "http://www.w3.org/2001/XMLSchema"
@@ -21,12 +34,12 @@ def _description(request: Request) -> bool:
     return wsdls(request) and request.query.lower() == "wsdl"
 
 
-def _edited(edit: Callable[[Any], object]) -> Callable[[], Any]:
+def _edited(edit: Callable[[Any], object]) -> Make:
     """Alter the WSDL; ``edit`` gets its root."""
     return altered(_description, tree(edit))
 
 
-def _typed(edit: Callable[[Any], object]) -> Callable[[], Any]:
+def _typed(edit: Callable[[Any], object]) -> Make:
     """Alter schemas, inline or in documents of their own; ``edit`` gets each schema that declares something."""
 
     def apply(root: Any) -> None:
@@ -37,28 +50,22 @@ def _typed(edit: Callable[[Any], object]) -> Callable[[], Any]:
     return altered(wsdls, tree(apply))
 
 
-def _all(path: str, edit: Callable[[Any], object]) -> Callable[[Any], None]:
+def _all(path: str, edit: Callable[[Any], object], which: slice = slice(None)) -> Make:
+    """Alter the WSDL's elements at a path, or some of them."""
+
     def apply(root: Any) -> None:
-        for node in root.findall(path):
+        for node in root.findall(path)[which]:
             edit(node)
 
-    return apply
+    return _edited(apply)
 
 
-def _first(path: str, edit: Callable[[Any], object]) -> Callable[[Any], None]:
-    def apply(root: Any) -> None:
-        for node in root.findall(path)[:1]:
-            edit(node)
-
-    return apply
+def _first(path: str, edit: Callable[[Any], object]) -> Make:
+    return _all(path, edit, slice(1))
 
 
 def _set(name: str, value: str) -> Callable[[Any], None]:
     return lambda node: node.set(name, value)
-
-
-def _removed(node: Any) -> None:
-    node.getparent().remove(node)
 
 
 def _twice(node: Any) -> None:
@@ -79,7 +86,7 @@ def _broken_import(request: Request, forward: Forward) -> Response:
 
 def _operation_lost(root: Any) -> None:
     for node in (root.find(_OPERATION), root.find(f"{_BINDING}/{_W}operation")):
-        _removed(node)
+        gone(node)
 
 
 def _typed_part(node: Any) -> None:
@@ -94,7 +101,7 @@ def _prefix(node: Any) -> str:
 def _import_in_types(root: Any) -> None:
     types = root.find(f"{_W}types")
     made = etree.Element(f"{_X}import")
-    made.set("namespace", "http://soap.turtlebot.mybot.org/")
+    made.set("namespace", TNS)
     types.insert(0, made)
 
 
@@ -117,42 +124,19 @@ def _two_parts(root: Any) -> None:
         body.set("parts", "parameters more")
 
 
-def _soap12(response: Response) -> None:
-    response.body = response.body.replace(_SOAP.encode(), b"http://schemas.xmlsoap.org/wsdl/soap12/")
+def _float(schema: Any) -> None:
+    for node in [node for node in schema.iter(f"{_X}element") if node.get("type", "").endswith("double")][:1]:
+        node.set("type", node.get("type").replace("double", "float"))
 
 
-def _latin(response: Response) -> None:
-    body = re.sub(rb"^\s*<\?xml.*?\?>", b"", response.body)
-    response.body = b'<?xml version="1.0" encoding="ISO-8859-1"?><!-- \xe9 -->' + body
-    response.put("Content-Type", "text/xml; charset=iso-8859-1")
+def _long_sequence(edit: Callable[[Any], object]) -> Make:
+    """Alter the first sequence of each schema that has more than two elements."""
 
+    def apply(schema: Any) -> None:
+        for sequence in [one for one in schema.iter(f"{_X}sequence") if len(one) > 2][:1]:
+            edit(sequence)
 
-def _first_double(value: str) -> Callable[[Any], None]:
-    def edit(schema: Any) -> None:
-        for node in schema.iter(f"{_X}element"):
-            if node.get("type", "").endswith("double"):
-                node.set("type", re.sub("double", value, node.get("type")))
-                return
-
-    return edit
-
-
-def _reordered(schema: Any) -> None:
-    for sequence in schema.iter(f"{_X}sequence"):
-        if len(sequence) > 2:
-            sequence.append(sequence[0])
-            return
-
-
-def _optional(schema: Any) -> None:
-    for sequence in schema.iter(f"{_X}sequence"):
-        if len(sequence) > 2:
-            sequence[0].set("minOccurs", "0")
-            return
-
-
-def _elsewhere(response: Response) -> None:
-    response.body = re.sub(rb'location="http://[^"]*"', b'location="http://127.0.0.1:9/turtlesim"', response.body)
+    return _typed(apply)
 
 
 def _inline_no_target(root: Any) -> None:
@@ -178,13 +162,13 @@ MUTANTS = (
         "wsdl-service-name",
         "The service has another name.",
         "wsdl-names",
-        _edited(_all(f"{_W}service", _set("name", "TurtlebotOfficeService"))),
+        _all(f"{_W}service", _set("name", "TurtlebotOfficeService")),
     ),
     _mutant(
         "wsdl-port-name",
         "The port has another name.",
         "wsdl-names",
-        _edited(_all(f"{_W}service/{_W}port", _set("name", "Port"))),
+        _all(f"{_W}service/{_W}port", _set("name", "Port")),
     ),
     _mutant(
         "wsdl-namespace",
@@ -197,11 +181,21 @@ MUTANTS = (
         "wsdl-part-name",
         "A message's part has another name.",
         "wsdl-operations",
-        _edited(_all(f"{_W}message/{_W}part", _set("name", "body"))),
+        _all(f"{_W}message/{_W}part", _set("name", "body")),
     ),
-    _mutant("wsdl-float", "A double is a float in the schema.", "wsdl-types", _typed(_first_double("float"))),
-    _mutant("wsdl-order", "The schema has its elements in another order.", "wsdl-types", _typed(_reordered)),
-    _mutant("wsdl-optional", "An element is optional in the schema.", "wsdl-types", _typed(_optional)),
+    _mutant("wsdl-float", "A double is a float in the schema.", "wsdl-types", _typed(_float)),
+    _mutant(
+        "wsdl-order",
+        "The schema has its elements in another order.",
+        "wsdl-types",
+        _long_sequence(lambda sequence: sequence.append(sequence[0])),
+    ),
+    _mutant(
+        "wsdl-optional",
+        "An element is optional in the schema.",
+        "wsdl-types",
+        _long_sequence(lambda sequence: sequence[0].set("minOccurs", "0")),
+    ),
     _mutant(
         "wsdl-action",
         "wsam:Action is something else.",
@@ -209,7 +203,10 @@ MUTANTS = (
         altered(_description, text(r'(:Action=["\'])[^"\']*', r"\1urn:drive")),
     ),
     _mutant(
-        "wsdl-address", "The address in the WSDL leads nowhere.", "wsdl-address", altered(_description, _elsewhere)
+        "wsdl-address",
+        "The address in the WSDL leads nowhere.",
+        "wsdl-address",
+        altered(_description, text(r'location="http://[^"]*"', 'location="http://127.0.0.1:9/turtlesim"')),
     ),
     _mutant("wsdl-import-in-types", "xsd:import stands in wsdl:types itself.", "wsdl-R2003", _edited(_import_in_types)),
     _mutant(
@@ -226,58 +223,57 @@ MUTANTS = (
         "wsdl-type-part",
         "A part has a type in place of an element.",
         "wsdl-R2204",
-        _edited(_first(f"{_W}message/{_W}part", _typed_part)),
+        _first(f"{_W}message/{_W}part", _typed_part),
     ),
     _mutant(
         "wsdl-part-of-nothing",
         "A part refers to an element that does not exist.",
         "wsdl-R2206",
-        _edited(_first(f"{_W}message/{_W}part", lambda node: node.set("element", f"{_prefix(node)}:NothingAtAll"))),
+        _first(f"{_W}message/{_W}part", lambda node: node.set("element", f"{_prefix(node)}:NothingAtAll")),
     ),
+    _mutant("wsdl-operation-twice", "A port type has an operation twice.", "wsdl-R2304", _first(_OPERATION, _twice)),
     _mutant(
-        "wsdl-operation-twice", "A port type has an operation twice.", "wsdl-R2304", _edited(_first(_OPERATION, _twice))
+        "wsdl-soap12",
+        "The binding is one of SOAP 1.2.",
+        "wsdl-R2401",
+        altered(_description, text(re.escape(_SOAP), "http://schemas.xmlsoap.org/wsdl/soap12/")),
     ),
-    _mutant("wsdl-soap12", "The binding is one of SOAP 1.2.", "wsdl-R2401", altered(_description, _soap12)),
     _mutant(
         "wsdl-no-transport",
         "The binding names no transport.",
         "wsdl-R2701",
-        _edited(_all(_TRANSPORT, lambda node: node.attrib.pop("transport", None))),
+        _all(_TRANSPORT, lambda node: node.attrib.pop("transport", None)),
     ),
     _mutant(
         "wsdl-smtp",
         "The transport is SMTP.",
         "wsdl-R2702",
-        _edited(_all(_TRANSPORT, _set("transport", "http://schemas.xmlsoap.org/soap/smtp"))),
+        _all(_TRANSPORT, _set("transport", "http://schemas.xmlsoap.org/soap/smtp")),
     ),
     _mutant(
         "wsdl-mixed-styles",
         "One operation is of style rpc.",
         "wsdl-R2705",
-        _edited(_first(f"{_BINDING}/{_W}operation/{_S}operation", _set("style", "rpc"))),
+        _first(f"{_BINDING}/{_W}operation/{_S}operation", _set("style", "rpc")),
     ),
     _mutant(
         "wsdl-encoded",
         "A body is encoded.",
         "wsdl-R2706",
-        _edited(_first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("use", "encoded"))),
+        _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("use", "encoded")),
     ),
     _mutant("wsdl-same-signature", "Two operations have the same element.", "wsdl-R2710", _edited(_same_element)),
     _mutant(
         "wsdl-body-namespace",
         "A body has a namespace attribute.",
         "wsdl-R2716",
-        _edited(
-            _first(
-                f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("namespace", "http://soap.turtlebot.mybot.org/")
-            )
-        ),
+        _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("namespace", TNS)),
     ),
     _mutant(
         "wsdl-binding-short",
         "The binding lacks an operation of its port type.",
         "wsdl-R2718",
-        _edited(_first(f"{_BINDING}/{_W}operation", _removed)),
+        _first(f"{_BINDING}/{_W}operation", gone),
     ),
     _mutant(
         "wsdl-old-schema",
@@ -285,5 +281,5 @@ MUTANTS = (
         "wsdl-R2801",
         altered(wsdls, text(re.escape(_XSD), "http://www.w3.org/1999/XMLSchema")),
     ),
-    _mutant("wsdl-latin", "The WSDL is ISO 8859-1.", "wsdl-R4003", altered(_description, _latin)),
+    _mutant("wsdl-latin", "The WSDL is ISO 8859-1.", "wsdl-R4003", altered(_description, latin)),
 )

@@ -5,7 +5,7 @@ from lxml import etree
 
 from conformance.selftest.messages import Request
 from conformance.selftest.mutants import soap_responses as edits
-from conformance.selftest.mutants.changes import SOAP, named, tree
+from conformance.selftest.mutants.changes import SOAP, becomes, each, named, page, says, tree
 
 ASKED = Request("soap", "POST", "/")
 
@@ -27,9 +27,9 @@ def test_a_fault_is_told_from_an_answer():
         (edits.declared, b"<!DOCTYPE s:Envelope>"),
         (edits.instructed, b"<?robot drive?>"),
         (edits.latin, b"ISO-8859-1"),
-        (edits.fault_tree(edits.traced), b"NullPointerException"),
+        (edits.fault_tree(each("faultstring", says(edits.TRACE))), b"NullPointerException"),
         (edits.fault_tree(edits.hinted), b"<hint>"),
-        (edits.bare_500, b"<html>"),
+        (page(500, b"<html>", "text/html"), b"<html>"),
     ],
 )
 def test_an_edit_shows(edit, shown):
@@ -49,5 +49,5 @@ def test_a_header_block_comes_before_the_body():
 
 def test_a_status_is_changed_with_its_reason():
     response = refused()
-    edits.set_status(202)(response)
+    becomes(202)(response)
     assert response.octets().startswith(b"HTTP/1.1 202 Accepted\r\n")
