@@ -18,7 +18,7 @@ from pathlib import Path
 from lxml import etree
 
 from conformance.contract.files import CONTRACT_DIR
-from conformance.selftest.change import unchanged
+from conformance.selftest.messages import unchanged
 from conformance.selftest.mutant_run import RobotPool
 from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.proxy import Proxy

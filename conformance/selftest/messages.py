@@ -1,10 +1,11 @@
-"""HTTP messages as values that a mutant can alter in any way, and the octets that they become."""
+"""HTTP messages as values that a mutant can alter in any way, the octets that they become, and what a change is."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
-from typing import Any
+from typing import Any, Protocol
 
 _REASONS = {status.value: status.phrase for status in HTTPStatus}
 _INFORMATIONAL = range(100, 200)
@@ -129,3 +130,33 @@ class Response(_Message):
             self.put("Content-Length", str(len(self.body)))
         head = self._head(f"{self.version} {self.status} {self.reason or _REASONS.get(self.status, 'Unknown')}")
         return head if self.method == "HEAD" else head + self.body
+
+
+Forward = Callable[[Request], Response]
+
+
+class HangUpError(Exception):
+    """The connection is closed without a response."""
+
+
+class Change(Protocol):
+    """What a proxy does to exchanges; one instance for one run, so it may remember."""
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """Respond to a request; ``forward`` asks the robot, as often as one likes.
+
+        Raises:
+            HangUpError: there is to be no response.
+        """
+
+
+class IncompleteRequest(Protocol):
+    """What a mutant does with a request that was never completed."""
+
+    def __call__(self, side: str, octets: bytes, forward: Forward) -> None:
+        """Take what had come when the client went away."""
+
+
+def unchanged(request: Request, forward: Forward) -> Response:
+    """The change that changes nothing."""
+    return forward(request)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Self
 
 from conformance.selftest.certifying import Job, Outcome, run_job
-from conformance.selftest.change import unchanged
+from conformance.selftest.messages import unchanged
 from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import REFERENCE, Robot, running, statement_of

@@ -8,8 +8,7 @@ import traceback
 from urllib.parse import urlsplit
 
 from conformance.selftest.addresses import Addresses
-from conformance.selftest.change import Change, Forward, HangUpError, IncompleteRequest, unchanged
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Change, Forward, HangUpError, IncompleteRequest, Request, Response, unchanged
 from conformance.selftest.wire import ClientConnection, IncompleteMessageError, RobotConnection
 
 _IDLE_S = 60.0

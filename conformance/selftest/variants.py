@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from conformance.selftest.change import Change, Forward, unchanged
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Change, Forward, Request, Response, unchanged
 from conformance.selftest.mutants.changes import parsed, problem
 
 _PREFIX = "/r2d2/api"

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import TNS, instead, plain, posted, rewritten
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped, fault

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 from collections.abc import Callable
@@ -10,8 +11,7 @@ from urllib.parse import parse_qsl, urlencode
 
 from lxml import etree
 
-from conformance.selftest.change import Change, Forward, HangUpError
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Change, Forward, HangUpError, Request, Response
 
 Where = Callable[[Request], bool]
 When = Callable[[Response], bool]
@@ -231,6 +231,16 @@ def inputs(edit: Callable[[Any], Any]) -> Callable[[Request], object]:
         if value is not None:
             made = edit(value)
             request.body = json.dumps(value if made is None else made).encode()
+
+    return apply
+
+
+def guarded(edit: Callable[[Any], object]) -> Callable[[Any], None]:
+    """An edit that leaves values of another shape than it expects as they are, to be refused."""
+
+    def apply(value: Any) -> None:
+        with contextlib.suppress(TypeError, KeyError, AttributeError, ValueError, OverflowError):
+            edit(value)
 
     return apply
 

@@ -4,8 +4,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     LINEAR,

@@ -4,14 +4,14 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     JSON,
     Make,
     altered,
     becomes,
+    guarded,
     inputs,
     instead,
     page,
@@ -100,10 +100,7 @@ def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
 
     def apply(goal: Any) -> None:
         if pose_of(goal) is not None:
-            try:
-                edit(goal)
-            except (TypeError, KeyError, ValueError, OverflowError):
-                return
+            guarded(edit)(goal)
 
     return apply
 

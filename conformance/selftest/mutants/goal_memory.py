@@ -4,8 +4,7 @@ import json
 import math
 from typing import Any
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import GOAL, parsed, plain, problem, rest, success
 from conformance.selftest.mutants.in_background import later
 

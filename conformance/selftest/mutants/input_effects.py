@@ -4,10 +4,21 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import DELIVERIES, GOAL, LINEAR, POSE, VELOCITY, deliveries, parsed, rest
+from conformance.selftest.messages import Forward, Request, Response
+from conformance.selftest.mutants.changes import (
+    DELIVERIES,
+    GOAL,
+    LINEAR,
+    POSE,
+    TNS,
+    VELOCITY,
+    Make,
+    deliveries,
+    parsed,
+    rest,
+)
 from conformance.selftest.mutants.mutant import of_class
+from conformance.selftest.mutants.soap_responses import enveloped
 
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 _INVALID = {400, 415, 422}
@@ -38,7 +49,9 @@ def goal_ahead(request: Request, forward: Forward, distance: float) -> None:
     sent(request, forward, "PUT", GOAL, {"goal": {"target_pose": target}})
 
 
-def _after_refusal(where: Callable[[Request], bool], act: Callable[[Request, Forward], None]) -> Callable[[], Any]:
+def after_refusal(where: Callable[[Request], bool], act: Callable[[Request, Forward], None]) -> Make:
+    """An invalid request is refused, and something is done."""
+
     def change(request: Request, forward: Forward) -> Response:
         response = forward(request)
         if where(request) and response.status in _INVALID:
@@ -60,12 +73,8 @@ def _soap_refusal(request: Request, forward: Forward) -> Response:
         # Only SOAP's side is at hand here: a valid message in place of the refused one.
         values = "".join(f"<{name}>1</{name}>" for name in ("depot_x", "depot_y", "destination_x", "destination_y"))
         message = f"<arg0>{values}<message_code>3</message_code><source_x>1</source_x><source_y>1</source_y></arg0>"
-        body = (
-            '<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body>'
-            f'<t:ExecuteDeliveryRequest xmlns:t="http://soap.turtlebot.mybot.org/">{message}</t:ExecuteDeliveryRequest>'
-            "</e:Body></e:Envelope>"
-        )
-        made = request.copy(body=body.encode())
+        envelope = enveloped(f'<t:ExecuteDeliveryRequest xmlns:t="{TNS}">{message}</t:ExecuteDeliveryRequest>')
+        made = request.copy(body=envelope(request).body)
         made.put("Content-Type", "text/xml; charset=utf-8")
         forward(made)
     return response
@@ -78,19 +87,19 @@ MUTANTS = (
         "input-velocity-refused-and-driven",
         "An invalid velocity is refused, and the robot drives.",
         "velocity-refused",
-        _after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)),
+        after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)),
     ),
     _mutant(
         "input-goal-refused-and-taken",
         "An invalid goal is refused, and the robot has a goal.",
         "goal-refused",
-        _after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)),
+        after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)),
     ),
     _mutant(
         "input-delivery-refused-and-made",
         "An invalid delivery is refused, and published.",
         "delivery-refused",
-        _after_refusal(deliveries, _deliver),
+        after_refusal(deliveries, _deliver),
         observer=True,
     ),
     _mutant(

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import Any
 from urllib.parse import parse_qsl
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     LINEAR,

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from conformance.selftest.change import Change, IncompleteRequest
+from conformance.selftest.messages import Change, IncompleteRequest
 
 
 @dataclass(frozen=True)

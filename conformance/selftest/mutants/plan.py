@@ -28,9 +28,9 @@ def _told(edit: Callable[[Any], Any]) -> Make:
     return altered(_GET, values(edit))
 
 
-def _led(edit: Callable[[list[Any]], list[Any]], **more: int) -> Make:
+def _led(edit: Callable[[list[Any]], list[Any]], nth: int = 1) -> Make:
     """The plan has other poses."""
-    return altered(_GET, values(lambda value: value["plan"].update(poses=edit(value["plan"]["poses"]))), **more)
+    return altered(_GET, values(lambda value: value["plan"].update(poses=edit(value["plan"]["poses"]))), nth=nth)
 
 
 def _moved(pose: Any, x: float, y: float) -> Any:

@@ -5,8 +5,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import POSE, Make, altered, instead, parsed, plain, problem, rest, values
 from conformance.selftest.mutants.mutant import of_class
 
@@ -21,9 +20,9 @@ def _orientation(odometry: Any) -> Any:
     return odometry["pose"]["pose"]["orientation"]
 
 
-def _told(edit: Callable[[Any], Any], **more: int) -> Make:
+def _told(edit: Callable[[Any], Any], nth: int = 1) -> Make:
     """The odometry is altered on its way to the client."""
-    return altered(_AT, values(edit), **more)
+    return altered(_AT, values(edit), nth=nth)
 
 
 def _scaled(factor: float) -> Callable[[Any], None]:

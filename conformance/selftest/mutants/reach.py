@@ -2,8 +2,7 @@
 
 from collections.abc import Callable
 
-from conformance.selftest.change import HangUpError
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import HangUpError, Request, Response
 from conformance.selftest.mutants.changes import hanging_up, instead, plain, rest
 from conformance.selftest.mutants.mutant import Mutant
 

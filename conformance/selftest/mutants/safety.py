@@ -1,19 +1,19 @@
 """Robots that are dangerous: they go on, go too fast, or start by themselves."""
 
 import time
-from collections.abc import Callable
 from typing import Any
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response, unchanged
 from conformance.selftest.mutants.changes import (
     GOAL,
     LINEAR,
     VELOCITY,
     altered,
+    guarded,
     inputs,
     parsed,
     plain,
+    problem,
     rest,
     rewritten,
     success,
@@ -21,7 +21,7 @@ from conformance.selftest.mutants.changes import (
 )
 from conformance.selftest.mutants.goal_memory import active
 from conformance.selftest.mutants.in_background import later
-from conformance.selftest.mutants.input_effects import drive, goal_ahead, sent
+from conformance.selftest.mutants.input_effects import after_refusal, drive, goal_ahead, sent
 from conformance.selftest.mutants.mutant import of_class
 
 _PUT = rest("PUT", VELOCITY)
@@ -87,14 +87,14 @@ class _Once:
         self._last: Any = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        if _PUT(request):
-            value = parsed(request.body)
-            if value is not None and value == self._last and moving(request):
-                return plain(204)(request)
-            response = forward(request)
-            self._last = value if success(response) else self._last
-            return response
-        return forward(request)
+        if not _PUT(request):
+            return forward(request)
+        value = parsed(request.body)
+        if value is not None and value == self._last and moving(request):
+            return plain(204)(request)
+        response = forward(request)
+        self._last = value if success(response) else self._last
+        return response
 
 
 class _SlowCancel:
@@ -110,8 +110,7 @@ class _SlowCancel:
             later(3.0, sent, request.copy(), forward, "DELETE", GOAL)
             return plain(204)(request)
         if gone and rest("GET DELETE", GOAL)(request):
-            body = b'{"status": 404, "detail": "there is no goal"}'
-            return plain(404, body, "application/problem+json")(request)
+            return problem(404, "there is no goal")(request)
         return forward(request)
 
 
@@ -123,16 +122,10 @@ def _second_wind(request: Request, forward: Forward) -> Response:
     return response
 
 
-def _clamped(twist: Any) -> None:
-    for part, axis, limit in (("linear", "x", 0.25), ("angular", "z", 1.0)):
-        value = twist[part][axis]
-        if isinstance(value, int | float):
-            twist[part][axis] = max(-limit, min(limit, value))
-
-
-def _clamped_vector(vector: Any) -> None:
-    if isinstance(vector.get("x"), int | float):
-        vector["x"] = max(-0.25, min(0.25, vector["x"]))
+def _clamped(value: Any) -> None:
+    for vector, axis, limit in ((value.get("linear", value), "x", 0.25), (value.get("angular", {}), "z", 1.0)):
+        if isinstance(vector.get(axis), int | float):
+            vector[axis] = max(-limit, min(limit, vector[axis]))
 
 
 def _two_wheeled(twist: Any) -> None:
@@ -141,29 +134,11 @@ def _two_wheeled(twist: Any) -> None:
             twist[part][axis] = 0.0
 
 
-def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
-    def apply(value: Any) -> None:
-        try:
-            edit(value)
-        except (TypeError, KeyError, AttributeError):
-            return
-
-    return apply
-
-
 def _too_fast(twist: Any) -> None:
     """What is measured is four times what is driven, above a crawl."""
     for part, axis in (("linear", "x"), ("angular", "z")):
         if abs(twist[part][axis]) > 0.15:
             twist[part][axis] *= 4
-
-
-def _stopping(request: Request, forward: Forward) -> Response:
-    """A refused velocity stops the robot."""
-    response = forward(request)
-    if _PUTS(request) and response.status in {400, 422}:
-        drive(request, forward, 0.0)
-    return response
 
 
 class _Stubborn:
@@ -174,7 +149,6 @@ class _Stubborn:
         self._turn = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
         if not _PUT(request):
             return forward(request)
         self._turn += 1
@@ -202,69 +176,61 @@ def _zero(value: Any) -> bool:
         return False
 
 
-def _incomplete_drive() -> Callable[[str, bytes, Forward], None]:
-    """A request that ends in the middle is carried out with what had come."""
-
-    def incomplete_request(side: str, _octets: bytes, forward: Forward) -> None:
-        if side == "rest":
-            drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
-
-    return incomplete_request
-
-
-def _unchanged() -> Callable[[Request, Forward], Response]:
-    return lambda request, forward: forward(request)
+def _torn(side: str, _octets: bytes, forward: Forward) -> None:
+    """What had come of a request is carried out."""
+    if side == "rest":
+        drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
 
 
 _mutant = of_class("safety", "rest")
 
 MUTANTS = (
-    _mutant("safety-relentless", "A velocity holds for ten seconds.", ("watchdog",), _Relentless),
-    _mutant("safety-short-of-breath", "A velocity holds for 0.15 s.", ("hold",), _ShortOfBreath),
-    _mutant("safety-no-renewal", "The same velocity again does not renew it.", ("renewal",), _Once),
+    _mutant("safety-relentless", "A velocity holds for ten seconds.", "watchdog", _Relentless),
+    _mutant("safety-short-of-breath", "A velocity holds for 0.15 s.", "hold", _ShortOfBreath),
+    _mutant("safety-no-renewal", "The same velocity again does not renew it.", "renewal", _Once),
     _mutant(
-        "safety-no-stop",
-        "A velocity of zero is answered, and the robot goes on for three seconds.",
-        ("stop",),
-        _Stubborn,
+        "safety-no-stop", "A velocity of zero is answered, and the robot goes on for three seconds.", "stop", _Stubborn
     ),
     _mutant(
         "safety-clamped",
         "A velocity beyond the limits is cut to them.",
-        ("limits-refused",),
-        rewritten(
-            _PUTS, inputs(_guarded(lambda value: _clamped(value) if "linear" in value else _clamped_vector(value)))
-        ),
+        "limits-refused",
+        rewritten(_PUTS, inputs(guarded(_clamped))),
     ),
     _mutant(
         "safety-unactuated-ignored",
         "Components that the robot does not have are ignored.",
-        ("unactuated-refused",),
-        rewritten(_PUT, inputs(_guarded(_two_wheeled))),
+        "unactuated-refused",
+        rewritten(_PUT, inputs(guarded(_two_wheeled))),
     ),
     _mutant(
         "safety-too-fast",
         "The robot drives at four times its speed.",
-        ("limits-hold",),
+        "limits-hold",
         altered(rest("GET", VELOCITY), values(_too_fast)),
     ),
-    _mutant("safety-refused-stops", "A refused velocity stops the robot.", ("refused-keeps",), lambda: _stopping),
-    _mutant("safety-slow-cancel", "After DELETE the robot drives on for three seconds.", ("cancel",), _SlowCancel),
     _mutant(
-        "safety-second-wind", "A second after DELETE the robot drives again.", ("cancel-stays",), lambda: _second_wind
+        "safety-refused-stops",
+        "A refused velocity stops the robot.",
+        "refused-keeps",
+        after_refusal(_PUTS, lambda request, forward: drive(request, forward, 0.0)),
+    ),
+    _mutant("safety-slow-cancel", "After DELETE the robot drives on for three seconds.", "cancel", _SlowCancel),
+    _mutant(
+        "safety-second-wind", "A second after DELETE the robot drives again.", "cancel-stays", lambda: _second_wind
     ),
     _mutant(
         "safety-torn-drives",
         "A request that ends in the middle moves the robot.",
-        ("client-vanished",),
-        _unchanged,
-        incomplete_request=_incomplete_drive,
+        "client-vanished",
+        lambda: unchanged,
+        incomplete_request=lambda: _torn,
     ),
     _mutant(
         "safety-one-at-a-time",
         "A request that is never completed keeps all others waiting.",
-        ("half-request",),
-        _unchanged,
+        "half-request",
+        lambda: unchanged,
         serial=True,
     ),
 )

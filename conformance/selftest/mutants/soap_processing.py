@@ -6,8 +6,7 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, posted, rewritten, soap, xml
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import coded, enveloped, fault, is_fault

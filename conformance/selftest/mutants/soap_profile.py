@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 from lxml import etree
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import (
     Make,
     altered,

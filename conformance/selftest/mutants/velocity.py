@@ -4,8 +4,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import (
     GOAL,
     JSON,
@@ -119,9 +118,9 @@ def _good(twist: Any) -> bool:
         return False
 
 
-def _told(edit: Callable[[Any], Any], **more: int) -> Make:
+def _told(edit: Callable[[Any], Any], nth: int = 1) -> Make:
     """The measured velocity is altered on its way to the client."""
-    return altered(_GET, values(edit), **more)
+    return altered(_GET, values(edit), nth=nth)
 
 
 def _driven(edit: Callable[[Any], Any]) -> Make:

@@ -6,8 +6,7 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.selftest.change import Forward
-from conformance.selftest.messages import Request, Response
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import (
     TNS,
     Make,
