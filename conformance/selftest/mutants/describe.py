@@ -4,21 +4,9 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.selftest.mutants.changes import (
-    SENSORS,
-    Make,
-    altered,
-    each,
-    gone,
-    instead,
-    plain,
-    problem,
-    rest,
-    text,
-    tree,
-    values,
-)
+from conformance.selftest.mutants.changes import SENSORS, Make, altered, instead, plain, problem, rest, text, values
 from conformance.selftest.mutants.mutant import of_class
+from conformance.selftest.mutants.xml_trees import each, gone, tree
 
 _OPENAPI, _WADL = rest("GET", "/openapi.json"), rest("GET", "/application.wadl")
 

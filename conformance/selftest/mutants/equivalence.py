@@ -9,16 +9,12 @@ from conformance.selftest.mutants.changes import (
     VELOCITY,
     altered,
     deliveries,
-    each,
-    gone,
     inputs,
     instead,
-    named,
     plain,
     rest,
     rewritten,
     soap,
-    tree,
     values,
 )
 from conformance.selftest.mutants.delivery import segments
@@ -35,6 +31,7 @@ from conformance.selftest.mutants.distortion import (
 )
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped
+from conformance.selftest.mutants.xml_trees import each, gone, named, tree
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")

@@ -12,15 +12,14 @@ from conformance.selftest.mutants.changes import (
     VELOCITY,
     altered,
     header,
-    named,
     problem,
     rest,
     rewritten,
     success,
     text,
-    tree,
 )
 from conformance.selftest.mutants.mutant import of_class
+from conformance.selftest.mutants.xml_trees import named, tree
 
 _GET = rest("GET")
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)

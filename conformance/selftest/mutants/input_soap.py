@@ -8,9 +8,10 @@ from lxml import etree
 
 from conformance.contract.delivery import XSD_FIELDS
 from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import SOAP, TNS, altered, named, rewritten, soap, xml
+from conformance.selftest.mutants.changes import SOAP, TNS, altered, rewritten, soap
 from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.mutants.soap_responses import is_fault
+from conformance.selftest.mutants.xml_trees import named, xml
 
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 _ANY = soap()

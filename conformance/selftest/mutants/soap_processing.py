@@ -7,9 +7,10 @@ from typing import Any
 from lxml import etree
 
 from conformance.selftest.messages import Forward, Request, Response
-from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, posted, rewritten, soap, xml
+from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, posted, rewritten, soap
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import coded, enveloped, fault, is_fault
+from conformance.selftest.mutants.xml_trees import xml
 
 
 def _foreign(request: Request) -> bool:

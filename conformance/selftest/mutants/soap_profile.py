@@ -10,16 +10,12 @@ from conformance.selftest.mutants.changes import (
     altered,
     anything,
     becomes,
-    each,
-    gone,
     header,
     page,
     posted,
-    says,
     soap,
     status,
     text,
-    tree,
 )
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import (
@@ -40,6 +36,7 @@ from conformance.selftest.mutants.soap_responses import (
     unqualified,
     wrapper_as_asked,
 )
+from conformance.selftest.mutants.xml_trees import each, gone, says, tree
 
 _PAGE = b"<html><body>Internal Server Error</body></html>"
 _ANY = soap()

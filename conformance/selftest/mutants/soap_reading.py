@@ -5,8 +5,9 @@ from collections.abc import Callable
 from typing import Any
 
 from conformance.selftest.messages import Request
-from conformance.selftest.mutants.changes import altered, each, gone, named, rewritten, says, soap, text, tree
+from conformance.selftest.mutants.changes import altered, rewritten, soap, text
 from conformance.selftest.mutants.mutant import of_class
+from conformance.selftest.mutants.xml_trees import each, gone, named, says, tree
 
 _POSE, _VELOCITY, _PLAN = soap("GetPose"), soap("GetVelocity"), soap("GetPlan")
 

@@ -11,7 +11,8 @@ from typing import Any
 from lxml import etree
 
 from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import SOAP, each, tree
+from conformance.selftest.mutants.changes import SOAP
+from conformance.selftest.mutants.xml_trees import each, tree
 
 TRACE = (
     "java.lang.NullPointerException\n\tat org.mybot.turtlebot.soap.Publishers.execute(Publishers.java:41)\n"

@@ -9,19 +9,17 @@ from conformance.selftest.mutants.changes import (
     TNS,
     Make,
     altered,
-    each,
-    gone,
     instead,
     page,
     rewritten,
     soap,
     success,
     text,
-    tree,
     wsdls,
 )
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped, fault, in_body, other_namespace, with_content
+from conformance.selftest.mutants.xml_trees import each, gone, tree
 
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _ACT, _READ = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"), soap("Get[A-Z][A-Za-z]+")

@@ -7,21 +7,10 @@ from typing import Any
 from lxml import etree
 
 from conformance.selftest.messages import Forward, Request, Response
-from conformance.selftest.mutants.changes import (
-    TNS,
-    Make,
-    altered,
-    gone,
-    hanging_up,
-    instead,
-    named,
-    plain,
-    text,
-    tree,
-    wsdls,
-)
+from conformance.selftest.mutants.changes import TNS, Make, altered, hanging_up, instead, plain, text, wsdls
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import latin
+from conformance.selftest.mutants.xml_trees import gone, named, tree
 
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _XSD = "http://www.w3.org/2001/XMLSchema"

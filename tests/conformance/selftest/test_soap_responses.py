@@ -5,7 +5,8 @@ from lxml import etree
 
 from conformance.selftest.messages import Request
 from conformance.selftest.mutants import soap_responses as edits
-from conformance.selftest.mutants.changes import SOAP, becomes, each, named, page, says, tree
+from conformance.selftest.mutants.changes import SOAP, becomes, page
+from conformance.selftest.mutants.xml_trees import each, named, says, tree
 
 ASKED = Request("soap", "POST", "/")
 
