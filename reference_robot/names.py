@@ -68,9 +68,6 @@ class RosNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def load_names(path: Path | None = None) -> RosNames:
     """Read names from a TOML file; keys that it leaves out keep their defaults.
 
-    Args:
-        path: The file, or None for the names that come with the robot.
-
     Raises:
         TomlFileError: The file cannot be read, is no TOML, or has an unknown or unusable key.
     """

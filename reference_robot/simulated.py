@@ -21,13 +21,7 @@ class SimulationError(RuntimeError):
 
 
 class SimulatedRobot:
-    """The simulation in a process of its own, with a watch on its end.
-
-    Args:
-        domain_id: The ROS domain.
-        time_scale: How many times faster the robot moves.
-        config: The TOML file of names, None for the robot's own.
-    """
+    """The simulation in a process of its own, with a watch on its end."""
 
     def __init__(self, domain_id: int, time_scale: float, config: Path | None) -> None:
         self._command = [

@@ -28,12 +28,7 @@ for _axis, _variance in ((0, 1e-4), (7, 1e-4), (35, 1e-3)):
 
 
 class Base:
-    """A differential-drive base on the ROS graph.
-
-    Args:
-        node: The node to work through.
-        names: Topics and frames; ``velocity.message`` says which type cmd_vel has.
-        time_scale: How many times faster than real time the body moves; at most 25 times.
+    """A differential-drive base on the ROS graph; ``time_scale`` makes it up to 25 times faster than real time.
 
     Attributes:
         motion: The body's pose and velocity now.

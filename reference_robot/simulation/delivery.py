@@ -6,6 +6,7 @@ cancelled or displaced from outside fails its mission and drops the queue, and s
 else's goal while missions wait: an operator who stops the robot wants it to stay stopped.
 """
 
+import itertools
 import json
 import math
 import time
@@ -19,14 +20,13 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header, String
 
+from conformance.contract.delivery import COFFEE, COURIER
+from reference_robot.deliveries import DeliveryRequest
 from reference_robot.names import RosNames
 from reference_robot.simulation.messages import LATCHED, stamped_pose
-from reference_robot.simulation.missions import DeliveryRequest, Missions, MissionState
+from reference_robot.simulation.missions import Missions, MissionState
 
-_CODES: Final = frozenset(
-    {DeliveryRequestMsg.COURIER_DELIVERY_MESSAGE_CODE, DeliveryRequestMsg.COFFEE_DELIVERY_MESSAGE_CODE}
-)
-
+_CODES: Final = frozenset({COURIER, COFFEE})
 _REPORT_PERIOD_S: Final = 0.05  # at least this between two reports, however fast requests come
 _RETRY_PERIOD_S: Final = 0.2  # while navigation's action server is not there
 
@@ -41,12 +41,7 @@ _CURRENT_GOALS: Final = QoSProfile(
 
 
 class Delivery:
-    """Runs missions.
-
-    Args:
-        node: The node to work through.
-        names: Topics, actions and frames.
-    """
+    """Runs missions."""
 
     def __init__(self, node: Node, names: RosNames) -> None:
         self._node = node
@@ -70,15 +65,7 @@ class Delivery:
                 f"ignored a request with the unknown message code {message.message_code}", throttle_duration_sec=1.0
             )
             return
-        request = DeliveryRequest(
-            message.message_code,
-            message.depot_x,
-            message.depot_y,
-            message.destination_x,
-            message.destination_y,
-            message.source_x,
-            message.source_y,
-        )
+        request = DeliveryRequest(*(getattr(message, field) for field in DeliveryRequest._fields))
         mission = self._missions.add(request, divmod(time.time_ns(), 1_000_000_000))
         if mission.state is MissionState.QUEUED:
             self._begin()
@@ -104,11 +91,11 @@ class Delivery:
         mission = self._missions.begin()
         if mission is None:
             return
-        x, y = mission.request.stops()[-1]
-        self._legs = []
-        for stop_x, stop_y in mission.request.stops():
-            self._legs.append((stop_x, stop_y, math.atan2(stop_y - y, stop_x - x)))
-            x, y = stop_x, stop_y
+        stops = mission.stops()
+        self._legs = [
+            (x, y, math.atan2(y - from_y, x - from_x))
+            for (from_x, from_y), (x, y) in itertools.pairwise((stops[-1], *stops))
+        ]
         self._changed()
         self._next_leg()
 

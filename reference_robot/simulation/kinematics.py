@@ -53,17 +53,10 @@ def advance(
     limits: Limits,
     is_free: Callable[[float, float], bool],
 ) -> Motion:
-    """Move on for some seconds towards a velocity setpoint.
+    """Move on for some seconds towards a velocity setpoint (m/s, rad/s), which is clamped to the limits.
 
     Against a wall the body stays where it is while its wheels go on turning: the velocity is the one
     that wheel encoders would measure.
-
-    Args:
-        motion: The state now.
-        setpoint: Wanted velocity (m/s, rad/s); clamped to the limits.
-        seconds: Simulated time step.
-        limits: Velocity and acceleration limits.
-        is_free: Whether the body may stand at x, y.
     """
     linear = _approach(motion.linear, within(setpoint[0], limits.linear), limits.linear_acceleration * seconds)
     angular = _approach(motion.angular, within(setpoint[1], limits.angular), limits.angular_acceleration * seconds)

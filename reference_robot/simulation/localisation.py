@@ -1,18 +1,13 @@
 """Where the robot is, as its odometry says."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from nav_msgs.msg import Odometry
+from rclpy.node import Node
 
 from reference_robot.names import RosNames
 from reference_robot.simulation.messages import PoseError, yaw_of
 from reference_robot.simulation.planner import Pose
-
-if TYPE_CHECKING:
-    from rclpy.node import Node
 
 
 class Localisation:

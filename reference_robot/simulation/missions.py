@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
 
+from reference_robot.deliveries import DeliveryRequest
+
 _REMEMBERED: Final = 100
 
 
@@ -22,23 +24,6 @@ class MissionState(StrEnum):
     DROPPED = "dropped"
 
 
-@dataclass(frozen=True, slots=True)
-class DeliveryRequest:
-    """The fields of mybot_delivery_app/DeliveryRequestMsg; positions in metres in the map frame."""
-
-    message_code: int
-    depot_x: float
-    depot_y: float
-    destination_x: float
-    destination_y: float
-    source_x: float
-    source_y: float
-
-    def stops(self) -> tuple[tuple[float, float], ...]:
-        """Where the robot goes, in order: source, destination, depot."""
-        return ((self.source_x, self.source_y), (self.destination_x, self.destination_y), (self.depot_x, self.depot_y))
-
-
 @dataclass(slots=True)
 class Mission:
     """A request, when it was accepted (seconds and nanoseconds of ROS time), and its state."""
@@ -47,22 +32,26 @@ class Mission:
     accepted: tuple[int, int]
     state: MissionState = MissionState.QUEUED
 
+    def stops(self) -> tuple[tuple[float, float], ...]:
+        """Where the robot goes, in order: source, destination, depot."""
+        asked = self.request
+        return (
+            (asked.source_x, asked.source_y),
+            (asked.destination_x, asked.destination_y),
+            (asked.depot_x, asked.depot_y),
+        )
+
     def plain(self) -> dict[str, Any]:
         """Return JSON-ready values, as they stand on the topic of missions."""
-        request = self.request
         return {
-            "request": {name: getattr(request, name) for name in DeliveryRequest.__slots__},
+            "request": self.request._asdict(),
             "state": self.state.value,
             "accepted": {"sec": self.accepted[0], "nanosec": self.accepted[1]},
         }
 
 
 class Missions:
-    """A bounded queue of missions, the one that drives, and a memory of the last hundred.
-
-    Args:
-        capacity: How many may wait.
-    """
+    """A queue of at most ``capacity`` missions, the one that drives, and a memory of the last hundred."""
 
     def __init__(self, capacity: int = 20) -> None:
         self._capacity = capacity

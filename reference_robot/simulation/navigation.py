@@ -59,15 +59,7 @@ class _Drive:
 
 
 class Navigation:
-    """Serves NavigateToPose.
-
-    Args:
-        node: The node to work through.
-        names: Topics, actions and frames.
-        planner: Plans in the office.
-        localisation: Where the robot is; each update is one step of control.
-        time_scale: How many times faster than real time the robot moves.
-    """
+    """Serves NavigateToPose; each update of the localisation is one step of control."""
 
     def __init__(
         self, node: Node, names: RosNames, planner: Planner, localisation: Localisation, time_scale: float = 1.0

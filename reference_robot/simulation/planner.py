@@ -40,12 +40,7 @@ class PlanError(ValueError):
 
 
 class Planner:
-    """Plans paths in one office.
-
-    Args:
-        office: The walls.
-        clearance: Metres that a path keeps from them.
-    """
+    """Plans paths in one office, with a clearance (m) from its walls."""
 
     def __init__(self, office: Office, clearance: float = CLEARANCE) -> None:
         self._walls = office

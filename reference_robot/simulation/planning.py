@@ -19,14 +19,7 @@ from reference_robot.simulation.planner import PlanError, Planner, Pose
 
 
 class Planning:
-    """Answers requests for plans without driving.
-
-    Args:
-        node: The node to work through.
-        names: Services, actions and frames.
-        planner: Plans in the office.
-        localisation: Where a plan starts that names no start.
-    """
+    """Answers requests for plans without driving; one that names no start starts where the robot is."""
 
     def __init__(self, node: Node, names: RosNames, planner: Planner, localisation: Localisation) -> None:
         self._node = node

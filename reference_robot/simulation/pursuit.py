@@ -30,11 +30,7 @@ class Command:
 
 
 class Pursuit:
-    """Follows one path.
-
-    Args:
-        path: (k, 3) poses as the planner returns them.
-    """
+    """Follows one path: (k, 3) poses as the planner returns them."""
 
     def __init__(self, path: Floats) -> None:
         self._path = path

@@ -13,12 +13,7 @@ from reference_robot.simulation.sensors import Sensors
 
 
 class Simulation:
-    """The robot's nodes ``base``, ``navigation`` and ``delivery`` on a runtime.
-
-    Args:
-        ros: The runtime that spins and destroys the nodes; starting it is the caller's affair.
-        names: Topics, services, actions and frames.
-        time_scale: How many times faster than real time the robot moves; ROS time stays wall time.
+    """The robot's nodes ``base``, ``navigation`` and ``delivery`` on a runtime; ROS time stays wall time.
 
     Raises:
         ValueError: The time scale is not positive.

@@ -31,13 +31,7 @@ _EMPTY_V: Final = 14.0
 
 
 class Sensors:
-    """Publishes what the body senses.
-
-    Args:
-        node: The node to work through.
-        names: Topics and frames.
-        motion: Gives the body's pose and velocity now.
-    """
+    """Publishes what the body senses."""
 
     def __init__(self, node: Node, names: RosNames, motion: Callable[[], Motion]) -> None:
         self._clock = node.get_clock()

@@ -28,15 +28,6 @@ from reference_robot.webservices.soap.subscribers import SubscribersWebService
 
 
 @dataclass(frozen=True)
-class RosSide:
-    """The nodes that everything shares, and the way to call ROS through them."""
-
-    publishers: RobotPublishersNode
-    subscribers: RobotSubscribersNode
-    calls: RosCalls
-
-
-@dataclass(frozen=True)
 class Endpoints:
     """Where the two interfaces listen: host, and the ports that were really bound."""
 
@@ -56,18 +47,15 @@ class Endpoints:
 
 
 def interfaces(
-    ros: RosSide, configuration: Configuration, endpoints: Endpoints, authorization: Authorization
+    publishers: RobotPublishersNode,
+    subscribers: RobotSubscribersNode,
+    configuration: Configuration,
+    endpoints: Endpoints,
+    authorization: Authorization,
 ) -> tuple[RestInterface, SoapInterface]:
-    """Return both interfaces, which share the nodes and everything that is known about the robot.
-
-    Args:
-        ros: The robot.
-        configuration: Names, limits and deadlines.
-        endpoints: Where the interfaces listen.
-        authorization: Who may call.
-    """
-    publishers, subscribers, calls = ros.publishers, ros.subscribers, ros.calls
+    """Return both interfaces, which share the nodes and everything that is known about the robot."""
     frames = configuration.frames
+    calls = RosCalls(publishers.node.executor, configuration.web.deadline)
     goals = Goals(publishers, subscribers, calls, frames)
     odometry = LatestOdometry(subscribers)
     velocity = Velocity(publishers, odometry, configuration.web, goals.is_active)

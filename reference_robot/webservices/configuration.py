@@ -35,10 +35,7 @@ class Configuration(RosNames, frozen=True, forbid_unknown_fields=True):
 
 
 def load_configuration(path: Path | None) -> Configuration:
-    """Read a configuration; what it leaves out keeps its default.
-
-    Args:
-        path: A TOML file with the tables of ``names.toml`` and the table ``[web]``; None for all defaults.
+    """Read a configuration: the tables of ``names.toml`` and ``[web]``; what it leaves out keeps its default.
 
     Raises:
         TomlFileError: The file cannot be read, is no TOML, or has an unknown or unusable key.

@@ -31,18 +31,12 @@ def bound(host: str, port: int) -> socket.socket:
         PortInUseError: The address cannot be had.
     """
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        listener = socket.socket(family, kind, protocol)
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+        # It listens already, so that a port in use is found out at once.
+        listener = socket.create_server(
+            address, family=family, backlog=_BACKLOG, dualstack_ipv6=family == socket.AF_INET6
+        )
     except OSError as error:
-        raise PortInUseError(f"cannot listen on {host} port {port}: {error}") from error
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-        listener.listen(_BACKLOG)  # here and not later, so that a port in use is found out at once
-    except OSError as error:
-        listener.close()
         raise PortInUseError(f"cannot listen on {host} port {port}: {error}") from error
     listener.settimeout(0)  # never blocks: the event loop is who waits
     return listener
@@ -70,12 +64,7 @@ class _Server(uvicorn.Server):
 
 
 class EndpointPublisher:
-    """Serves interfaces until it is told to stop.
-
-    Args:
-        interfaces: Each interface with the bound socket that it listens on.
-        read_deadline: Seconds that a client may take to send one request.
-    """
+    """Serves interfaces until it is told to stop; a client may take ``read_deadline`` seconds to send one request."""
 
     def __init__(self, interfaces: list[tuple[Interface, socket.socket]], read_deadline: float) -> None:
         self._read_deadline = read_deadline
@@ -83,12 +72,7 @@ class EndpointPublisher:
         self._servers = [_Server(_settings(interface)) for interface, _ in interfaces]
 
     async def serve(self, stop: asyncio.Event, started: asyncio.Event) -> None:
-        """Answer requests.
-
-        Args:
-            stop: Set by whoever wants the endpoints to close; answers under way are finished first.
-            started: Set here when all endpoints answer.
-        """
+        """Answer requests, setting ``started``, until ``stop`` is set; answers under way are finished then."""
         async with asyncio.TaskGroup() as group:
             sweeping = group.create_task(self._end_overdue_requests())
             for server, listener in zip(self._servers, self._listeners, strict=True):

@@ -19,13 +19,7 @@ _DELIVERY_PATHS: Final = b"/robot/app/delivery/"
 
 
 class RestInterface(Interface):
-    """Serves resources.
-
-    Args:
-        resources: Those with a fixed path.
-        delivery: The one with values in its path.
-        authorization: Who may call.
-    """
+    """Serves resources with a fixed path, and the delivery, which has values in its path."""
 
     def __init__(self, resources: Iterable[Resource], delivery: Delivery, authorization: Authorization) -> None:
         super().__init__(authorization)

@@ -1,24 +1,21 @@
 """RobotWebServiceNodesRunner: starts nodes and endpoints, and stops them (paper; apart from the endpoint itself)."""
 
 import asyncio
-import contextlib
 import os
 import resource
 import signal
-import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import uvloop
 
 from reference_robot.ros import RosRuntime
-from reference_robot.webservices.assembly import Endpoints, RosSide, interfaces
+from reference_robot.webservices.assembly import Endpoints, interfaces
 from reference_robot.webservices.configuration import Configuration
 from reference_robot.webservices.endpoint import EndpointPublisher, bound
 from reference_robot.webservices.http.authorization import Authorization
-from reference_robot.webservices.nodes.calls import RosCalls
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
@@ -42,13 +39,7 @@ class Listening:
 
 
 class RobotWebServiceNodesRunner:
-    """Runs the web services of one robot.
-
-    Args:
-        configuration: Names, limits and deadlines.
-        listening: Addresses and who may call.
-        domain_id: The ROS domain; None takes the environment's.
-    """
+    """Runs the web services of one robot."""
 
     def __init__(self, configuration: Configuration, listening: Listening, domain_id: int | None) -> None:
         self._configuration = configuration
@@ -56,11 +47,7 @@ class RobotWebServiceNodesRunner:
         self._domain_id = domain_id
 
     def run(self, ready: Callable[[Endpoints], None], *, wait_for_robot: bool) -> None:
-        """Serve until SIGINT or SIGTERM.
-
-        Args:
-            ready: Called once, when both interfaces answer.
-            wait_for_robot: Whether odometry and the listeners of commands must be there first.
+        """Serve until SIGINT or SIGTERM; ``ready`` is called once, when both interfaces answer.
 
         Raises:
             PortInUseError: A port cannot be had.
@@ -71,24 +58,20 @@ class RobotWebServiceNodesRunner:
         # Fast DDS then sends from a thread of its own, which saves a delivery PUT a quarter of its time; nothing is
         # lost, because the publisher keeps all that has not been acknowledged. Other middleware ignores it.
         os.environ.setdefault("RMW_FASTRTPS_PUBLICATION_MODE", "ASYNCHRONOUS")
-        with self._sockets() as (rest, soap), RosRuntime(self._domain_id) as ros:
-            endpoints = Endpoints(self._listening.host, rest.getsockname()[1], soap.getsockname()[1])
+        host = self._listening.host
+        with (
+            bound(host, self._listening.rest_port) as rest,
+            bound(host, self._listening.soap_port) as soap,
+            RosRuntime(self._domain_id) as ros,
+        ):
+            endpoints = Endpoints(host, rest.getsockname()[1], soap.getsockname()[1])
             publishers, subscribers = RobotPublishersNode(ros, configuration), RobotSubscribersNode(ros, configuration)
             ros.start()
             if wait_for_robot:
                 _await_robot(publishers, subscribers)
-            calls = RosCalls(publishers.node.executor, configuration.web.deadline)
-            pair = interfaces(
-                RosSide(publishers, subscribers, calls), configuration, endpoints, self._listening.authorization
-            )
+            pair = interfaces(publishers, subscribers, configuration, endpoints, self._listening.authorization)
             publisher = EndpointPublisher(list(zip(pair, (rest, soap), strict=True)), configuration.web.read_deadline)
             uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
-
-    @contextlib.contextmanager
-    def _sockets(self) -> Iterator[tuple[socket.socket, socket.socket]]:
-        host = self._listening.host
-        with bound(host, self._listening.rest_port) as rest, bound(host, self._listening.soap_port) as soap:
-            yield rest, soap
 
 
 async def _serve_until_signalled(publisher: EndpointPublisher, ready: Callable[[], None]) -> None:

@@ -15,11 +15,7 @@ def url_of(host: str, port: int) -> str:
 
 
 class Address:
-    """The base URL of an interface.
-
-    Args:
-        bound: The URL of the socket, for clients whose Host field is no address.
-    """
+    """The base URL of an interface: ``bound``, the socket's, for clients whose Host field is no address."""
 
     def __init__(self, bound: str) -> None:
         self._bound = bound

@@ -15,11 +15,7 @@ class TokenFileError(ValueError):
 
 
 class Authorization:
-    """Lets requests through that carry the token.
-
-    Args:
-        token: The token, or None where everybody may call.
-    """
+    """Lets requests through that carry the token; all of them where there is none."""
 
     def __init__(self, token: str | None) -> None:
         self._token = None if token is None else token.encode()

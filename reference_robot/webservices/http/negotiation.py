@@ -9,11 +9,7 @@ from reference_robot.webservices.representation.writing import JSON, XML
 
 @lru_cache(maxsize=256)
 def chosen(accept: bytes | None, offers: Sequence[str]) -> str:
-    """Return the offer that the client likes best; among equals the earliest one.
-
-    Args:
-        accept: The Accept field's value; None where the client sent none, which means anything.
-        offers: Media types without parameters, the default first.
+    """Return the media type that the client likes best, among equals the earliest; it likes any if it sent no Accept.
 
     Raises:
         Problem: 406, where no offer is acceptable (RFC 9110 15.5.7).

@@ -1,27 +1,20 @@
 """Asking ROS from the web server's event loop: hand over, wait with a deadline, come back."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rclpy.executors import Executor
+from rclpy.task import Future
 
 from reference_robot.webservices.representation.problems import not_yet
 
-if TYPE_CHECKING:
-    from rclpy.executors import Executor
-    from rclpy.task import Future
-
 
 class RosCalls:
-    """Calls services and actions for the event loop.
+    """Calls services and actions for the event loop, and waits ``deadline`` seconds for an answer.
 
     A call begins in the executor's thread: rclpy's action client registers a request after it has sent it, so an
     answer taken meanwhile by another thread would be dropped as unexpected.
-
-    Args:
-        executor: The executor that spins the nodes in a thread of its own.
-        deadline: Seconds to wait for an answer.
     """
 
     def __init__(self, executor: Executor, deadline: float) -> None:
@@ -29,11 +22,7 @@ class RosCalls:
         self._deadline = deadline
 
     async def result(self, begin: Callable[[], Future], what: str) -> Any:
-        """Return what ROS answers.
-
-        Args:
-            begin: Starts the call and returns rclpy's future; runs in the executor's thread.
-            what: The partner, for the error message.
+        """Return what ROS answers to ``begin``, which runs in the executor's thread; ``what`` is the partner's name.
 
         Raises:
             Problem: 503, when no answer came within the deadline.

@@ -1,8 +1,6 @@
 """RobotPublishersNode: everything that the web services send into ROS."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from action_msgs.srv import CancelGoal
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
@@ -10,14 +8,11 @@ from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
 from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.task import Future
 from unique_identifier_msgs.msg import UUID
 
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
-
-if TYPE_CHECKING:
-    from rclpy.publisher import Publisher
-    from rclpy.task import Future
 
 # Each accepted request is exactly one message (contract, ROS side): nothing gives way before it is acknowledged.
 _DELIVERY_QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL)
@@ -29,18 +24,13 @@ _VELOCITY_TYPES: Final[dict[str, Any]] = {
 
 
 class RobotPublishersNode:
-    """All publishers, and the clients of the actions that move the robot.
-
-    Args:
-        ros: The runtime that spins the node.
-        names: Topics and actions to bind to.
-    """
+    """All publishers, and the clients of the actions that move the robot."""
 
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self.node = ros.create_node("robot_publishers")
         self._names = names
-        self._delivery: Publisher = self.node.create_publisher(DeliveryRequestMsg, names.topics.delivery, _DELIVERY_QOS)
-        self._velocity: dict[str, Publisher] = {}
+        self._delivery = self.node.create_publisher(DeliveryRequestMsg, names.topics.delivery, _DELIVERY_QOS)
+        self._velocity: dict[str, Any] = {}
         self._navigation = ActionClient(self.node, NavigateToPose, names.actions.navigate_to_pose)
         self._cancel = self.node.create_client(CancelGoal, f"{names.actions.navigate_to_pose}/_action/cancel_goal")
         if names.velocity.message != "auto":
@@ -98,12 +88,7 @@ class RobotPublishersNode:
         return bool(self._navigation.server_is_ready())
 
     def send_goal(self, identity: bytes, pose: PoseStamped) -> Future:
-        """Send a goal; the future holds rclpy's ClientGoalHandle. Call it in the executor's thread.
-
-        Args:
-            identity: The 16 octets of the goal's UUID.
-            pose: Where to go, in a frame that the robot knows.
-        """
+        """Send a goal under a UUID's 16 octets, in the executor's thread; the future holds rclpy's ClientGoalHandle."""
         return self._navigation.send_goal_async(NavigateToPose.Goal(pose=pose), goal_uuid=UUID(uuid=list(identity)))
 
     def cancel_goal(self, identity: bytes) -> Future:

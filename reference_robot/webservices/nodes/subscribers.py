@@ -1,21 +1,17 @@
 """RobotSubscribersNode: everything that the web services learn from ROS."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from nav2_msgs.action import ComputePathToPose
 from nav_msgs.msg import Odometry
 from nav_msgs.srv import GetPlan
 from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.task import Future
 from std_msgs.msg import String
 
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
-
-if TYPE_CHECKING:
-    from rclpy.task import Future
 
 _LATCHED_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NAVIGATION_PACKAGES: Final = frozenset({"nav_msgs", "nav2_msgs", "map_msgs", "slam_toolbox"})

@@ -10,12 +10,7 @@ _SHOWN: Final = 120
 
 
 def checked(shape: Shape, plain: Any, where: str = "") -> Any:
-    """Return the data with every real number as a float.
-
-    Args:
-        shape: What is asked for.
-        plain: What was sent.
-        where: The field's path, for the message; empty at the root.
+    """Return the data with every real number as a float; ``where`` is the field's path, empty at the root.
 
     Raises:
         Problem: 422, with a detail that names the field and the value (RFC 9110 15.5.21).

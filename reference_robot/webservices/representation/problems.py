@@ -14,13 +14,7 @@ _NAMESPACE: Final = "urn:ietf:rfc:7807"  # RFC 9457 appendix B keeps RFC 7807's
 
 
 class Problem(Exception):  # noqa: N818 - RFC 9457's own name for it
-    """A request is refused.
-
-    Args:
-        status: HTTP status, 4xx for the client's fault and 5xx for the robot's.
-        detail: What was wrong, naming field and value.
-        headers: Further fields of the response, such as Allow or Retry-After.
-    """
+    """A request is refused: 4xx for the client's fault, 5xx for the robot's; the detail names field and value."""
 
     def __init__(self, status: int, detail: str, headers: tuple[tuple[bytes, bytes], ...] = ()) -> None:
         super().__init__(detail)

@@ -1,23 +1,20 @@
 """Request bodies as plain data: strict JSON (RFC 8259) and XML in the form that the robot sends."""
 
-from __future__ import annotations
-
 import codecs
 import json
 import math
 import re
 from collections import Counter
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
+
+from lxml import etree
 
 from reference_robot.webservices.representation.checking import checked, shown
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.shapes import Real, Record, Series, Text, Truth, Whole
 from reference_robot.webservices.representation.writing import JSON, XML
 from reference_robot.webservices.representation.xml_input import parsed
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 ACCEPTED: Final = (JSON, XML)
 
@@ -40,12 +37,7 @@ class _Beyond:
 
 
 def read(body: bytes, content_type: bytes | None, shape: Record) -> dict[str, Any]:
-    """Return a request body as plain data of the given shape.
-
-    Args:
-        body: The content, its size already bounded.
-        content_type: The Content-Type field's value, None where there is none.
-        shape: What the contract asks for.
+    """Return a request body, its size already bounded, as plain data of the given shape.
 
     Raises:
         Problem: 415 for another media type, 400 for what is no JSON or XML at all, 422 for the wrong shape or value.

@@ -75,10 +75,7 @@ _OPTIONAL: Final = {"std_msgs/Header": frozenset({"stamp"})}
 
 @cache
 def shape_of(message: Any) -> Record:
-    """Return the shape of a ROS message class.
-
-    Args:
-        message: A class that rosidl generated, such as ``geometry_msgs.msg.Twist``.
+    """Return the shape of a message class that rosidl generated.
 
     Raises:
         TypeError: The class has a field of a type that no web service carries (wide characters, long double).

@@ -51,11 +51,7 @@ _PARSER: Final = _new_parser()
 
 
 def parsed(body: bytes, charset: str | None = None) -> etree._Element:
-    """Return the root element of a document.
-
-    Args:
-        body: The document, its size already bounded.
-        charset: The media type's charset parameter, which outranks the document's own word (RFC 7303 3.2).
+    """Return the root element; the media type's charset outranks the document's own word (RFC 7303 3.2).
 
     Raises:
         Problem: 400 where the document is malformed, 415 where its encoding is neither UTF-8 nor UTF-16, and 400

@@ -4,20 +4,21 @@ import re
 from typing import ClassVar, Final
 from urllib.parse import unquote_to_bytes
 
+from conformance.contract.delivery import PATH_NAMES
+from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, wanted_format
-from reference_robot.webservices.robot.deliveries import Deliveries, DeliveryRequest, UnusableFieldError
+from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
 
 # The values of the path, in the order of the message's fields and by the path template's names.
-_COORDINATES: Final = ("depot_x", "depot_y", "dest_x", "dest_y", "source_x", "source_y")
-_NAMES: Final = ("code", *_COORDINATES)
+_NAMES: Final = ("code", *PATH_NAMES)
 _PREFIX: Final = "/robot/app/delivery/"
-_ANY: Final = re.compile((f"{_PREFIX}([^/]*)" + "".join(f"/{name}/([^/]*)" for name in _COORDINATES)).encode())
+_ANY: Final = re.compile((f"{_PREFIX}([^/]*)" + "".join(f"/{name}/([^/]*)" for name in PATH_NAMES)).encode())
 _WELL_FORMED: Final = re.compile(
-    (f"{_PREFIX}([+-]?[0-9]{{1,40}})" + "".join(f"/{name}/({NUMBER})" for name in _COORDINATES)).encode()
+    (f"{_PREFIX}([+-]?[0-9]{{1,40}})" + "".join(f"/{name}/({NUMBER})" for name in PATH_NAMES)).encode()
 )
 _CODE: Final = re.compile(rb"[+-]?[0-9]{1,40}")
 _NUMBER: Final = re.compile(NUMBER.encode())
@@ -26,7 +27,7 @@ _NUMBER: Final = re.compile(NUMBER.encode())
 class Delivery(Resource):
     """PUT publishes one DeliveryRequestMsg. The only resource with values in its path."""
 
-    path: ClassVar = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in _COORDINATES)
+    path: ClassVar = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in PATH_NAMES)
 
     def __init__(self, deliveries: Deliveries) -> None:
         self._deliveries = deliveries
@@ -40,12 +41,8 @@ class Delivery(Resource):
         """Accept a delivery, 204; a body is ignored. 422 for codes other than 3 and 4 and for bad numbers."""
         match = _WELL_FORMED.fullmatch(request.path)
         sent = _spelled_out(request.path) if match is None else match.groups()
-        code, depot_x, depot_y, dest_x, dest_y, source_x, source_y = sent
-        delivery = DeliveryRequest(
-            int(code), float(depot_x), float(depot_y), float(dest_x), float(dest_y), float(source_x), float(source_y)
-        )
         try:
-            self._deliveries.accept(delivery, "rest")
+            self._deliveries.accept(DeliveryRequest(int(sent[0]), *map(float, sent[1:])), "rest")
         except UnusableFieldError as error:
             place = DeliveryRequest._fields.index(error.field)
             raise error.refusal(_NAMES[place], _text(sent[place])) from error
@@ -73,7 +70,7 @@ def _spelled_out(path: bytes) -> tuple[bytes, ...]:
     code, *coordinates = values = tuple(unquote_to_bytes(group) for group in match.groups())
     if not _CODE.fullmatch(code):
         raise Problem(422, f"code must be an integer, not {shown(_text(code))}")
-    for name, value in zip(_COORDINATES, coordinates, strict=True):
+    for name, value in zip(PATH_NAMES, coordinates, strict=True):
         if not _NUMBER.fullmatch(value):
             raise Problem(422, f"{name} must be a number, not {shown(_text(value))}")
     return values

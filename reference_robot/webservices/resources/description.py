@@ -14,24 +14,13 @@ from reference_robot.webservices.resources.resource import Resource
 _WADL_NAMESPACE: Final = "{http://wadl.dev.java.net/2009/02}"
 
 
-class _Description(Resource):
-    """A description of the interface.
-
-    Args:
-        address: Tells the interface's base URL, as a request names it.
-    """
-
-    def __init__(self, address: Callable[[Request], str]) -> None:
-        self._address = address
-
-
-class OpenApi(_Description):
+class OpenApi(Resource):
     """The OpenAPI description, as JSON."""
 
     path: ClassVar = "/openapi.json"
 
     def __init__(self, address: Callable[[Request], str]) -> None:
-        super().__init__(address)
+        self._address = address
         document: Any = yaml.safe_load((CONTRACT_DIR / "openapi.yaml").read_text(encoding="utf-8"))
         self._document: dict[str, Any] = document
 
@@ -41,13 +30,13 @@ class OpenApi(_Description):
         return content(200, "application/json", json.dumps(document, default=str).encode())
 
 
-class Wadl(_Description):
+class Wadl(Resource):
     """The WADL description."""
 
     path: ClassVar = "/application.wadl"
 
     def __init__(self, address: Callable[[Request], str]) -> None:
-        super().__init__(address)
+        self._address = address
         self._document = etree.parse(CONTRACT_DIR / "robot.wadl")
 
     def get(self, request: Request) -> Response:

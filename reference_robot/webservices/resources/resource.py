@@ -37,15 +37,7 @@ def wanted_format(request: Request) -> str:
 def represented(
     plain: Any, root: str, media_type: str, status: int = 200, headers: tuple[tuple[bytes, bytes], ...] = ()
 ) -> Response:
-    """Return plain data as an answer.
-
-    Args:
-        plain: What the client is to learn.
-        root: The root element's name in XML: the ROS type's.
-        media_type: One of FORMATS.
-        status: The HTTP status.
-        headers: Further fields.
-    """
+    """Return plain data as an answer; in XML, ``root`` names the root element: the ROS type."""
     if media_type == JSON:
         body = write_json(plain)
     elif media_type == XML:

@@ -8,37 +8,21 @@ from typing import Any, Final, Literal, NamedTuple
 
 from mybot_delivery_app.msg import DeliveryRequestMsg
 
+from conformance.contract.delivery import COFFEE, COURIER
+from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
-COFFEE: Final[int] = DeliveryRequestMsg.COFFEE_DELIVERY_MESSAGE_CODE
-_CODES: Final = frozenset({DeliveryRequestMsg.COURIER_DELIVERY_MESSAGE_CODE, COFFEE})
+_CODES: Final = frozenset({COURIER, COFFEE})
 _REMEMBERED: Final = 100  # the contract asks for the last 50
 _STATES: Final = frozenset({"queued", "active", "done", "failed", "dropped"})
 _NANOSECONDS: Final = 10**9
 
 
-class DeliveryRequest(NamedTuple):
-    """The fields of a DeliveryRequestMsg: coordinates in metres, every double as it was sent."""
-
-    message_code: int
-    depot_x: float
-    depot_y: float
-    destination_x: float
-    destination_y: float
-    source_x: float
-    source_y: float
-
-
 class UnusableFieldError(ValueError):
-    """A field has a value that no delivery may have.
-
-    Args:
-        field: The message's field, one of ``DeliveryRequest._fields``.
-        rule: What the value must be.
-    """
+    """A field of the message has a value that no delivery may have; the rule says what it must be."""
 
     def __init__(self, field: str, rule: str) -> None:
         super().__init__(f"{field} {rule}")
@@ -57,12 +41,7 @@ class _Accepted(NamedTuple):
 
 
 class Deliveries:
-    """Takes delivery requests from both interfaces.
-
-    Args:
-        publishers: The node that publishes requests.
-        subscribers: The node that hears what became of them.
-    """
+    """Takes delivery requests from both interfaces."""
 
     def __init__(self, publishers: RobotPublishersNode, subscribers: RobotSubscribersNode) -> None:
         self._publishers = publishers
@@ -80,34 +59,23 @@ class Deliveries:
         _require_usable(request)
         if not self._publishers.delivery_is_served():
             raise not_yet("no delivery application listens on the robot")
-        message = self._message
-        (
-            message.message_code,
-            message.depot_x,
-            message.depot_y,
-            message.destination_x,
-            message.destination_y,
-            message.source_x,
-            message.source_y,
-        ) = request
+        for field, value in zip(DeliveryRequest._fields, request, strict=True):
+            setattr(self._message, field, value)
         self._accepted.append(_Accepted(request, time.time_ns(), interface))
-        self._publishers.publish_delivery(message)
+        self._publishers.publish_delivery(self._message)
 
     def listed(self) -> list[dict[str, Any]]:
         """Return the requests accepted last, newest first, with the state that the application reports."""
         missions = _missions(self._subscribers.missions)
-        entries = []
-        for accepted in reversed(self._accepted):
-            seconds, nanoseconds = divmod(accepted.nanoseconds, _NANOSECONDS)
-            entries.append(
-                {
-                    "request": accepted.request._asdict(),
-                    "state": _state(accepted, missions),
-                    "accepted": {"sec": seconds, "nanosec": nanoseconds},
-                    "interface": accepted.interface,
-                }
-            )
-        return entries
+        return [
+            {
+                "request": accepted.request._asdict(),
+                "state": _state(accepted, missions),
+                "accepted": dict(zip(("sec", "nanosec"), divmod(accepted.nanoseconds, _NANOSECONDS), strict=True)),
+                "interface": accepted.interface,
+            }
+            for accepted in reversed(self._accepted)
+        ]
 
 
 def _require_usable(request: DeliveryRequest) -> None:

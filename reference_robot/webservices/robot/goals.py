@@ -59,14 +59,7 @@ class _Goal:
 
 
 class Goals:
-    """The goal resource's life cycle, on the event loop's thread.
-
-    Args:
-        publishers: The node that sends and cancels goals.
-        subscribers: The node that hears of goals which others sent (a mission's) and of reasons for refusals.
-        calls: Waits for ROS.
-        frames: Those in which poses are taken.
-    """
+    """The goal resource's life cycle, on the event loop's thread; ``frames`` are those in which poses are taken."""
 
     def __init__(
         self, publishers: RobotPublishersNode, subscribers: RobotSubscribersNode, calls: RosCalls, frames: Frames
@@ -92,10 +85,7 @@ class Goals:
         return self.current() is not None
 
     async def send(self, wanted: dict[str, Any]) -> tuple[int, dict[str, Any]]:
-        """Send a goal, unless it is the current one already.
-
-        Args:
-            wanted: A plain MoveBaseActionGoal of the right shape.
+        """Send a plain MoveBaseActionGoal of the right shape, unless it is the current one already.
 
         Returns:
             The HTTP status and the goal as the robot holds it: 200 for a repeat, 201 for a new goal, 202 where it

@@ -10,11 +10,7 @@ from reference_robot.webservices.representation.problems import not_yet
 
 
 class LatestOdometry:
-    """Tells what the robot measures.
-
-    Args:
-        subscribers: The node that hears the odometry.
-    """
+    """Tells what the robot measures."""
 
     def __init__(self, subscribers: RobotSubscribersNode) -> None:
         self._subscribers = subscribers

@@ -1,12 +1,10 @@
 """Plans: a GetPlan service where the robot has one, else the ComputePathToPose action of Nav2."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from action_msgs.msg import GoalStatus
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Pose, PoseStamped
 from nav2_msgs.action import ComputePathToPose
 from nav_msgs.msg import Path
 from nav_msgs.srv import GetPlan
@@ -18,9 +16,6 @@ from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.target_poses import planar_pose, require_known_frame
-
-if TYPE_CHECKING:
-    from geometry_msgs.msg import Pose
 
 _LARGEST_TOLERANCE: Final = 3.4e38  # nav_msgs/GetPlan carries it as a float32
 
@@ -43,14 +38,7 @@ class PlanQuery:
 
 
 class Planner:
-    """Asks ROS for plans.
-
-    Args:
-        subscribers: The node with the planners' clients.
-        calls: Waits for ROS.
-        odometry: Where a plan starts that names no start.
-        frames: Those in which poses are taken.
-    """
+    """Asks ROS for plans between poses in one of its ``frames``."""
 
     def __init__(
         self, subscribers: RobotSubscribersNode, calls: RosCalls, odometry: LatestOdometry, frames: Frames

@@ -19,14 +19,7 @@ _DISCOVERY_STEP: Final = 0.02
 
 
 class Velocity:
-    """Commands and measures velocity.
-
-    Args:
-        publishers: The node that publishes commands.
-        odometry: What the robot measures.
-        settings: Limits and hold time.
-        goal_is_active: Tells whether the robot follows a goal, and so takes no velocity from clients.
-    """
+    """Commands and measures velocity."""
 
     def __init__(
         self,
@@ -52,10 +45,7 @@ class Velocity:
         return self._read(self._odometry.message().twist.twist)
 
     async def command(self, twist: dict[str, Any]) -> None:
-        """Publish a velocity once; the robot's own watchdog ends it after the hold time.
-
-        Args:
-            twist: A plain Twist of the right shape.
+        """Publish a plain Twist once; the robot's own watchdog ends it after the hold time.
 
         Raises:
             Problem: 422 for a value beyond the limits or for a component that a differential drive cannot actuate,

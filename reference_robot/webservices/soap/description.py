@@ -14,12 +14,7 @@ _ERRORS_TOLD: Final = 3
 
 
 class ServiceDescription:
-    """The contract's files of one service.
-
-    Args:
-        name: ``publishers`` or ``subscribers``, the files' name.
-        path: Where the service answers, such as ``/turtlesim_publisher_ws``.
-    """
+    """The contract's files of one service, ``publishers`` or ``subscribers``, which answers at a path."""
 
     def __init__(self, name: str, path: str) -> None:
         self._path = path
@@ -30,11 +25,7 @@ class ServiceDescription:
         self._schema = etree.XMLSchema(document)
 
     def wsdl(self, base: str) -> bytes:
-        """Return the WSDL with the robot's address in it (WS-I BP R2001), its schema at ``?xsd=1``.
-
-        Args:
-            base: The interface's base URL, as the request names it.
-        """
+        """Return the WSDL with the robot's address in it (WS-I BP R2001), its schema at ``?xsd=1``."""
         for address in self._wsdl.iter(f"{_WSDL_SOAP}address"):
             address.set("location", base + self._path)
         for schema in self._wsdl.iter(f"{_XSD}import"):

@@ -1,14 +1,11 @@
 """From a parsed document to the one element in its Body, by the rules of SOAP 1.1 and the Basic Profile."""
 
-from __future__ import annotations
+from typing import Final
 
-from typing import TYPE_CHECKING, Final
+from lxml import etree
 
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.soap.faults import SOAP, Fault, FaultCode, client_fault
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 _ENVELOPE: Final = f"{{{SOAP}}}Envelope"
 _HEADER: Final = f"{{{SOAP}}}Header"

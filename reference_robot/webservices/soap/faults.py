@@ -20,12 +20,7 @@ class FaultCode(StrEnum):
 
 
 class Fault(Exception):  # noqa: N818 - SOAP's own name for it
-    """A message is answered with a fault.
-
-    Args:
-        code: Whose fault.
-        text: What was wrong, naming element and value.
-    """
+    """A message is answered with a fault; its text names element and value."""
 
     def __init__(self, code: FaultCode, text: str) -> None:
         super().__init__(text)

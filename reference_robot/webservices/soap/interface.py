@@ -15,13 +15,7 @@ _READ: Final = frozenset({"GET", "HEAD"})
 
 
 class SoapInterface(Interface):
-    """Serves SOAP services and their descriptions.
-
-    Args:
-        services: The services, each at its own path.
-        address: Tells the interface's base URL, as a request names it.
-        authorization: Who may call.
-    """
+    """Serves SOAP services, each at its own path, and their descriptions."""
 
     def __init__(
         self, services: Iterable[SoapService], address: Callable[[Request], str], authorization: Authorization

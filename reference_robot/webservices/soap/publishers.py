@@ -1,26 +1,21 @@
 """RobotPublishersWebService: the web methods that make the robot act."""
 
-from __future__ import annotations
+from typing import Final
 
-from typing import TYPE_CHECKING, Final
+from lxml import etree
 
-from reference_robot.webservices.robot.deliveries import COFFEE, Deliveries, DeliveryRequest, UnusableFieldError
+from conformance.contract.delivery import COFFEE, COORDINATES
+from reference_robot.deliveries import DeliveryRequest
+from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
 from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.faults import SOAP, client_fault
 from reference_robot.webservices.soap.service import Operation, SoapService
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 PATH: Final = "/turtlesim_publisher_ws"
 
 
 class PublishersWebService(SoapService):
-    """ExecuteDeliveryRequest and ExecuteCoffeeRequest: both return nothing (paper), the empty wrapper.
-
-    Args:
-        deliveries: Takes the requests.
-    """
+    """ExecuteDeliveryRequest and ExecuteCoffeeRequest: both return nothing (paper), the empty wrapper."""
 
     def __init__(self, deliveries: Deliveries) -> None:
         self.path = PATH
@@ -42,11 +37,7 @@ class PublishersWebService(SoapService):
         return self._done["ExecuteCoffeeRequest"]
 
     def _accept(self, wrapper: etree._Element, code: int | None = None) -> None:
-        """Hand a request over, with the operation's own code where it has one.
-
-        Args:
-            wrapper: Valid by the XSD, which allows ``INF``, ``NaN`` and a missing ``arg0``.
-            code: The message code; None takes the message's.
+        """Hand over a request that is valid by the XSD, which allows ``INF``, ``NaN`` and a missing ``arg0``.
 
         Raises:
             Fault: Client, where ``arg0`` is missing: there is nothing to deliver.
@@ -73,12 +64,4 @@ def _request(sent: dict[str, str], code: int | None) -> DeliveryRequest:
         asked = int(sent["message_code"])
     except ValueError as error:  # thousands of leading zeros: valid, and more than Python reads as an integer
         raise UnusableFieldError("message_code", "must be an integer of fewer digits") from error
-    return DeliveryRequest(
-        asked if code is None else code,
-        float(sent["depot_x"]),
-        float(sent["depot_y"]),
-        float(sent["destination_x"]),
-        float(sent["destination_y"]),
-        float(sent["source_x"]),
-        float(sent["source_y"]),
-    )
+    return DeliveryRequest(asked if code is None else code, *(float(sent[name]) for name in COORDINATES))

@@ -19,15 +19,7 @@ PATH: Final = "/turtlesim_subscriber_ws"
 
 
 class SubscribersWebService(SoapService):
-    """GetPose, GetVelocity, GetSensors, GetNavigationServices, GetGoal and GetPlan.
-
-    Args:
-        subscribers: The node that knows the graph.
-        odometry: Where the robot is.
-        velocity: Measures.
-        goals: Knows the active goal.
-        planner: Plans.
-    """
+    """GetPose, GetVelocity, GetSensors, GetNavigationServices, GetGoal and GetPlan."""
 
     def __init__(
         self,

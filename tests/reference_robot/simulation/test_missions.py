@@ -5,11 +5,20 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference_robot.simulation.missions import DeliveryRequest, Missions, MissionState
+from conformance.contract.delivery import MESSAGE_FIELDS
+from reference_robot.deliveries import DeliveryRequest
+from reference_robot.simulation.missions import Mission, Missions, MissionState
 
 
 def request(number=0):
     return DeliveryRequest(4, float(number), 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+def queued(count, **options):
+    missions = Missions(**options)
+    for number in range(count):
+        missions.add(request(number), (number, 0))
+    return missions
 
 
 def states(missions):
@@ -17,7 +26,7 @@ def states(missions):
 
 
 def test_the_stops_are_source_destination_depot():
-    assert DeliveryRequest(4, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0).stops() == ((5.0, 6.0), (3.0, 4.0), (1.0, 2.0))
+    assert Mission(DeliveryRequest(4, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (0, 0)).stops() == ((5, 6), (3, 4), (1, 2))
 
 
 def test_missions_begin_in_the_order_they_came():
@@ -32,16 +41,11 @@ def test_missions_begin_in_the_order_they_came():
 
 
 def test_a_request_beyond_the_capacity_is_dropped_and_those_that_wait_stay():
-    missions = Missions(capacity=20)
-    for number in range(22):
-        missions.add(request(number), (number, 0))
-    assert states(missions) == ["dropped", "dropped", *["queued"] * 20]
+    assert states(queued(22, capacity=20)) == ["dropped", "dropped", *["queued"] * 20]
 
 
 def test_abandoning_fails_the_active_mission_and_drops_the_rest():
-    missions = Missions()
-    for number in range(3):
-        missions.add(request(number), (number, 0))
+    missions = queued(3)
     missions.begin()
     missions.abandon()
     assert states(missions) == ["dropped", "dropped", "failed"]
@@ -49,17 +53,8 @@ def test_abandoning_fails_the_active_mission_and_drops_the_rest():
 
 
 def test_a_mission_in_plain_values_is_what_the_topic_carries():
-    missions = Missions()
-    assert json.loads(json.dumps(missions.add(request(1), (12, 34)).plain())) == {
-        "request": {
-            "message_code": 4,
-            "depot_x": 1.0,
-            "depot_y": 2.0,
-            "destination_x": 3.0,
-            "destination_y": 4.0,
-            "source_x": 5.0,
-            "source_y": 6.0,
-        },
+    assert json.loads(json.dumps(Mission(request(1), (12, 34)).plain())) == {
+        "request": dict(zip(MESSAGE_FIELDS, (4, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), strict=True)),
         "state": "queued",
         "accepted": {"sec": 12, "nanosec": 34},
     }
