@@ -13,10 +13,11 @@ from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import ComputePathToPose, NavigateToPose
 
 import reference_robot
+from conformance.contract.delivery import COFFEE, COORDINATES, COURIER, MESSAGE_FIELDS
+from reference_robot.deliveries import DeliveryRequest
 from reference_robot.ros import RosRuntime
 
 INTERFACES = Path(reference_robot.__file__).with_name("interfaces")
-DOUBLES = ("depot_x", "depot_y", "destination_x", "destination_y", "source_x", "source_y")
 
 # Another process: writes each message that it gets as hexadecimal, code first.
 LISTENER = """
@@ -61,7 +62,7 @@ def test_delivery_requests_reach_another_process_bit_for_bit(domain_id):
     sent = list(requests())
     with (
         subprocess.Popen(
-            [sys.executable, "-c", LISTENER, str(len(sent)), *DOUBLES], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-c", LISTENER, str(len(sent)), *COORDINATES], stdout=subprocess.PIPE, text=True
         ) as listener,
         RosRuntime(domain_id) as ros,
     ):
@@ -74,7 +75,7 @@ def test_delivery_requests_reach_another_process_bit_for_bit(domain_id):
             assert time.monotonic() < deadline
             time.sleep(0.01)
         for code, doubles in sent:
-            publisher.publish(DeliveryRequestMsg(message_code=code, **dict(zip(DOUBLES, doubles, strict=True))))
+            publisher.publish(DeliveryRequestMsg(message_code=code, **dict(zip(COORDINATES, doubles, strict=True))))
         received, _ = listener.communicate(timeout=90)
     assert received.split() == [struct.pack(">i6d", code, *doubles).hex() for code, doubles in sent]
 
@@ -82,37 +83,38 @@ def test_delivery_requests_reach_another_process_bit_for_bit(domain_id):
 def test_the_delivery_request_has_the_papers_fields():
     assert DeliveryRequestMsg.get_fields_and_field_types() == {
         "message_code": "int32",
-        **dict.fromkeys(DOUBLES, "double"),
+        **dict.fromkeys(COORDINATES, "double"),
     }
-    assert DeliveryRequestMsg.COURIER_DELIVERY_MESSAGE_CODE == 3
-    assert DeliveryRequestMsg.COFFEE_DELIVERY_MESSAGE_CODE == 4
+    assert DeliveryRequest._fields == MESSAGE_FIELDS
+    assert DeliveryRequestMsg.COURIER_DELIVERY_MESSAGE_CODE == COURIER == 3
+    assert DeliveryRequestMsg.COFFEE_DELIVERY_MESSAGE_CODE == COFFEE == 4
 
 
-def test_the_actions_are_nav2s():
-    assert NavigateToPose.Goal.get_fields_and_field_types() == {
-        "pose": "geometry_msgs/PoseStamped",
-        "behavior_tree": "string",
-    }
-    assert NavigateToPose.Result.get_fields_and_field_types() == {"error_code": "uint16", "error_msg": "string"}
-    assert NavigateToPose.Feedback.get_fields_and_field_types() == {
-        "current_pose": "geometry_msgs/PoseStamped",
-        "navigation_time": "builtin_interfaces/Duration",
-        "estimated_time_remaining": "builtin_interfaces/Duration",
-        "number_of_recoveries": "int16",
-        "distance_remaining": "float",
-    }
-    assert ComputePathToPose.Goal.get_fields_and_field_types() == {
-        "goal": "geometry_msgs/PoseStamped",
-        "start": "geometry_msgs/PoseStamped",
-        "planner_id": "string",
-        "use_start": "boolean",
-    }
-    assert ComputePathToPose.Result.get_fields_and_field_types() == {
-        "path": "nav_msgs/Path",
-        "planning_time": "builtin_interfaces/Duration",
-        "error_code": "uint16",
-        "error_msg": "string",
-    }
+TIMES = "builtin_interfaces/Duration navigation_time, builtin_interfaces/Duration estimated_time_remaining"
+
+
+@pytest.mark.parametrize(
+    ("message", "definition"),
+    [
+        (NavigateToPose.Goal, "geometry_msgs/PoseStamped pose, string behavior_tree"),
+        (NavigateToPose.Result, "uint16 error_code, string error_msg"),
+        (
+            NavigateToPose.Feedback,
+            "geometry_msgs/PoseStamped current_pose, int16 number_of_recoveries, float distance_remaining, " + TIMES,
+        ),
+        (
+            ComputePathToPose.Goal,
+            "geometry_msgs/PoseStamped goal, geometry_msgs/PoseStamped start, string planner_id, boolean use_start",
+        ),
+        (
+            ComputePathToPose.Result,
+            "nav_msgs/Path path, builtin_interfaces/Duration planning_time, uint16 error_code, string error_msg",
+        ),
+    ],
+)
+def test_the_actions_are_nav2s(message, definition):
+    fields = message.get_fields_and_field_types()
+    assert {f"{kind} {name}" for name, kind in fields.items()} == set(definition.split(", "))
     assert NavigateToPose.Result.NONE == ComputePathToPose.Result.NONE == 0
 
 

@@ -1,7 +1,6 @@
 """A simulated robot on a domain of its own, and an observer on the same graph."""
 
 import pytest
-from action_msgs.msg import GoalStatus
 from msgspec.structs import replace
 from observer import Observer, until
 
@@ -25,8 +24,3 @@ def robot(domain_id, request):
         ros.start()
         until(observer.is_connected)
         yield observer
-
-
-@pytest.fixture
-def statuses():
-    return GoalStatus

@@ -13,6 +13,7 @@ from nav_msgs.srv import GetPlan
 from rclpy.action import ActionClient
 from std_msgs.msg import String
 
+from conformance.contract.delivery import COORDINATES
 from reference_robot.simulation.messages import LATCHED, quaternion_of, yaw_of
 
 _PATIENCE_S = 30.0
@@ -132,17 +133,8 @@ class Observer:
         return self.ask(self.plans.call_async, request).plan
 
     def request(self, source, destination, depot, code=4):
-        self.requests.publish(
-            DeliveryRequestMsg(
-                message_code=code,
-                source_x=float(source[0]),
-                source_y=float(source[1]),
-                destination_x=float(destination[0]),
-                destination_y=float(destination[1]),
-                depot_x=float(depot[0]),
-                depot_y=float(depot[1]),
-            )
-        )
+        coordinates = dict(zip(COORDINATES, map(float, (*depot, *destination, *source)), strict=True))
+        self.requests.publish(DeliveryRequestMsg(message_code=code, **coordinates))
 
     def is_at(self, x, y, yaw=None):
         here = self.pose

@@ -3,8 +3,10 @@
 import json
 
 import pytest
+from action_msgs.msg import GoalStatus
 from observer import pose, until
 
+from conformance.contract.delivery import EXAMPLE
 from reference_robot.simulation.office import DEPOT, DESTINATION, SOURCE
 
 FAST = pytest.mark.parametrize("robot", [{"time_scale": 20.0}], indirect=True)
@@ -19,15 +21,7 @@ def test_the_papers_coffee_goes_source_destination_depot(robot):
     assert [(position["x"], position["y"]) for position in goals.values()] == [SOURCE, DESTINATION, DEPOT]
     assert robot.is_at(*DEPOT)
     (mission,) = json.loads(robot.reports[-1])
-    assert mission["request"] == {
-        "message_code": 4,
-        "depot_x": DEPOT[0],
-        "depot_y": DEPOT[1],
-        "destination_x": DESTINATION[0],
-        "destination_y": DESTINATION[1],
-        "source_x": SOURCE[0],
-        "source_y": SOURCE[1],
-    }
+    assert mission["request"] == EXAMPLE | {"message_code": 4}
     assert any('"active"' in report for report in robot.reports)
 
 
@@ -69,30 +63,30 @@ def test_a_cancel_from_outside_fails_the_mission_and_drops_the_queue(robot):
     until(lambda: robot.rests and robot.current_goal is None)
 
 
-def test_a_mission_waits_while_somebody_elses_goal_is_active(robot, statuses):
+def test_a_mission_waits_while_somebody_elses_goal_is_active(robot):
     handle = robot.send(pose(70.5, 38.7))
     until(lambda: robot.current_goal)
     robot.request(*NEAR)
     until(lambda: robot.states == ["queued"])
-    assert robot.end_of(handle) == statuses.STATUS_SUCCEEDED
+    assert robot.end_of(handle) == GoalStatus.STATUS_SUCCEEDED
     until(lambda: robot.states == ["done"])
 
 
-def test_a_goal_that_displaces_a_mission_drops_the_queue(robot, statuses):
+def test_a_goal_that_displaces_a_mission_drops_the_queue(robot):
     robot.request(SOURCE, DESTINATION, DEPOT)
     robot.request(*NEAR)
     until(lambda: robot.states == ["active", "queued"] and robot.current_goal)
     handle = robot.send(pose(67.0, 38.7))
     until(lambda: robot.states == ["failed", "dropped"])
-    assert robot.end_of(handle) == statuses.STATUS_SUCCEEDED
+    assert robot.end_of(handle) == GoalStatus.STATUS_SUCCEEDED
 
 
-def test_cancelling_somebody_elses_goal_drops_the_missions_that_wait(robot, statuses):
+def test_cancelling_somebody_elses_goal_drops_the_missions_that_wait(robot):
     handle = robot.send(pose(60.5, 38.7))
     until(lambda: robot.current_goal)
     robot.request(*NEAR)
     until(lambda: robot.states == ["queued"])
     assert len(robot.cancel_all().goals_canceling) == 1
-    assert robot.end_of(handle) == statuses.STATUS_CANCELED
+    assert robot.end_of(handle) == GoalStatus.STATUS_CANCELED
     until(lambda: robot.states == ["dropped"])
     until(lambda: robot.rests and robot.current_goal is None)

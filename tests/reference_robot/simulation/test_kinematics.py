@@ -56,10 +56,7 @@ def test_a_full_circle_comes_back():
     assert (motion.x, motion.y, motion.yaw) == pytest.approx((0, 0, 0), abs=1e-9)
 
 
-def test_against_a_wall_the_body_stays_and_its_wheels_turn():
+def test_against_a_wall_the_body_stays_its_wheels_turn_and_it_can_turn():
     motion = advance(Motion(3, 4, 0, 0.5), (0.5, 0.0), 0.1, LIMITS, nowhere)
     assert (motion.x, motion.y, motion.linear) == (3, 4, 0.5)
-
-
-def test_against_a_wall_the_body_can_still_turn():
     assert advance(Motion(3, 4, 0), (0.0, 2.0), 0.1, LIMITS, nowhere).yaw > 0

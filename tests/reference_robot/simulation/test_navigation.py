@@ -6,6 +6,7 @@ import math
 import time
 
 import pytest
+from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
 from nav2_msgs.action import ComputePathToPose
 from nav_msgs.msg import Odometry
@@ -19,16 +20,16 @@ from reference_robot.simulation.office import DEPOT, OFFICE, SOURCE
 from reference_robot.simulation.planner import Planner
 
 
-def test_a_goal_is_reached_with_feedback_and_shown_while_it_is_active(robot, statuses):
+def test_a_goal_is_reached_with_feedback_and_shown_while_it_is_active(robot):
     goal = pose(71.0, 36.0, 2.0)
     handle = robot.send(goal)
     assert handle.accepted
     shown = until(lambda: robot.current_goal)
     assert shown["goal_id"] == bytes(handle.goal_id.uuid).hex()
-    assert shown["status"] == statuses.STATUS_EXECUTING
+    assert shown["status"] == GoalStatus.STATUS_EXECUTING
     assert shown["pose"]["header"]["frame_id"] == "map"
     assert shown["pose"]["pose"]["position"] == {"x": 71.0, "y": 36.0, "z": 0.0}
-    assert robot.end_of(handle) == statuses.STATUS_SUCCEEDED
+    assert robot.end_of(handle) == GoalStatus.STATUS_SUCCEEDED
     until(lambda: robot.current_goal is None)
     until(lambda: robot.rests)
     assert robot.is_at(71.0, 36.0, 2.0)
@@ -38,13 +39,13 @@ def test_a_goal_is_reached_with_feedback_and_shown_while_it_is_active(robot, sta
 
 
 @pytest.mark.parametrize("robot", [{"time_scale": 1.0}], indirect=True)
-def test_a_cancelled_goal_leaves_the_robot_at_rest_within_the_settle_time(robot, statuses):
+def test_a_cancelled_goal_leaves_the_robot_at_rest_within_the_settle_time(robot):
     handle = robot.send(pose(81.0, 39.0))
     until(lambda: robot.velocity[0] > 0.5)
     cancelled_at = time.monotonic()
     response = robot.ask(handle.cancel_goal_async)
     assert len(response.goals_canceling) == 1
-    assert robot.end_of(handle) == statuses.STATUS_CANCELED
+    assert robot.end_of(handle) == GoalStatus.STATUS_CANCELED
     until(lambda: robot.rests)
     assert robot.odometry[-1][0] - cancelled_at < 0.6
     until(lambda: robot.current_goal is None)
@@ -54,18 +55,18 @@ def test_a_cancelled_goal_leaves_the_robot_at_rest_within_the_settle_time(robot,
     assert robot.pose == here
 
 
-def test_a_newer_goal_displaces_an_older_one_which_ends_aborted(robot, statuses):
+def test_a_newer_goal_displaces_an_older_one_which_ends_aborted(robot):
     older = robot.send(pose(81.0, 39.0))
     until(lambda: robot.velocity[0] > 0.3)
     newer = robot.send(pose(66.0, 37.0, 1.0))
-    assert robot.end_of(older) == statuses.STATUS_ABORTED
+    assert robot.end_of(older) == GoalStatus.STATUS_ABORTED
     until(lambda: robot.current_goal["goal_id"] == bytes(newer.goal_id.uuid).hex())
-    assert robot.end_of(newer) == statuses.STATUS_SUCCEEDED
+    assert robot.end_of(newer) == GoalStatus.STATUS_SUCCEEDED
     assert robot.is_at(66.0, 37.0, 1.0)
 
 
-def test_after_a_goal_the_robot_obeys_velocity_commands_again(robot, statuses):
-    assert robot.end_of(robot.send(pose(68.5, 38.7))) == statuses.STATUS_SUCCEEDED
+def test_after_a_goal_the_robot_obeys_velocity_commands_again(robot):
+    assert robot.end_of(robot.send(pose(68.5, 38.7))) == GoalStatus.STATUS_SUCCEEDED
     until(lambda: robot.current_goal is None and robot.rests)
     robot.command(0.25)
     until(lambda: robot.velocity == (0.25, 0.0))
@@ -80,10 +81,10 @@ def test_an_unreachable_goal_is_refused_and_the_reason_is_told(robot, unreachabl
     assert robot.current_goal is None
 
 
-def test_a_refused_goal_leaves_the_active_one_alone(robot, statuses):
+def test_a_refused_goal_leaves_the_active_one_alone(robot):
     handle = robot.send(pose(70.0, 38.7))
     assert not robot.send(pose(0.0, 0.0)).accepted
-    assert robot.end_of(handle) == statuses.STATUS_SUCCEEDED
+    assert robot.end_of(handle) == GoalStatus.STATUS_SUCCEEDED
 
 
 def test_a_goal_in_an_unknown_frame_or_without_orientation_is_refused(robot):
@@ -120,7 +121,7 @@ def test_get_plan_is_empty_where_no_way_leads(robot):
         assert not robot.plan(goal).poses
 
 
-def test_compute_path_to_pose_plans_or_says_why_not(robot, statuses):
+def test_compute_path_to_pose_plans_or_says_why_not(robot):
     def compute(goal, start=None):
         message = ComputePathToPose.Goal(goal=goal, use_start=start is not None)
         if start is not None:
@@ -129,17 +130,17 @@ def test_compute_path_to_pose_plans_or_says_why_not(robot, statuses):
 
     goal = pose(*SOURCE, 0.3)
     found = compute(goal)
-    assert found.status == statuses.STATUS_SUCCEEDED
+    assert found.status == GoalStatus.STATUS_SUCCEEDED
     assert found.result.error_code == ComputePathToPose.Result.NONE
     check_plan(found.result.path, DEPOT, goal)
     check_plan(compute(pose(*DEPOT), start=goal).result.path, SOURCE, pose(*DEPOT))
     refused = compute(pose(82.0, 47.0))
-    assert refused.status == statuses.STATUS_ABORTED
+    assert refused.status == GoalStatus.STATUS_ABORTED
     assert refused.result.error_code == ComputePathToPose.Result.NO_VALID_PATH
     assert "82" in refused.result.error_msg
 
 
-def test_a_goal_without_progress_is_aborted(domain_id, statuses):
+def test_a_goal_without_progress_is_aborted(domain_id):
     names = RosNames()
     with RosRuntime(domain_id) as ros:
         observer = Observer(ros, names)
@@ -153,6 +154,6 @@ def test_a_goal_without_progress_is_aborted(domain_id, statuses):
         ros.start()
         until(lambda: observer.odometry and observer.navigate.server_is_ready())
         handle = observer.send(pose(*SOURCE))
-        assert observer.end_of(handle) == statuses.STATUS_ABORTED
+        assert observer.end_of(handle) == GoalStatus.STATUS_ABORTED
         until(lambda: observer.current_goal is None)
         assert navigation  # kept while it serves

@@ -80,29 +80,21 @@ def test_a_goal_where_the_robot_stands_is_a_turn():
 
 
 @pytest.mark.parametrize(
-    ("goal", "failure"),
+    ("start", "goal", "failure"),
     [
-        ((82.0, 47.0, 0.0), PlanFailure.NO_VALID_PATH),  # the lift shaft
-        ((90.0, 40.0, 0.0), PlanFailure.GOAL_OUTSIDE_MAP),
-        ((math.nan, 40.0, 0.0), PlanFailure.GOAL_OUTSIDE_MAP),
-        ((60.0, math.inf, 0.0), PlanFailure.GOAL_OUTSIDE_MAP),
-        ((72.0, 35.0, 0.0), PlanFailure.GOAL_OCCUPIED),  # in a wall
-        ((72.2, 35.0, 0.0), PlanFailure.GOAL_OCCUPIED),  # too near to it
+        (DEPOT, (82.0, 47.0), PlanFailure.NO_VALID_PATH),  # the lift shaft
+        (DEPOT, (90.0, 40.0), PlanFailure.GOAL_OUTSIDE_MAP),
+        (DEPOT, (math.nan, 40.0), PlanFailure.GOAL_OUTSIDE_MAP),
+        (DEPOT, (60.0, math.inf), PlanFailure.GOAL_OUTSIDE_MAP),
+        (DEPOT, (72.0, 35.0), PlanFailure.GOAL_OCCUPIED),  # in a wall
+        (DEPOT, (72.2, 35.0), PlanFailure.GOAL_OCCUPIED),  # too near to it
+        ((0.0, 0.0), DEPOT, PlanFailure.START_OUTSIDE_MAP),
+        ((72.0, 35.0), DEPOT, PlanFailure.START_OCCUPIED),
     ],
 )
-def test_without_a_way_the_reason_names_the_goal(goal, failure):
-    with pytest.raises(PlanError, match=r"goal \(") as caught:
-        PLANNER.plan((*DEPOT, 0.0), goal)
-    assert caught.value.failure is failure
-
-
-@pytest.mark.parametrize(
-    ("start", "failure"),
-    [((0.0, 0.0, 0.0), PlanFailure.START_OUTSIDE_MAP), ((72.0, 35.0, 0.0), PlanFailure.START_OCCUPIED)],
-)
-def test_a_plan_starts_on_free_floor(start, failure):
-    with pytest.raises(PlanError, match="start") as caught:
-        PLANNER.plan(start, (*DEPOT, 0.0))
+def test_without_a_way_the_reason_names_the_pose(start, goal, failure):
+    with pytest.raises(PlanError, match=r"start \(" if goal is DEPOT else r"goal \(") as caught:
+        PLANNER.plan((*start, 0.0), (*goal, 0.0))
     assert caught.value.failure is failure
 
 

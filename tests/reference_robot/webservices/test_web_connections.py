@@ -1,19 +1,14 @@
 """Clients that send half a request, vanish, or come in hundreds."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import select
 import socket
 import threading
 import time
-from typing import TYPE_CHECKING
 
 from web_messages import delivery_envelope, delivery_path, twist
-
-if TYPE_CHECKING:
-    from web_robot import ForeignRobot, Served
+from web_robot import ForeignRobot, Served
 
 BODY = b'{"linear": {"x": 0.1, "y": 0, "z": 0},'
 HALVES = {

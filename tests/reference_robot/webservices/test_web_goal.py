@@ -92,6 +92,8 @@ def test_any_id_comes_back_unchanged(served: Served, foreign: ForeignRobot, iden
         (goal() | {"header": {"stamp": {"sec": 0, "nanosec": 0}}}, "header.frame_id"),
         (goal() | {"header": {"stamp": {"sec": 2**31, "nanosec": 0}, "frame_id": "map"}}, "header.stamp.sec"),
         (goal() | {"header": {"stamp": {"sec": 0, "nanosec": -1}, "frame_id": "map"}}, "header.stamp.nanosec"),
+        (goal() | {"header": {"stamp": {"sec": 4e10, "nanosec": 0}, "frame_id": "map"}}, "not 40000000000.0"),
+        (goal(w=1.7e308, z=1.7e308), "must have length 1 within 0.001, not {'x': 0.0, 'y': 0.0, 'z': 1.7e+308,"),
         ({"goal_id": {"id": "x"}}, "goal"),
     ],
 )

@@ -1,16 +1,10 @@
 """Methods, negotiation and errors, by RFC 9110 and 9457."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 import yaml
 from lxml import etree
 from web_messages import delivery_path, twist
-
-if TYPE_CHECKING:
-    from web_robot import Served
+from web_robot import Served
 
 ALLOWED = {
     "/robot/pose/": {"GET", "HEAD", "OPTIONS"},

@@ -14,7 +14,12 @@ def test_a_planner_of_nav2_is_asked(domain_id: int):
     robot = ForeignRobot(domain_id, "Twist", "planner")
     with running_robot(domain_id, "--attach") as served:
         robot.do(odometry={"x": 2.5, "covariance": 0.0})
-        eventually(lambda: served.call("GET", "/robot/pose/").is_success)
+        eventually(
+            lambda: (
+                (a := served.call("GET", "/robot/pose/")).is_success
+                and a.json()["pose"]["pose"]["position"]["x"] == 2.5
+            )
+        )
         plan = eventually(
             lambda: (a := served.call("GET", PATH + "?x=1e+1&y=-2&yaw=1")).is_success and a.json()["plan"]
         )
