@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import quote
 
 from conformance.documents.json_schema import Schema, kind_of
-from conformance.documents.openapi import Operation, Parameter
+from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
 from conformance.documents.writing import json_text, text_of, xml_bytes
 from conformance.rest.interface import RestInterface
@@ -54,17 +54,12 @@ class Call:
         values = {key: item for key, item in self.values.items() if key != name}
         return replace(self, values=values if text is None else {**values, name: text})
 
-    def carrying(self, body: bytes, media_type: str | None = None) -> Call:
+    def carrying(self, body: bytes) -> Call:
         """The same with another body."""
-        return replace(self, body=body, media_type=media_type or self.media_type)
+        return replace(self, body=body)
 
     def send(
-        self,
-        api: RestInterface,
-        *headers: tuple[str, str],
-        method: str | None = None,
-        fresh: bool = False,
-        timeout_s: float | None = None,
+        self, api: RestInterface, *headers: tuple[str, str], method: str | None = None, fresh: bool = False
     ) -> Exchange:
         """Send it.
 
@@ -81,7 +76,6 @@ class Call:
             headers=[pair for pair in fields if pair != ("Content-Type", "")],
             body=self.body,
             fresh=fresh,
-            timeout_s=timeout_s,
         )
 
 
@@ -98,38 +92,25 @@ def example_call(api: RestInterface, operation: Operation, media_type: str = JSO
     given: dict[str, Any] = {}
     for item in operation.parameters:
         if item.where in {"path", "query"} and (item.required or item.examples):
-            given[item.name] = example_of(item)
+            given[item.name] = item.examples[0] if item.examples else minimal(item.schema)
     if given:
         given = _fitted(api, operation, given)
     call = Call(operation, {name: text_of(value) for name, value in given.items()})
     if media_type not in operation.bodies:
         return call
-    value = body_value(api, operation)
-    return replace(call, media_type=media_type, body=body_bytes(operation, media_type, value), value=value)
-
-
-def body_value(api: RestInterface, operation: Operation) -> Any:
-    """A valid value for an operation's body, by the contract's JSON example."""
     body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
     plain = [item for item in body.examples if not isinstance(item, str)]
-    return _fitted(api, operation, plain[0] if plain else minimal(body.schema))
-
-
-def body_bytes(operation: Operation, media_type: str, value: Any) -> bytes:
-    """A body value as octets."""
+    value = _fitted(api, operation, plain[0] if plain else minimal(body.schema))
     if media_type == XML:
-        return xml_bytes(value, root_name(operation.bodies[XML].schema) or "value")
-    return json_text(value).encode()
+        octets = xml_bytes(value, root_name(operation.bodies[XML].schema) or "value")
+    else:
+        octets = json_text(value).encode()
+    return replace(call, media_type=media_type, body=octets, value=value)
 
 
 def root_name(schema: Schema) -> str:
     """The name that a schema gives its XML element; empty where it gives none."""
     return str(schema.get("xml", {}).get("name", ""))
-
-
-def example_of(parameter: Parameter) -> Any:
-    """A valid value of a parameter."""
-    return parameter.examples[0] if parameter.examples else minimal(parameter.schema)
 
 
 def minimal(schema: Schema, depth: int = 0) -> Any:

@@ -57,8 +57,7 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
 
 
 def _near(api: RestInterface, shown: Any, wanted: Any) -> bool:
-    numbers = [item for item in (shown, wanted) if isinstance(item, float)]
-    if len(numbers) < 2:  # noqa: PLR2004 - both, or compare as they are
+    if not (isinstance(shown, float) and isinstance(wanted, float)):
         return bool(shown == wanted)
     limits = api.run.statement.limits
-    return abs(numbers[0] - numbers[1]) <= limits.tolerance_abs + limits.tolerance * abs(numbers[1])
+    return abs(shown - wanted) <= limits.tolerance_abs + limits.tolerance * abs(wanted)

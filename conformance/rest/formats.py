@@ -62,6 +62,22 @@ def disagreements(api: RestInterface, call: Call, media_types: list[str]) -> tup
     return list((suspects or {}).values()), exchange
 
 
+def judge_same_values(api: RestInterface, call: Call, media_types: list[str]) -> Exchange:
+    """Judge that the formats of a resource agree, where it can be read; give the last JSON exchange."""
+    found, exchange = disagreements(api, call, media_types)
+    first = found[0] if found else None
+    if exchange.response.ok:
+        api.run.judge.check(
+            "rest-formats/same-values",
+            first is None,
+            first.exchange if first else exchange,
+            f"the same values in all formats of {call.operation.template}",
+            found=first.description if first else "",
+            cause=call.operation.id,
+        )
+    return exchange
+
+
 def _snapshot(exchange: Exchange, media_type: str, schema: Schema) -> dict[str, Any] | None:
     answer = exchange.response
     if not answer.ok or answer.media_type != media_type:

@@ -1,20 +1,13 @@
 """Whether what breaks the contract is refused: with 4xx, with the fitting one, and with a detail that helps."""
 
 from collections.abc import Callable
-from http import HTTPStatus
 
 from conformance.rest import problem
 from conformance.rest.interface import RestInterface
+from conformance.rest.statuses import is_refusal, judge_status
 from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
 
-# These refuse the request for another reason than its content.
-_NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
 _MALFORMED, _INVALID = 400, 422
-
-
-def refuses(status: int) -> bool:
-    """Whether a status refuses a request because of what is in it."""
-    return HTTPStatus.BAD_REQUEST <= status < HTTPStatus.INTERNAL_SERVER_ERROR and status not in _NO_REFUSALS
 
 
 def judge_refusal(
@@ -66,28 +59,13 @@ def judge_refusal(
             found=str(none),
             cause=f"{what.split(' at ', 1)[0]} {none.kind}",
         )
-    answer = exchange.response
-    status = answer.status
-    refused = judge.check(
-        requirement,
-        refuses(status),
-        exchange,
-        f"4xx for {what}",
-        found=f"status {status}",
-        cause=f"{what.split(' at ', 1)[0]} {status}",
-    )
-    if not refused:
+    status = exchange.response.status
+    cause = f"{what.split(' at ', 1)[0]} {status}"
+    if not judge_status(judge, requirement, is_refusal(exchange), exchange, f"4xx for {what}", cause=cause):
         return False
     if json and malformed is not None:
-        fitting = _MALFORMED if malformed else _INVALID
-        judge.check(
-            f"strict-input/status-{'malformed' if malformed else 'invalid'}",
-            status == fitting,
-            exchange,
-            f"{fitting} for {what}",
-            found=f"status {status}",
-            cause=f"{status}",
-        )
+        fitting, name = (_MALFORMED, "malformed") if malformed else (_INVALID, "invalid")
+        judge_status(judge, f"strict-input/status-{name}", status == fitting, exchange, f"{fitting} for {what}")
     if status in {_MALFORMED, _INVALID}:
         _judge_detail(api, exchange, what, field, shown)
     return True

@@ -61,7 +61,7 @@ class ListObserver:
 
     exact = False
 
-    def __init__(self, rest: HttpClient, slow_s: float = 0.0) -> None:
+    def __init__(self, rest: HttpClient, slow_s: float) -> None:
         self._rest = rest
         self._slow_s = slow_s
         self._before: list[Any] = []

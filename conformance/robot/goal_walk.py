@@ -1,6 +1,6 @@
 """Goals in any order, as a state machine: put, repeated, contradicted, displaced, cancelled, put again."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any, Final
 
@@ -26,11 +26,6 @@ from conformance.transport.exchange import Exchange
 
 _IDS: Final = st.sampled_from((None, "a", "b", "a ", "A"))
 _WHICH: Final = st.integers(0, 1)
-
-
-def machine(walk: Walk, poses: Sequence[Pose]) -> Callable[[], RuleBasedStateMachine]:
-    """A factory of machines that send one robot to poses, of which there are two at least."""
-    return lambda: GoalMachine(walk, poses)
 
 
 class GoalMachine(RuleBasedStateMachine):

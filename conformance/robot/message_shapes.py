@@ -5,6 +5,7 @@ A robot may add fields to what a schema names.
 
 import json
 from collections.abc import Mapping
+from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.contract.files import Contract
@@ -58,13 +59,13 @@ MESSAGE_TYPE: Final = Shape(_SENSORS["items"]["properties"]["type"])
 SERVICE_TYPE: Final = Shape(_SERVICES["items"]["properties"]["type"])
 
 
-def read_as(response: Response, shape: Shape, status: int = 200) -> tuple[Any, str]:
-    """The value of a shape in an answer with a status.
+def read_as(response: Response, shape: Shape) -> tuple[Any, str]:
+    """The value of a shape in an answer with status 200.
 
     Returns:
         (value, ""), or (None, what is wrong with the answer).
     """
-    if response.status != status:
+    if response.status != HTTPStatus.OK:
         return None, f"status {response.status}"
     text = read_json(response.body)
     problem = text.unreadable or shape.problem(text.value)

@@ -7,15 +7,10 @@ from typing import Any, Final
 from conformance.documents.json_text import read_json
 from conformance.rest.interface import RestInterface
 from conformance.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
+from conformance.robot.robot import ACCEPT_JSON, GOAL_PATH, JSON_BODY, POSE, STILL, VELOCITY, Velocity
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Response
 
-_GOAL: Final = "/robot/navigation/action/goal/"
-_VELOCITY: Final = "/robot/velocity/"
-_POSE: Final = "/robot/pose/"
-_STILL: Final = body_of({part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")})
-_JSON: Final = (("Content-Type", "application/json"),)
-_ACCEPT: Final = (("Accept", "application/json"),)
 _NOT_FOUND: Final = 404
 # A robot with a queue of missions starts the next one when the first is cancelled: cancel again for so long, s.
 _CANCEL_S: Final = 3.0
@@ -91,15 +86,15 @@ class _Stiller:
         """Cancel and stop; what bring_to_rest() says of it."""
         cancelled = self._no_goal_left(time.monotonic() + cancel_s)
         # Also where the goal could not be cancelled: a robot that takes velocities meanwhile stops for a moment.
-        self._ask("PUT", _VELOCITY, _JSON, _STILL)
+        self._ask("PUT", VELOCITY, JSON_BODY, body_of(STILL.twist))
         if not cancelled:
             return f"its goal is still active after {cancel_s:g} s of cancelling it"
         return self._wait(time.monotonic() + settle_s)
 
     def _no_goal_left(self, until: float) -> bool:
         while True:
-            cancelled = self._ask("DELETE", _GOAL)
-            current = self._ask("GET", _GOAL, _ACCEPT)
+            cancelled = self._ask("DELETE", GOAL_PATH)
+            current = self._ask("GET", GOAL_PATH, ACCEPT_JSON)
             # Anything but a goal that can be read: there is none, or no such resource, or no telling. Whether the robot
             # moves is seen by its velocity.
             if current is None or not current.response.ok or not _shows(current.response):
@@ -124,7 +119,7 @@ class _Stiller:
 
     def _speed(self) -> tuple[float, str]:
         """The greatest component of the measured velocity, and why it cannot be told."""
-        read = self._ask("GET", _VELOCITY, _ACCEPT)
+        read = self._ask("GET", VELOCITY, ACCEPT_JSON)
         if read is not None and read.response.status == _NOT_FOUND:
             return 0.0, ""  # a robot without this resource: nothing says that it moves
         twist: Any
@@ -132,12 +127,12 @@ class _Stiller:
         twist, problem = read_as(read.response, TWIST) if read else (None, self._silent)
         if problem:
             # What the velocity does not say, the odometry may.
-            read = self._ask("GET", _POSE, _ACCEPT)
+            read = self._ask("GET", POSE, ACCEPT_JSON)
             odometry, unread = read_as(read.response, ODOMETRY) if read else (None, self._silent)
             if unread:
                 return 0.0, f"its velocity cannot be read: {problem}"
             twist = odometry["twist"]["twist"]
-        return max(abs(twist[part][axis]) for part in ("linear", "angular") for axis in "xyz"), ""
+        return max(map(abs, Velocity.of(twist))), ""
 
     def _ask(
         self, method: str, path: str, headers: tuple[tuple[str, str], ...] = (), body: bytes = b""

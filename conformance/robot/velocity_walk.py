@@ -1,7 +1,6 @@
 """Velocities in any order, as a state machine: what was asked for last is what the robot does."""
 
 import time
-from collections.abc import Callable
 
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
@@ -15,11 +14,6 @@ _ANGULAR_SHARE = 0.6
 # Farther than this from where the walk began, the next way leads back, m.
 _LEASH_M = 0.25
 _SHARES = st.floats(0.15, 1.0)
-
-
-def machine(walk: Walk) -> Callable[[], RuleBasedStateMachine]:
-    """A factory of machines that drive one robot."""
-    return lambda: VelocityMachine(walk)
 
 
 class VelocityMachine(RuleBasedStateMachine):

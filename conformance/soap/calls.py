@@ -9,6 +9,7 @@ from conformance.documents.xml_node import Node
 from conformance.soap.envelope import Envelope, Fault, NotSoapError, envelope, read
 from conformance.soap.service import SoapService
 from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -115,3 +116,16 @@ def call(service: SoapService, *payload: Node, headers: tuple[Node, ...] | None 
         NoAnswerError: no HTTP response came.
     """
     return send(service, envelope(payload, headers), **how)
+
+
+def judge_answer(
+    judge: Judge,
+    requirement: str,
+    holds: bool,  # noqa: FBT001 - as Judge.check()
+    answer: SoapResponse,
+    expected: str,
+    *,
+    cause: str = "",
+) -> bool:
+    """Judge one case by what a service answered, which a finding then describes; see Judge.check()."""
+    return judge.check(requirement, holds, answer.exchange, expected, found=answer.describe(), cause=cause)

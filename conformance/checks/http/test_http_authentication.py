@@ -4,6 +4,7 @@ import pytest
 
 from conformance.rest.applicable import reads
 from conformance.rest.interface import RestInterface
+from conformance.rest.statuses import judge_status
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
@@ -31,11 +32,4 @@ def _judge(judge: Judge, exchange: Exchange, *, asked: bool) -> None:
             "http/authentication", bool(challenge), exchange, "WWW-Authenticate with 401", found="no WWW-Authenticate"
         )
     else:
-        judge.check(
-            "http/authentication",
-            not asked,
-            exchange,
-            "401 where the token is missing or wrong",
-            found=f"status {status}",
-            cause=f"{status}",
-        )
+        judge_status(judge, "http/authentication", not asked, exchange, "401 where the token is missing or wrong")

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from conformance.documents.openapi import Operation
 from conformance.rest.applicable import applicable_operations
 from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.interface import RestInterface
+from conformance.rest.statuses import is_taken, judge_status
 from conformance.robot.stopping import stop_robot
-from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
+from conformance.transport.exchange import NoAnswer, NoAnswerError
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
@@ -25,24 +25,14 @@ _TAKEN = 64 * 1024
 _TOO_LARGE = 10 * 1024 * 1024 + 1
 
 
-def _takes_json(operation: Operation) -> bool:
-    return JSON in operation.bodies
-
-
-def _accepted(exchange: Exchange) -> bool:
-    """Whether a valid request was taken, or only put off."""
-    answer = exchange.response
-    return answer.ok or answer.status == 409
-
-
 def _valid(api: RestInterface, judge: Judge, ids: tuple[str, ...]) -> Iterator[Call]:
     """A valid request for each operation that takes JSON and is answered as one should be."""
     tried = 0
-    for operation in applicable_operations(api, ids, _takes_json, "takes JSON"):
+    for operation in applicable_operations(api, ids, lambda item: JSON in item.bodies, "takes JSON"):
         stop_robot(api)
         call = example_call(api, operation)
         exchange = call.send(api)
-        if _accepted(exchange):
+        if is_taken(exchange):
             tried += 1
             yield call
         else:
@@ -54,20 +44,17 @@ def _valid(api: RestInterface, judge: Judge, ids: tuple[str, ...]) -> Iterator[C
 @pytest.mark.requirement("http/unsupported-media-type")
 def test_media_types_that_are_not_taken(api: RestInterface, judge: Judge) -> None:
     """A valid body under another media type, and under none at all, is not looked at."""
-    for operation in applicable_operations(api, ["http/unsupported-media-type"], _takes_json, "takes JSON"):
+    for operation in applicable_operations(
+        api, ["http/unsupported-media-type"], lambda item: JSON in item.bodies, "takes JSON"
+    ):
         call = example_call(api, operation)
         for media_type in api.run.effort.subsample(_OTHERS, 2):
             if media_type in operation.bodies:
                 continue
             exchange = call.send(api, ("Content-Type", media_type))
             status = exchange.response.status
-            judge.check(
-                "http/unsupported-media-type",
-                status == 415,
-                exchange,
-                f"415 for a body of {media_type}",
-                found=f"status {status}",
-                cause=f"{status}",
+            judge_status(
+                judge, "http/unsupported-media-type", status == 415, exchange, f"415 for a body of {media_type}"
             )
 
 
@@ -79,7 +66,7 @@ def test_charset_parameter(api: RestInterface, judge: Judge) -> None:
             exchange = call.send(api, ("Content-Type", media_type))
             judge.check(
                 "http/charset",
-                _accepted(exchange),
+                is_taken(exchange),
                 exchange,
                 f"Content-Type: {media_type} taken like {JSON}",
                 cause=media_type,
@@ -93,12 +80,12 @@ def test_sizes(api: RestInterface, judge: Judge) -> None:
     for call in _valid(api, judge, ("http/content-too-large",)):
         padded = call.carrying(call.body[:1] + b" " * (_TAKEN - len(call.body)) + call.body[1:])
         exchange = padded.send(api)
-        judge.check("http/content-too-large", _accepted(exchange), exchange, "a body of 64 KiB taken")
+        judge.check("http/content-too-large", is_taken(exchange), exchange, "a body of 64 KiB taken")
         huge = call.carrying(call.body[:1] + b" " * (_TOO_LARGE - len(call.body)) + call.body[1:])
         for fields in ((), (("Transfer-Encoding", "chunked"),)):
             _judge_too_large(api, judge, huge, fields)
         exchange = call.send(api)
-        judge.check("http/content-too-large", _accepted(exchange), exchange, "the next valid request taken as ever")
+        judge.check("http/content-too-large", is_taken(exchange), exchange, "the next valid request taken as ever")
 
 
 def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple[tuple[str, str], ...]) -> None:

@@ -5,6 +5,7 @@ import pytest
 from conformance.rest.accept import quality
 from conformance.rest.applicable import answered
 from conformance.rest.interface import RestInterface
+from conformance.rest.statuses import judge_status
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
@@ -19,14 +20,7 @@ def test_no_acceptable_format(api: RestInterface, judge: Judge) -> None:
     for call, accept in api.run.effort.draw(cases, 120, f"{api.run.seed}/not acceptable"):
         exchange = call.send(api, ("Accept", accept))
         status = exchange.response.status
-        judge.check(
-            "http/not-acceptable",
-            status == 406,
-            exchange,
-            f"406 for Accept: {accept}",
-            found=f"status {status}",
-            cause=f"{status}",
-        )
+        judge_status(judge, "http/not-acceptable", status == 406, exchange, f"406 for Accept: {accept}")
 
 
 @pytest.mark.requirement("http/q-zero")

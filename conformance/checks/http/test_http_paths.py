@@ -9,6 +9,7 @@ from conformance.rest.applicable import reads
 from conformance.rest.calls import example_call
 from conformance.rest.interface import RestInterface
 from conformance.rest.observers import KNOWN_METHODS
+from conformance.rest.statuses import judge_status
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
 from conformance.verdict.evidence import Judge
@@ -42,12 +43,12 @@ def test_unknown_paths(api: RestInterface, rest: HttpClient, judge: Judge) -> No
         for method in api.run.effort.subsample(_METHODS, 3):
             exchange = rest.send(method, path)
             status = exchange.response.status
-            judge.check(
+            judge_status(
+                judge,
                 "http/not-found",
                 status == 404 or (status == 501 and method not in KNOWN_METHODS),
                 exchange,
                 f"404 for {method} of an unknown path",
-                found=f"status {status}",
                 cause=f"{method} {status}",
             )
         rest.send("GET", path, headers=[("Accept", "application/xml")])

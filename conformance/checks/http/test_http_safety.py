@@ -9,6 +9,7 @@ from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.effects import reader_of, settles_at
 from conformance.rest.interface import RestInterface
 from conformance.rest.snapshot import changed, changes_by_itself, flatten, take_snapshots
+from conformance.rest.statuses import is_taken, judge_status
 from conformance.robot.stopping import stop_robot
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
@@ -50,7 +51,7 @@ def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
         stop_robot(api)
         call = example_call(api, operation)
         reader = reader_of(api, call)
-        if reader is None or _is_there(reader.send(api)):
+        if reader is None or reader.send(api).response.ok:
             continue
         kept, exchange, took = _put_and_watch(api, call, reader, [reader, *others], _WATCHED_S)
         if not kept:
@@ -84,14 +85,10 @@ def _put_and_watch(
         for method in ("HEAD", "OPTIONS"):
             item.send(api, method=method)
     until = time.monotonic() + seconds
-    while _is_there(exchange) and time.monotonic() < until:
+    while exchange.response.ok and time.monotonic() < until:
         time.sleep(0.01)
         exchange = reader.send(api)
-    return _is_there(exchange), exchange, time.monotonic() - started
-
-
-def _is_there(exchange: Exchange) -> bool:
-    return exchange.response.ok
+    return exchange.response.ok, exchange, time.monotonic() - started
 
 
 def _judge_safe(api: RestInterface, judge: Judge) -> None:
@@ -142,7 +139,10 @@ def test_put_twice(api: RestInterface, judge: Judge) -> None:
             # A goal of the robot's own may have begun in between: once more from the start.
             stop_robot(api)
             first, once, second = _pair(api, call)
-        if not _accepted(judge, "http/put-idempotent", operation.id, first):
+        if not is_taken(first):
+            # A robot with reasons of its own to refuse the contract's example is not blamed here.
+            remark = f"{operation.id} with a valid request is answered {first.came}, so it was not tried"
+            judge.note("http/put-idempotent", remark)
             continue
         statuses = [item.response.status for item in (first, second)]
         fine = 200 <= statuses[1] < 300 or statuses[0] == 409
@@ -176,15 +176,6 @@ def _pair(api: RestInterface, call: Call) -> tuple[Exchange, str | None, Exchang
     return first, settles_at(api, call), second
 
 
-def _accepted(judge: Judge, requirement: str, id_: str, exchange: Exchange) -> bool:
-    """Whether the contract's example was taken; a robot with reasons of its own to refuse it is not blamed here."""
-    answer = exchange.response
-    if answer.ok or answer.status == 409:
-        return True
-    judge.note(requirement, f"{id_} with a valid request is answered {exchange.came}, so it was not tried")
-    return False
-
-
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/delete-idempotent")
 def test_delete_twice(api: RestInterface, judge: Judge) -> None:
@@ -200,13 +191,12 @@ def test_delete_twice(api: RestInterface, judge: Judge) -> None:
             before = _after_a_while(api, read)
             exchange = call.send(api)
             status = exchange.response.status
-            judge.check(
+            judge_status(
+                judge,
                 "http/delete-idempotent",
                 200 <= status < 300 or status == 404,
                 exchange,
                 "2xx or 404 for a second DELETE",
-                found=f"status {status}",
-                cause=f"{status}",
             )
             after = _after_a_while(api, read)
             # A robot with a mission waiting may have begun it in between: that is no effect of the DELETE.

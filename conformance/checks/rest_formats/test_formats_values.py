@@ -7,7 +7,7 @@ from conformance.documents.openapi import Operation, is_xml, operations_of
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
 from conformance.rest.applicable import answered, reads
 from conformance.rest.calls import root_name
-from conformance.rest.formats import disagreements
+from conformance.rest.formats import judge_same_values
 from conformance.rest.interface import RestInterface
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -18,20 +18,18 @@ _TEXT = "text/plain"
 _IDS = {_XML: "rest-formats/xml", _TEXT: "rest-formats/text"}
 
 
-def _lacks(api: RestInterface, media_type: str, *ids: str) -> bool:
+def _say_lacking(api: RestInterface, media_type: str, *ids: str) -> None:
     """Say that requirements do not apply where no operation of the contract has the format."""
-    if any(media_type in operation.formats for operation in operations_of(api.run.contract)):
-        return False
-    for id_ in ids:
-        api.run.judge.unclaimed(id_, f"the contract has no answers as {media_type}")
-    return True
+    if not any(media_type in operation.formats for operation in operations_of(api.run.contract)):
+        for id_ in ids:
+            api.run.judge.unclaimed(id_, f"the contract has no answers as {media_type}")
 
 
 @pytest.mark.requirement("rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/vary")
 def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -> None:
     """Each resource is sent as XML and as text when that is asked for; the observers judge what is in them."""
-    _lacks(api, _XML, "rest-formats/xml", "rest-formats/xml-root")
-    _lacks(api, _TEXT, "rest-formats/text")
+    _say_lacking(api, _XML, "rest-formats/xml", "rest-formats/xml-root")
+    _say_lacking(api, _TEXT, "rest-formats/text")
     if not any(len(operation.formats) > 1 for operation in operations_of(api.run.contract)):
         judge.unclaimed("rest-formats/vary", "the contract has no answers in more than one format")
     calls = answered(api)
@@ -77,18 +75,6 @@ def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None
         others = [name for name in _IDS if name in call.operation.formats]
         if not others:
             continue
-        found, exchange = disagreements(api, call, others)
-        if not exchange.response.ok:
-            continue
-        compared += 1
-        first = found[0] if found else None
-        judge.check(
-            "rest-formats/same-values",
-            first is None,
-            first.exchange if first else exchange,
-            f"the same values in all formats of {call.operation.template}",
-            found=first.description if first else "",
-            cause=call.operation.id,
-        )
+        compared += judge_same_values(api, call, others).response.ok
     if not compared and not any(set(_IDS) & set(item.formats) for item in operations_of(api.run.contract)):
         judge.unclaimed("rest-formats/same-values", "the contract has one format only")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.robot.goal_walk import machine
+from conformance.robot.goal_walk import GoalMachine
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import Robot
 from conformance.robot.walk import Walk
@@ -26,6 +26,6 @@ def test_goal_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
     """Whatever clients do with goals, in whatever order, the one that was put last is the active one."""
     walk = Walk(robot, 0.4 * effort.budget_s)
     poses = choose_goals(walk.robot, 1.5, 2)
-    explore.machine(machine(walk, poses), cases=20, steps=effort.cases(12))
+    explore.machine(lambda: GoalMachine(walk, poses), cases=20, steps=effort.cases(12))
     if walk.unreachable:
         raise walk.unreachable

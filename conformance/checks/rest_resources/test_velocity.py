@@ -4,7 +4,7 @@ import pytest
 
 from conformance.robot.goals import make_room
 from conformance.robot.robot import Robot
-from conformance.robot.velocity_walk import machine
+from conformance.robot.velocity_walk import VelocityMachine
 from conformance.robot.walk import Walk
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
@@ -26,7 +26,7 @@ def test_velocity_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
     """Whatever is asked for, in whatever order, is what the robot does, and its pose follows."""
     make_room(robot)
     walk = Walk(robot, 0.8 * effort.budget_s)
-    explore.machine(machine(walk), cases=10, steps=effort.cases(12))
+    explore.machine(lambda: VelocityMachine(walk), cases=10, steps=effort.cases(12))
     walk.drive.judge_motion()
     if walk.unreachable:
         raise walk.unreachable

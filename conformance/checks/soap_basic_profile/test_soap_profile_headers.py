@@ -7,7 +7,7 @@ import pytest
 from conformance.documents.xml_names import ENVELOPE, NEXT_ACTOR, clark
 from conformance.documents.xml_node import Node
 from conformance.soap.callable_services import SoapServices, callable_services, repetitions
-from conformance.soap.calls import SoapResponse, call, send
+from conformance.soap.calls import SoapResponse, call, judge_answer, send
 from conformance.soap.envelope import envelope
 from conformance.soap.service import SoapService
 from conformance.soap.valid_messages import example, quiet_example
@@ -35,9 +35,7 @@ def _messages(service: SoapService) -> list[Node]:
 
 
 def _is_fault(judge: Judge, id_: str, answer: SoapResponse, code: str, what: str) -> bool:
-    return judge.check(
-        id_, answer.code == code, answer.exchange, f"a fault with the code {code} for {what}", found=answer.describe()
-    )
+    return judge_answer(judge, id_, answer.code == code, answer, f"a fault with the code {code} for {what}")
 
 
 @pytest.mark.requirement("soap-basic-profile/R1015", "soap-basic-profile/version-mismatch")
@@ -47,23 +45,23 @@ def test_other_versions(soap: SoapServices, judge: Judge, effort: Effort) -> Non
         messages = _messages(service)[: effort.cases(10)] or [_UNKNOWN]
         for message in messages:
             answer = send(service, envelope([message], space=_OTHER_VERSION))
-            judge.check(
+            judge_answer(
+                judge,
                 "soap-basic-profile/R1015",
                 answer.fault is not None,
-                answer.exchange,
+                answer,
                 "a fault for an Envelope of another namespace",
-                found=answer.describe(),
             )
             _is_fault(judge, "soap-basic-profile/version-mismatch", answer, "VersionMismatch", "another envelope")
         answer = send(service, envelope([messages[0]], space=_SOAP_12))
         # A robot that speaks SOAP 1.2 as well answers in it, and has no other version before it.
         speaks_both = _SOAP_12.encode() in answer.exchange.response.body
-        judge.check(
+        judge_answer(
+            judge,
             "soap-basic-profile/R1015",
             speaks_both or answer.fault is not None,
-            answer.exchange,
+            answer,
             "a fault for an Envelope of SOAP 1.2",
-            found=answer.describe(),
         )
 
 
@@ -102,13 +100,7 @@ def test_other_headers(soap: SoapServices, judge: Judge, effort: Effort) -> None
                 ("R2739", "an empty Header", ()),
             ):
                 answer = call(service, message, headers=headers)
-                judge.check(
-                    f"soap-basic-profile/{id_}",
-                    answer.accepted,
-                    answer.exchange,
-                    f"2xx with {what}",
-                    found=answer.describe(),
-                )
+                judge_answer(judge, f"soap-basic-profile/{id_}", answer.accepted, answer, f"2xx with {what}")
 
 
 @pytest.mark.requirement("soap-basic-profile/R2725")

@@ -6,7 +6,7 @@ from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xml_node import Node
 from conformance.soap.callable_services import SoapServices, callable_services, repetitions
-from conformance.soap.calls import SoapResponse, call, read_exchange, send
+from conformance.soap.calls import SoapResponse, call, judge_answer, read_exchange, send
 from conformance.soap.envelope import envelope
 from conformance.soap.service import SoapService
 from conformance.soap.valid_messages import quiet_example
@@ -37,13 +37,7 @@ def test_soap_action(soap: SoapServices, judge: Judge, effort: Effort) -> None:
         actions = ['""', f'"{operation.input_action or operation.name}"', '"http://example.com/some/action"']
         for action in actions * repetitions(effort, 3):
             answer = call(service, message, soap_action=action)
-            judge.check(
-                "soap-basic-profile/R1109",
-                answer.accepted,
-                answer.exchange,
-                f"2xx with SOAPAction: {action}",
-                found=answer.describe(),
-            )
+            judge_answer(judge, "soap-basic-profile/R1109", answer.accepted, answer, f"2xx with SOAPAction: {action}")
 
 
 def _malformed(message: Node) -> list[tuple[str, bytes]]:
@@ -89,14 +83,8 @@ def test_malformed(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 def _judge_malformed(judge: Judge, answer: SoapResponse, what: str) -> None:
     fits = (answer.fault is None and 400 <= answer.status < 500) or (answer.fault is not None and answer.status == 500)
     expected = f"4xx without a fault or 500 with one, for {what}"
-    judge.check("soap-basic-profile/R1125", fits, answer.exchange, expected, found=answer.describe())
-    judge.check(
-        "soap-basic-profile/R1113",
-        answer.status == 400,
-        answer.exchange,
-        f"status 400 for {what}",
-        found=answer.describe(),
-    )
+    judge_answer(judge, "soap-basic-profile/R1125", fits, answer, expected)
+    judge_answer(judge, "soap-basic-profile/R1113", answer.status == 400, answer, f"status 400 for {what}")
 
 
 def _truncated(judge: Judge, service: SoapService) -> None:
@@ -162,10 +150,4 @@ def test_media_types(soap: SoapServices, judge: Judge, effort: Effort) -> None:
         body = envelope([_message(service)]).written()
         for media_type in types * repetitions(effort, 3):
             answer = send(service, body, content_type=media_type)
-            judge.check(
-                "soap-basic-profile/R1115",
-                answer.status == 415,
-                answer.exchange,
-                f"415 for {media_type}",
-                found=answer.describe(),
-            )
+            judge_answer(judge, "soap-basic-profile/R1115", answer.status == 415, answer, f"415 for {media_type}")

@@ -8,7 +8,7 @@ from conformance.documents.wsdl import Operation
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.soap.callable_services import SoapServices, callable_services
-from conformance.soap.calls import call, send
+from conformance.soap.calls import call, judge_answer, send
 from conformance.soap.envelope import envelope
 from conformance.soap.mutations import invalid_ones, mutations
 from conformance.soap.service import SoapService
@@ -45,20 +45,20 @@ def test_answers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
         for operation, message in good:
             for _ in range(effort.cases(15)):
                 answer = call(service, message)
-                judge.check(
+                judge_answer(
+                    judge,
                     "soap-basic-profile/R1017",
                     answer.accepted,
-                    answer.exchange,
+                    answer,
                     "2xx for a valid message without xsi:type",
-                    found=answer.describe(),
                 )
                 if answer.accepted:
-                    judge.check(
+                    judge_answer(
+                        judge,
                         "soap-basic-profile/R2712",
                         answer.payload == operation.response,
-                        answer.exchange,
+                        answer,
                         f"{operation.response} in the Body",
-                        found=answer.describe(),
                     )
 
 
@@ -92,21 +92,9 @@ def test_dispatch(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             for action in spoofed[: effort.cases(len(spoofed))]:
                 answer = call(service, message, soap_action=action)
                 right = answer.accepted and answer.payload == operation.response
-                judge.check(
-                    ids[0],
-                    right,
-                    answer.exchange,
-                    f"{operation.response}, the Body's operation",
-                    found=answer.describe(),
-                )
+                judge_answer(judge, ids[0], right, answer, f"{operation.response}, the Body's operation")
                 # To refuse such a message is safe, if not by the profile; to run the other operation is neither.
-                judge.check(
-                    ids[1],
-                    right or answer.refused,
-                    answer.exchange,
-                    f"{operation.response} or a refusal",
-                    found=answer.describe(),
-                )
+                judge_answer(judge, ids[1], right or answer.refused, answer, f"{operation.response} or a refusal")
 
 
 @pytest.mark.requirement("soap-basic-profile/unknown-operation")
@@ -122,7 +110,7 @@ def test_unknown_operation(soap: SoapServices, judge: Judge, effort: Effort) -> 
         for tag in tags[: effort.cases(len(tags))]:
             for action in ('""', f'"{known[0].input_action or known[0].name}"') if known else ('""',):
                 answer = call(service, Node(tag), soap_action=action)
-                judge.check(id_, answer.refused, answer.exchange, f"a fault or 4xx for {tag}", found=answer.describe())
+                judge_answer(judge, id_, answer.refused, answer, f"a fault or 4xx for {tag}")
 
 
 @pytest.mark.requirement("soap-basic-profile/R4001", "soap-basic-profile/utf-16")
@@ -141,13 +129,7 @@ def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             ):
                 answer = send(service, body, content_type=f"text/xml; charset={charset}")
                 right = answer.accepted and answer.payload == operation.response
-                judge.check(
-                    f"soap-basic-profile/{id_}",
-                    right,
-                    answer.exchange,
-                    f"2xx for a message in {what}",
-                    found=answer.describe(),
-                )
+                judge_answer(judge, f"soap-basic-profile/{id_}", right, answer, f"2xx for a message in {what}")
 
 
 @pytest.mark.requirement("soap-basic-profile/R2724")
@@ -163,11 +145,11 @@ def test_invalid_messages(soap: SoapServices, judge: Judge, effort: Effort) -> N
             step = max(1, len(wrong) // effort.cases(40))
             for mutant in invalid_ones(wrong[::step], service.contract.types):
                 answer = call(service, *mutant.payload)
-                judge.check(
+                judge_answer(
+                    judge,
                     "soap-basic-profile/R2724",
                     answer.code == "Client",
-                    answer.exchange,
+                    answer,
                     f"a Client fault where {mutant.what}",
-                    found=answer.describe(),
                     cause=f"{mutant.kind} {answer.status} {answer.code}",
                 )

@@ -8,7 +8,7 @@ from conformance.documents.xml_names import ADDRESSING, clark, local
 from conformance.documents.xml_node import Node
 from conformance.robot import delivery_messages
 from conformance.soap.callable_services import repetitions
-from conformance.soap.calls import SoapResponse, call, send
+from conformance.soap.calls import SoapResponse, call, judge_answer, send
 from conformance.soap.envelope import envelope
 from conformance.soap.forms import written_integer
 from conformance.soap.messages import variants, with_text
@@ -25,7 +25,7 @@ _VALID = "soap-delivery/response-valid"
 
 def _answered(judge: Judge, id_: str, operation: str, answer: SoapResponse, what: str) -> bool:
     """Judge that a valid request was taken, and that the answer is what the XSD says."""
-    taken = judge.check(id_, answer.accepted, answer.exchange, f"2xx for {what}", found=answer.describe())
+    taken = judge_answer(judge, id_, answer.accepted, answer, f"2xx for {what}")
     return _valid(judge, operation, answer) and taken if answer.succeeded else taken
 
 
@@ -33,7 +33,7 @@ def _valid(judge: Judge, operation: str, answer: SoapResponse) -> bool:
     expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
     wrapper = answer.first
     if wrapper is None or wrapper.tag != expected:
-        return judge.check(_VALID, False, answer.exchange, f"{expected} in the Body", found=answer.describe())
+        return judge_answer(judge, _VALID, False, answer, f"{expected} in the Body")
     inside = [local(str(child.tag)) for child in elements(wrapper)]
     text = text_of(wrapper).strip()
     return judge.check(
@@ -53,13 +53,7 @@ def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> No
             code = "3" if operation == "ExecuteDeliveryRequest" and number % 2 else "4"
             answer = call(publishers, delivery_messages.delivery(operation, code))
             right = answer.payload == clark(delivery_messages.NAMESPACE, f"{operation}Response")
-            judge.check(
-                id_,
-                answer.accepted and right,
-                answer.exchange,
-                f"2xx with {operation}Response for code {code}",
-                found=answer.describe(),
-            )
+            judge_answer(judge, id_, answer.accepted and right, answer, f"2xx with {operation}Response for code {code}")
             if answer.succeeded:
                 _valid(judge, operation, answer)
 
@@ -158,12 +152,12 @@ def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
     for code in codes[: effort.cases(len(codes))]:
         answer = call(publishers, delivery_messages.delivery(code=code))
         for id_ in ("soap-delivery/refuses-code", "strict-input/soap-code"):
-            judge.check(id_, answer.refused, answer.exchange, f"a refusal of code {code}", found=answer.describe())
+            judge_answer(judge, id_, answer.refused, answer, f"a refusal of code {code}")
         if not answer.accepted:
-            judge.check(
+            judge_answer(
+                judge,
                 "strict-input/soap-fault",
                 answer.fault is not None and answer.status == 500,
-                answer.exchange,
+                answer,
                 "a fault with status 500",
-                found=answer.describe(),
             )

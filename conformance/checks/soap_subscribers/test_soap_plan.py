@@ -16,7 +16,7 @@ from conformance.robot.geometry import Pose
 from conformance.robot.plan import START_OFF
 from conformance.soap import content
 from conformance.soap.callable_services import SoapServices
-from conformance.soap.calls import SoapResponse, call
+from conformance.soap.calls import SoapResponse, call, judge_answer
 from conformance.soap.service import SoapService
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -109,7 +109,7 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
         if planned >= wanted:
             break
     if not planned and answer is not None:
-        judge.check(_PLAN, False, answer.exchange, "a plan to where the robot is", found=answer.describe())
+        judge_answer(judge, _PLAN, False, answer, "a plan to where the robot is")
 
 
 def _problem(path: _Path, before: Pose, after: Pose, target: Pose, frame: str) -> str:
@@ -142,10 +142,6 @@ def test_no_plan(subscribers: SoapService, judge: Judge) -> None:
         path = _path(wrapper, expected)[0] if wrapper is not None else None
         # A robot in an open world may know a way to anywhere; then it has to end there.
         arrives = path is not None and math.hypot(path.points[-1][0] - 1e7, path.points[-1][1] + 1e7) < 1
-        judge.check(
-            "soap-subscribers/plan-none",
-            answer.fault is not None or arrives,
-            answer.exchange,
-            f"a fault for {what}",
-            found=answer.describe(),
+        judge_answer(
+            judge, "soap-subscribers/plan-none", answer.fault is not None or arrives, answer, f"a fault for {what}"
         )

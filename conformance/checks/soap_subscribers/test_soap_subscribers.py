@@ -12,7 +12,7 @@ from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.robot import delivery_messages
 from conformance.soap import content
-from conformance.soap.calls import SoapResponse, call
+from conformance.soap.calls import SoapResponse, call, judge_answer
 from conformance.soap.service import SoapService
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -37,7 +37,7 @@ def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapRes
     expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
     first = answer.first if answer.fault is None else None
     if first is None or first.tag != expected:
-        judge.check(_VALID, False, answer.exchange, f"{expected} in the Body", found=answer.describe())
+        judge_answer(judge, _VALID, False, answer, f"{expected} in the Body")
         return None
     described = service.described
     if described.shape(expected) is None:
@@ -50,7 +50,7 @@ def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapRes
 def _complete(judge: Judge, id_: str, service: SoapService, operation: str) -> etree._Element | None:
     """Ask an operation without arguments, and judge that it returns all that the contract says; return it."""
     answer = call(service, Node(clark(delivery_messages.NAMESPACE, operation)))
-    judge.check(id_, answer.accepted, answer.exchange, f"{operation}Response", found=answer.describe())
+    judge_answer(judge, id_, answer.accepted, answer, f"{operation}Response")
     if not answer.succeeded:
         return None
     wrapper = _wrapper(judge, service, operation, answer)
@@ -95,7 +95,7 @@ def test_lists(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
             ("GetNavigationServices", "soap-subscribers/services"),
         ):
             answer = call(subscribers, Node(clark(delivery_messages.NAMESPACE, operation)))
-            judge.check(id_, answer.accepted, answer.exchange, f"{operation}Response", found=answer.describe())
+            judge_answer(judge, id_, answer.accepted, answer, f"{operation}Response")
             if not answer.succeeded:
                 continue
             wrapper = _wrapper(judge, subscribers, operation, answer)
@@ -133,7 +133,7 @@ def test_goal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
             continue
         wrapper = _wrapper(judge, subscribers, "GetGoal", answer) if answer.succeeded else None
         if wrapper is None:
-            judge.check("soap-subscribers/goal", False, answer.exchange, "GetGoalResponse", found=answer.describe())
+            judge_answer(judge, "soap-subscribers/goal", False, answer, "GetGoalResponse")
             continue
         returned = content.content_of(wrapper, expected)
         empty = returned is None or (len(returned) == 0 and not text_of(returned).strip())

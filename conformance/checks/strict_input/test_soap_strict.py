@@ -9,7 +9,7 @@ from conformance.documents.wsdl import Operation
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.soap.callable_services import SoapServices, callable_services
-from conformance.soap.calls import SoapResponse, call
+from conformance.soap.calls import SoapResponse, call, judge_answer
 from conformance.soap.messages import ordinary, variants
 from conformance.soap.mutations import Mutation, invalid_ones, mutations
 from conformance.soap.service import SoapService
@@ -38,22 +38,22 @@ def _targets(service: SoapService) -> list[tuple[Operation, Element, Node]]:
 def _judged(judge: Judge, mutant: Mutation, answer: SoapResponse) -> bool:
     """Judge that a mutant was refused, and how."""
     why = f" ({mutant.reason})" if mutant.reason else ""
-    refused = judge.check(
+    refused = judge_answer(
+        judge,
         f"strict-input/soap-{mutant.kind}",
         answer.refused,
-        answer.exchange,
+        answer,
         f"a refusal where {mutant.what}{why}",
-        found=answer.describe(),
         cause=f"{mutant.kind} {answer.status} {answer.accepted}",
     )
     if answer.accepted:
         return refused
-    return judge.check(
+    return judge_answer(
+        judge,
         _FAULT,
         answer.fault is not None and answer.status == 500,
-        answer.exchange,
+        answer,
         f"a fault with status 500 where {mutant.what}",
-        found=answer.describe(),
         cause=f"{answer.status} {answer.fault is None}",
     )
 

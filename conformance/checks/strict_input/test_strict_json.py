@@ -10,6 +10,7 @@ from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.interface import RestInterface
 from conformance.rest.mutations import MUTATED, Mutation, mutations
 from conformance.rest.refusals import judge_refusal
+from conformance.rest.statuses import is_taken
 from conformance.robot.stopping import stop_robot
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -33,8 +34,9 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
         by_name = _by_requirement(call, operation)
         possible |= {name for name, made in by_name.items() if made}
         first = call.send(api)
-        if not _accepted(first.response.status):
-            _say_unjudged(judge, operation, first.came)
+        if not is_taken(first):
+            for id_ in (*_IDS, *_STATUSES):
+                judge.note(id_, f"a valid {operation.id} is answered {first.came}, so nothing was made of it")
             continue
         for name, made in by_name.items():
             drawn = effort.draw(made, _count(effort, name), f"{api.run.seed}/{operation.id} {name}")
@@ -44,7 +46,7 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
         again = call.send(api)
         judge.check(
             "http/no-server-error",
-            _accepted(again.response.status),
+            is_taken(again),
             again,
             f"a valid {operation.id} taken after all that was refused",
             found=again.came,
@@ -53,15 +55,6 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
     for name in MUTATED if possible else ():
         if name not in possible:
             judge.unclaimed(f"strict-input/{name}", "no body of the contract can be wrong in this way")
-
-
-def _accepted(status: int) -> bool:
-    return 200 <= status < 300 or status == 409
-
-
-def _say_unjudged(judge: Judge, operation: Operation, came: str) -> None:
-    for id_ in (*_IDS, *_STATUSES):
-        judge.note(id_, f"a valid {operation.id} is answered {came}, so nothing was made of it")
 
 
 def _count(effort: Effort, name: str) -> int:

@@ -80,16 +80,11 @@ def _runner(judge: Judge, service: SoapService, message: Node) -> AttackRunner:
     return AttackRunner(judge, send, ask, statistics.median(times))
 
 
-def _no_soap(soap: SoapServices) -> bool:
-    """Whether the robot has no SOAP service at all: then the class is judged over REST alone."""
-    return not soap.there
-
-
 @pytest.mark.requirement(*_IDS)
 def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Each attack in a message that the robot would take without it, in the Body and in a Header block."""
-    if _no_soap(soap):
-        return
+    if not soap.there:
+        return  # then the class is judged over REST alone
     services = callable_services(soap, *_IDS)
     with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
         runners = []
@@ -114,7 +109,7 @@ def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 def test_addressing(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Addresses in WS-Addressing headers are not called, whichever header names them."""
     ids = ("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
-    if _no_soap(soap):
+    if not soap.there:
         for id_ in (ids[0], "xml-security/soapaction-spoofing"):
             judge.unclaimed(id_, "the robot has no SOAP service")
         return

@@ -60,7 +60,6 @@ class Probe:
         self._lines: queue.Queue[str] = queue.Queue(_LINES_KEPT)
         threading.Thread(target=self._listen, daemon=True, name="probe").start()
         atexit.register(self.close)
-        self.nodes = 0
 
     def await_robot(self) -> None:
         """Wait until the probe sees the robot.
@@ -69,7 +68,7 @@ class Probe:
             ProbeError: it does not start, for want of ROS or of the message package, or sees no robot.
         """
         try:
-            self.nodes = int(self._answer(_START_S)["nodes"])
+            self._answer(_START_S)
         except ProbeError:
             self.close()
             raise

@@ -16,9 +16,10 @@ from conformance.rest.formats import disagreements
 from conformance.rest.generated import GeneratedRequest, targets
 from conformance.rest.interface import RestInterface
 from conformance.rest.motion_guard import MotionGuard
-from conformance.rest.refusals import refuses
 from conformance.rest.snapshot import changed, changes_by_itself, flatten, steady, take_snapshots
+from conformance.rest.statuses import is_refusal
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
@@ -115,10 +116,11 @@ def test_schemathesis_makes_the_same_requests_again(api):
     assert {item.method for group in made for item in group} > {"GET", "PUT", "DELETE"}
 
 
-@pytest.mark.parametrize(("status", "expected"), [(400, True), (422, True), (404, True), (204, False), (500, False)])
+@pytest.mark.parametrize(
+    ("status", "expected"), [(400, True), (422, True), (404, True), (204, False), (500, False), (401, False)]
+)
 def test_refusals(status, expected):
-    assert refuses(status) is expected
-    assert not refuses(401)
+    assert is_refusal(Exchange(Request("PUT", "http://robot/"), Response(status, (), b"", 1.0))) is expected
 
 
 def test_what_a_robot_might_take_of_random_requests_is_slow_or_not_sent():
