@@ -4,28 +4,24 @@ A fault that shows once in fifty answers is seen by reading often; all reading t
 """
 
 import time
+from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.documents.json_schema import Shape
 from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import length_of
 from conformance.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
+from conformance.robot.robot import LINEAR, POSE, VELOCITY
 from conformance.transport.exchange import Exchange, Listener
 
 _READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
-    "/robot/pose/": ("rest-resources/pose-type", ODOMETRY, "status 200 with a complete nav_msgs/Odometry"),
-    "/robot/velocity/": ("rest-resources/velocity-type", TWIST, "status 200 with a complete geometry_msgs/Twist"),
-    "/robot/velocity/linear/": (
-        "rest-resources/linear-type",
-        VECTOR3,
-        "status 200 with a complete geometry_msgs/Vector3",
-    ),
+    POSE: ("rest-resources/pose-type", ODOMETRY, "status 200 with a complete nav_msgs/Odometry"),
+    VELOCITY: ("rest-resources/velocity-type", TWIST, "status 200 with a complete geometry_msgs/Twist"),
+    LINEAR: ("rest-resources/linear-type", VECTOR3, "status 200 with a complete geometry_msgs/Vector3"),
 }
 _PLAIN_FIELDS: Final = frozenset({"host", "accept", "authorization", "connection"})
 _PLAIN_ACCEPT: Final = frozenset({"", "*/*", "application/json"})
 _UNIT: Final = 1e-3
-_UNAVAILABLE: Final = 503
-_TOO_MANY: Final = 429
 
 
 class Observer(Listener):
@@ -46,26 +42,26 @@ class Observer(Listener):
         if reading is None or exchange.request.method != "GET" or not self._plain(exchange):
             return
         response = exchange.response
-        if response.status == _TOO_MANY:
+        if response.status == HTTPStatus.TOO_MANY_REQUESTS:
             return
         path, id_, shape, expected = reading
         judge = self._api.run.judge
-        if path == "/robot/pose/":
+        if path == POSE:
             judge.check(
                 "rest-resources/pose-unavailable",
-                response.status != _UNAVAILABLE or bool(response.header("retry-after")),
+                response.status != HTTPStatus.SERVICE_UNAVAILABLE or bool(response.header("retry-after")),
                 exchange,
                 "Retry-After with 503",
             )
-        if response.status == _UNAVAILABLE:
+        if response.status == HTTPStatus.SERVICE_UNAVAILABLE:
             return
         value, problem = read_as(response, shape)
         if not judge.check(id_, not problem, exchange, expected, found=problem):
             return
-        if path == "/robot/pose/":
+        if path == POSE:
             self._odometry(value, exchange, response.elapsed_ms)
             value = value["twist"]["twist"]
-        elif path == "/robot/velocity/linear/":
+        elif path == LINEAR:
             value = {"linear": value}
         self._limits(value, exchange)
 

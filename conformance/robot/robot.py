@@ -189,6 +189,13 @@ class Robot:
         """Whether each component is what was wanted, within ``factor`` times the tolerance."""
         return is_near(self.limits, measured, wanted, factor)
 
+    def share_of_limits(self, linear: float, angular: float) -> Velocity:
+        """A velocity ahead and turning, by shares of the limits; zero in what the robot cannot actuate."""
+        return Velocity(
+            linear_x=linear * self.limits.linear_m_s if self.actuated(0) else 0.0,
+            angular_z=angular * self.limits.angular_rad_s if self.actuated(5) else 0.0,
+        )
+
     def limit_of(self, component: int) -> float:
         """The limit of a component by its place in Velocity, declared or not, m/s or rad/s."""
         return self.limits.linear_m_s if component < len("xyz") else self.limits.angular_rad_s

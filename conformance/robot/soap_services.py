@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import pytest
+
 from conformance.contract.delivery import COFFEE
 from conformance.documents.wsdl import Operation
 from conformance.documents.xml import elements
-from conformance.documents.xml_names import local
+from conformance.documents.xml_names import clark, local
 from conformance.documents.xml_node import Node
+from conformance.documents.xsd_shapes import Element
 from conformance.robot.delivery import Delivery
 from conformance.robot.delivery_messages import NAMESPACE, delivery, request
 from conformance.soap.calls import call, read_exchange
@@ -40,6 +43,18 @@ def send_delivery(publishers: SoapService, values: Delivery, *, coffee: bool = F
 def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> Exchange:
     """Ask the subscribers service."""
     return call(subscribers, request(operation, **parameters)).exchange
+
+
+def declared_return(service: SoapService, operation: str) -> Element:
+    """What an operation returns, by the contract.
+
+    Raises:
+        pytest.skip.Exception: the contract has no such operation.
+    """
+    wrapper = service.contract.shape(clark(NAMESPACE, f"{operation}Response"))
+    if wrapper is None or not wrapper.children:
+        pytest.skip(f"the contract has no {operation}")
+    return wrapper.children[0]
 
 
 def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:

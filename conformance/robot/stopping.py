@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.documents.json_text import read_json
@@ -11,7 +12,6 @@ from conformance.robot.robot import ACCEPT_JSON, GOAL_PATH, JSON_BODY, POSE, STI
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Response
 
-_NOT_FOUND: Final = 404
 # A robot with a queue of missions starts the next one when the first is cancelled: cancel again for so long, s.
 _CANCEL_S: Final = 3.0
 # Beyond the settle time, which a loaded machine and a far network may stretch, s.
@@ -120,7 +120,7 @@ class _Stiller:
     def _speed(self) -> tuple[float, str]:
         """The greatest component of the measured velocity, and why it cannot be told."""
         read = self._ask("GET", VELOCITY, ACCEPT_JSON)
-        if read is not None and read.response.status == _NOT_FOUND:
+        if read is not None and read.response.status == HTTPStatus.NOT_FOUND:
             return 0.0, ""  # a robot without this resource: nothing says that it moves
         twist: Any
         odometry: Any

@@ -16,7 +16,7 @@ from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.robot.plan import plan_of, query, reachable
-from conformance.robot.robot import POSE, SENSORS, SERVICES, STILL, VELOCITY, Robot, Velocity
+from conformance.robot.robot import POSE, SENSORS, SERVICES, STILL, VELOCITY, Robot
 from conformance.robot.soap_services import ask, returned
 from conformance.soap.service import SoapService
 from conformance.transport.exchange import Exchange
@@ -80,10 +80,7 @@ def test_pose_and_velocity_in_motion(robot: Robot, subscribers: SoapService, jud
     """On an arc, where no component of the velocity that a robot has is zero."""
     make_room(robot)
     drive = Drive(robot)
-    arc = Velocity(
-        linear_x=0.3 * robot.limits.linear_m_s if robot.actuated(0) else 0.0,
-        angular_z=-0.4 * robot.limits.angular_rad_s if robot.actuated(5) else 0.0,
-    )
+    arc = robot.share_of_limits(0.3, -0.4)
     drive.command(arc)
     drive.reach(arc)
     for _ in range(5):

@@ -71,11 +71,7 @@ def test_velocity_is_published(robot: Robot, seeing: Probe, judge: Judge, effort
         lost = 0
         for index in range(effort.cases(12)):
             share = (-1) ** index / (3 + index)
-            wanted = Velocity(
-                linear_x=share * robot.limits.linear_m_s if robot.actuated(0) else 0.0,
-                angular_z=-share * robot.limits.angular_rad_s if robot.actuated(5) else 0.0,
-            )
-            lost += not _judge_one(robot, seeing, judge, wanted)
+            lost += not _judge_one(robot, seeing, judge, robot.share_of_limits(share, -share))
             if lost > 1:
                 break
         drive.command(STILL)

@@ -7,7 +7,7 @@ from conformance.rest.calls import Call
 from conformance.rest.interface import RestInterface
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import Unanswered
+from conformance.transport.exchange import Attempt, Unanswered
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
@@ -81,9 +81,7 @@ def test_fields_that_have_to_be_refused(api: RestInterface, rest: HttpClient, ju
         ("http/content-length-conflict", True, raw.head(rest, "GET", path, "Content-Length: 5", "Content-Length: 0")),
     ):
         judge.at_risk = (id_,)
-        came = raw.talk(rest, octets, timeout_s=_patience(api), answers=1)
-        attempt, _ = raw.read_one(rest, octets, came, "GET")
-        status = 0 if isinstance(attempt, Unanswered) else attempt.response.status
+        attempt, status, came = _ask_by_hand(api, octets)
         judge.check(
             id_,
             status == 400 or (closing and came.closed and not came.octets),
@@ -96,13 +94,11 @@ def test_fields_that_have_to_be_refused(api: RestInterface, rest: HttpClient, ju
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/malformed-request")
-def test_octets_that_are_no_request(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+def test_octets_that_are_no_request(api: RestInterface, judge: Judge) -> None:
     """What is no HTTP is refused or cut off, and the robot answers the next request."""
     judge.at_risk = ("http/malformed-request",)
     for octets in _GARBAGE:
-        came = raw.talk(rest, octets, timeout_s=_patience(api), answers=1)
-        attempt, _ = raw.read_one(rest, octets, came, "GET")
-        status = 0 if isinstance(attempt, Unanswered) else attempt.response.status
+        attempt, status, came = _ask_by_hand(api, octets)
         judge.check(
             "http/malformed-request",
             400 <= status < 500 or status == 505 or (came.closed and not came.octets),
@@ -114,5 +110,10 @@ def test_octets_that_are_no_request(api: RestInterface, rest: HttpClient, judge:
     _first(api).send(api)
 
 
-def _patience(api: RestInterface) -> float:
-    return min(api.client.connection.timeout_s, _THINK_S + 4 * api.run.effort.usual_ms / 1000)
+def _ask_by_hand(api: RestInterface, octets: bytes) -> tuple[Attempt, int, raw.RawAnswer]:
+    """What came, its status (0 for none), and the octets as they came."""
+    patience_s = min(api.client.connection.timeout_s, _THINK_S + 4 * api.run.effort.usual_ms / 1000)
+    came = raw.talk(api.client, octets, timeout_s=patience_s, answers=1)
+    attempt, _ = raw.read_one(api.client, octets, came, "GET")
+    status = 0 if isinstance(attempt, Unanswered) else attempt.response.status
+    return attempt, status, came

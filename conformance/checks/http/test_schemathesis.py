@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from hypothesis.errors import Unsatisfiable
 
-from conformance.documents.openapi import Operation
+from conformance.documents.openapi import operations_of
 from conformance.rest.applicable import allowed
 from conformance.rest.generated import GeneratedRequest, Target
 from conformance.rest.interface import RestInterface
@@ -53,18 +53,8 @@ def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
         return []  # importing Schemathesis and reading the contract takes a tenth of the time that a quick run has
     from conformance.rest.generated import targets  # noqa: PLC0415 - half a second that an unclaimed class need not pay
 
-    chosen = []
-    for target in targets(api.run.contract):
-        operation = _operation(api, target)
-        if operation is not None and operation.motion == moving and allowed(api, operation):
-            chosen.append(target)
-    return chosen
-
-
-def _operation(api: RestInterface, target: Target) -> Operation | None:
-    from conformance.documents.openapi import operations_of  # noqa: PLC0415 - beside the one above
-
-    return next((item for item in operations_of(api.run.contract) if item.label == target.label), None)
+    labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allowed(api, item)}
+    return [target for target in targets(api.run.contract) if target.label in labels]
 
 
 @pytest.mark.phase("reading")

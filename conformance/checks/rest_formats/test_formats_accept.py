@@ -89,6 +89,5 @@ def _judge_preferred(api: RestInterface, judge: Judge, call: Call, id_: str, tex
         fine and (sent != "" or (answer.status == 406)),
         exchange,
         f"{' or '.join(liked) if best else '406'} for Accept: {accept}",
-        found=exchange.came,
         cause=f"{text} {sent}",
     )

@@ -52,7 +52,6 @@ def test_goal_ids(robot: Robot, judge: Judge, explore: Explorer) -> None:
             status in NEW,
             exchange,
             f"201 or 202 for the id {shown(id_)}, which has {len(id_)} characters",
-            found=exchange.came,
             cause=exchange.came,
         )
         goal, problem, read = await_goal(robot, body)

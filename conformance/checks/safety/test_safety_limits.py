@@ -117,7 +117,6 @@ def _judge_component(robot: Robot, judge: Judge, component: int) -> None:
                 refused or does,
                 exchange,
                 f"422 (another 4xx conforms) for {wanted}, which the robot cannot actuate",
-                found=exchange.came,
                 cause=f"{path} {exchange.came}",
             )
             if does:

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 
@@ -10,9 +11,10 @@ from conformance.documents.xml_names import ENVELOPE, clark
 from conformance.documents.xml_node import Node
 from conformance.robot import delivery_messages
 from conformance.robot.geometry import Pose
-from conformance.robot.goal import goal_body
+from conformance.robot.goal import goal_body, put_goal
 from conformance.robot.interfaces import Interfaces
 from conformance.robot.message_shapes import DELIVERIES, read_as
+from conformance.robot.robot import DELIVERIES as DELIVERIES_PATH
 from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
 from conformance.soap import content
@@ -22,7 +24,6 @@ from conformance.transport.client import HttpClient
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-_LIST = "/robot/app/delivery/"
 # A delivery with these coordinates is none that any other check sends.
 _DEPOT_X = 4711.125
 _STEP_S = 0.02
@@ -30,7 +31,7 @@ _STEP_S = 0.02
 
 def _listed(rest: HttpClient, depot_x: float) -> int | None:
     """How many deliveries with that depot the robot lists; None where it lists none at all."""
-    deliveries, problem = read_as(rest.send("GET", _LIST).response, DELIVERIES)
+    deliveries, problem = read_as(rest.send("GET", DELIVERIES_PATH).response, DELIVERIES)
     if problem:
         return None
     return sum(1 for delivery in deliveries if delivery["request"]["depot_x"] == depot_x)
@@ -55,7 +56,7 @@ def test_misunderstood_has_no_effect(interfaces: Interfaces, judge: Judge, effor
         # A valid delivery after it shows when the robot is through with both.
         marker = depot_x + 0.5
         call(service, delivery_messages.delivery(depot_x=repr(marker)))
-        _until(lambda marker=marker: (_listed(api.client, marker) or 0) > 0, 1.0)  # type: ignore[misc] # a default argument binds the loop's value
+        _until(partial(_listed, api.client, marker), 1.0)
         judge.check(
             "soap-basic-profile/R1028",
             not _listed(api.client, depot_x),
@@ -82,7 +83,7 @@ def test_goal_is_shown(interfaces: Interfaces, judge: Judge) -> None:
     id_ = "roaas-soap-goal"
     # A turn on the spot, on which the robot needs no free space.
     put = goal_body(Pose(here.x, here.y, here.yaw + 2.5), api.run.statement.motion.frame, id_)
-    exchange = robot.put("/robot/navigation/action/goal/", put)
+    exchange = put_goal(robot, put)
     if exchange.response.status not in {201, 202}:
         return
     shown = _until(lambda: _goal_id(service) == id_, robot.settle_s)
@@ -106,7 +107,7 @@ def _goal_id(service: SoapService) -> str | None:
     return content.text_at(first, "goal_id", "id") if first is not None else None
 
 
-def _until(condition: Callable[[], bool], seconds: float) -> bool:
+def _until(condition: Callable[[], object], seconds: float) -> bool:
     """Ask until it is so, or the time is over."""
     end = time.monotonic() + seconds
     while not condition():

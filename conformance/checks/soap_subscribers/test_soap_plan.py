@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.documents.xml_names import clark, local
+from conformance.documents.xml_names import local
 from conformance.documents.xsd_shapes import Element
 from conformance.robot import delivery_messages, soap_services
 from conformance.robot.geometry import Pose
@@ -35,13 +35,6 @@ class _Path:
 
     frames: frozenset[str]
     points: tuple[tuple[float, float], ...]
-
-
-def _returned(service: SoapService) -> Element:
-    wrapper = service.contract.shape(clark(delivery_messages.NAMESPACE, "GetPlanResponse"))
-    if wrapper is None:
-        pytest.skip("the contract has no GetPlan")
-    return wrapper.children[0]
 
 
 def _path(wrapper: etree._Element, expected: Element) -> tuple[_Path | None, str]:
@@ -83,7 +76,7 @@ def _targets(soap: SoapServices, here: Pose) -> Iterator[Pose]:
 @pytest.mark.requirement(_PLAN, "soap-subscribers/response-valid")
 def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """A path starts at the robot, ends at the asked position within the tolerance, and is in the asked frame."""
-    expected = _returned(subscribers)
+    expected = soap_services.declared_return(subscribers, "GetPlan")
     frame = soap.run.statement.motion.frame
     wanted = effort.cases(10)
     planned = 0
@@ -129,7 +122,7 @@ def _problem(path: _Path, before: Pose, after: Pose, target: Pose, frame: str) -
 @pytest.mark.requirement("soap-subscribers/plan-none")
 def test_no_plan(subscribers: SoapService, judge: Judge) -> None:
     """Where there can be no plan, the answer is a fault: far outside any map, and in a frame that nobody knows."""
-    expected = _returned(subscribers)
+    expected = soap_services.declared_return(subscribers, "GetPlan")
     for message, what in (
         (delivery_messages.request("GetPlan", x=1e7, y=-1e7), "a position 10,000 km away"),
         (

@@ -11,6 +11,7 @@ from conformance.documents.xml_names import clark, local
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.robot import delivery_messages
+from conformance.robot.soap_services import declared_return
 from conformance.soap import content
 from conformance.soap.calls import SoapResponse, call, judge_answer
 from conformance.soap.service import SoapService
@@ -22,14 +23,6 @@ if TYPE_CHECKING:
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
 _VALID = "soap-subscribers/response-valid"
-
-
-def _returned(service: SoapService, operation: str) -> Element:
-    """Declaration of what an operation returns, by the contract."""
-    wrapper = service.contract.shape(clark(delivery_messages.NAMESPACE, f"{operation}Response"))
-    if wrapper is None or not wrapper.children:
-        pytest.skip(f"the contract has no {operation}")
-    return wrapper.children[0]
 
 
 def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapResponse) -> etree._Element | None:
@@ -54,7 +47,7 @@ def _complete(judge: Judge, id_: str, service: SoapService, operation: str) -> e
     if not answer.succeeded:
         return None
     wrapper = _wrapper(judge, service, operation, answer)
-    expected = _returned(service, operation)
+    expected = declared_return(service, operation)
     returned = content.content_of(wrapper, expected) if wrapper is not None else None
     if returned is None:
         judge.check(
@@ -100,7 +93,7 @@ def test_lists(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
                 continue
             wrapper = _wrapper(judge, subscribers, operation, answer)
             if wrapper is not None:
-                problem = _list_problem(wrapper, _returned(subscribers, operation))
+                problem = _list_problem(wrapper, declared_return(subscribers, operation))
                 judge.check(id_, not problem, answer.exchange, "a list of complete items", found=problem)
 
 
@@ -125,7 +118,7 @@ def _list_problem(wrapper: etree._Element, expected: Element) -> str:
 @pytest.mark.requirement("soap-subscribers/goal", _VALID)
 def test_goal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """GetGoal gives a complete goal; without one an empty response, or a fault."""
-    expected = _returned(subscribers, "GetGoal")
+    expected = declared_return(subscribers, "GetGoal")
     for _ in range(effort.cases(30)):
         answer = call(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
         if answer.fault is not None:

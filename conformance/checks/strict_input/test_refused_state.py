@@ -50,10 +50,7 @@ def _put(robot: Robot, path: str, media_type: str, body: bytes) -> Exchange:
 @pytest.mark.requirement("strict-input/velocity-refused")
 def test_an_invalid_velocity_moves_nothing(api: RestInterface, robot: Robot, judge: Judge) -> None:
     """A robot at rest stays there, whatever is wrong with what it is sent."""
-    fast = Velocity(
-        linear_x=0.4 * robot.limits.linear_m_s if robot.actuated(0) else 0.0,
-        angular_z=0.4 * robot.limits.angular_rad_s if robot.actuated(5) else 0.0,
-    )
+    fast = robot.share_of_limits(0.4, 0.4)
     drive = Drive(robot)
     sent: list[tuple[str, Exchange]] = []
     for path, valid, number in ((VELOCITY, fast.twist, "linear.x"), (LINEAR, fast.linear, "x")):
