@@ -1,4 +1,4 @@
-"""A Locust master and its workers as a executor: processes of this machine, or of others."""
+"""A Locust master and its workers as an executor: processes of this machine, or of others."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import gevent
 from locust.exception import RPCError
+from locust.runners import STATE_MISSING
 
 from loadtests.clients.library import LIBRARY
 from loadtests.measuring.errors import GeneratorError
@@ -58,9 +59,11 @@ class DistributedExecutor:
         self._expected = max(generator.expect, generator.processes)
         self._children: dict[int, subprocess.Popen[bytes]] = {}
         self._by_client: dict[str, Member] = {}
+        self._listening: set[str] = set()
         self._refusals: list[str] = []
         self._prepared = 0
         self._began = 0
+        self.runner.register_message("roaas_listening", self._on_listening)
         self.runner.register_message("roaas_ready", self._on_ready)
         self.runner.register_message("roaas_done", self._on_done)
         self.environment.events.worker_report.add_listener(self._on_report)
@@ -89,7 +92,7 @@ class DistributedExecutor:
             self.tell(
                 f"master on {self._host}:{self._port}: waiting for {self._expected - self._processes} more workers"
             )
-        self._wait(lambda: self.runner.worker_count >= self._expected, "workers connected")
+        self._wait(lambda: sum(map(self._is_there, self._listening)) >= self._expected, "workers connected")
         job = {
             "robot": asdict(replace(robot, token=None)),  # a token does not travel: each worker has its own
             "operations": list(plan.operations),
@@ -113,6 +116,15 @@ class DistributedExecutor:
                 raise GeneratorError(f"a worker process ended at once, with exit code {dead[0]}")
             if time.monotonic() > deadline:
                 raise GeneratorError(f"{self.runner.worker_count} of {self._expected} {what} in time")
+
+    def _is_there(self, client: str) -> bool:
+        """Whether a worker has not quit, and its heart beats."""
+        node = self.runner.clients.get(client)
+        return node is not None and node.state != STATE_MISSING
+
+    def _on_listening(self, environment: Any, msg: Any) -> None:
+        del environment
+        self._listening.add(msg.node_id)
 
     def _on_ready(self, environment: Any, msg: Any) -> None:
         del environment
@@ -186,9 +198,8 @@ class DistributedExecutor:
             if member.done:
                 continue
             child = self._children.get(member.pid)
-            node = self.runner.clients.get(client)
             ended = child is not None and child.poll() is not None
-            if overdue or ended or node is None or node.state == "missing":
+            if overdue or ended or not self._is_there(client):
                 member.state, member.done, member.lost_at_s = "lost", True, (now_ns() - self._began) / _NS
                 self.tell(f"worker {member.id} ({member.host}) was lost {member.lost_at_s:.1f} s into the run")
 

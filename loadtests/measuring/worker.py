@@ -45,6 +45,7 @@ class Worker:
         self.runner.register_message("roaas_prepare", self._on_prepare, concurrent=True)
         self.runner.register_message("roaas_begin", self._on_begin, concurrent=True)
         self.runner.register_message("roaas_stop", self._on_stop)
+        self.runner.send_message("roaas_listening")  # Locust has long said that we are here, and drops what we await
 
     def _on_prepare(self, environment: Any, msg: Any) -> None:
         job = msg.data

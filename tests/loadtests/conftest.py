@@ -2,17 +2,21 @@
 
 import json
 import os
+import re
+import socket
 import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in `roaas load`: its threads spin on a busy machine
 
 HERE = Path(__file__).parent
 CONTRACT = HERE.parents[1] / "conformance" / "contract"
+SCHEMA = json.loads((HERE.parents[1] / "reports" / "schemas" / "roaas-latency-1.schema.json").read_text())
 
 
 @dataclass
@@ -30,18 +34,12 @@ class Toy:
 
     def both(self):
         """Options that name both interfaces."""
-        return [
-            "--rest",
-            self.url,
-            "--publishers-wsdl",
-            str(CONTRACT / "publishers.wsdl"),
-            "--publishers-endpoint",
-            f"{self.url}/publishers",
-            "--subscribers-wsdl",
-            str(CONTRACT / "subscribers.wsdl"),
-            "--subscribers-endpoint",
-            f"{self.url}/subscribers",
+        services = [
+            f"--{name}-{kind}={value}"
+            for name in ("publishers", "subscribers")
+            for kind, value in (("wsdl", CONTRACT / f"{name}.wsdl"), ("endpoint", f"{self.url}/{name}"))
         ]
+        return [f"--rest={self.url}", *services]
 
 
 @pytest.fixture
@@ -75,10 +73,13 @@ class Loaded:
 
     @property
     def result(self):
-        return json.loads((self.folder / "latency.json").read_text())
+        """The result file, which keeps to its schema whatever became of the run."""
+        result = json.loads((self.folder / "latency.json").read_text())
+        jsonschema.Draft202012Validator(SCHEMA).validate(result)
+        return result
 
-    def series(self, operation, interface, client="wire"):
-        wanted = (operation, interface, client)
+    def series(self, *wanted):
+        """The series of an operation, interface and client."""
         return next(
             entry
             for entry in self.result["series"]
@@ -91,15 +92,17 @@ COMMAND = [sys.executable, "-c", "from loadtests.cli import load; load(prog_name
 
 @pytest.fixture
 def load(tmp_path):
-    """Run `roaas load`; `begin` gives the process and a function that waits for it."""
+    """Run `roaas load`; `begin` gives the process and a function that waits for it. A string may hold several words."""
 
     def run(*options):
         return run.begin(*options)[1]()
 
     def begin(*options):
         folder = tmp_path / "out"
-        words = [*COMMAND, *(str(option) for option in options), "--out", str(folder)]
-        process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        words = [word for option in options for word in (option.split() if isinstance(option, str) else [option])]
+        process = subprocess.Popen(
+            [*COMMAND, *words, f"--out={folder}"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
 
         def finish():
             out, err = process.communicate(timeout=90)
@@ -111,33 +114,33 @@ def load(tmp_path):
     return run
 
 
+@pytest.fixture
+def wait_for():
+    """Wait for a line on a process' standard error."""
+
+    def wait(process, pattern):
+        found = next((found for line in process.stderr if (found := re.search(pattern, line))), None)
+        assert found, f"no {pattern!r} on stderr"
+        return found
+
+    return wait
+
+
+@pytest.fixture
+def free_port():
+    """A TCP port that nothing listens on."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return probe.getsockname()[1]
+
+
 @pytest.fixture(scope="session")
 def certificate(tmp_path_factory):
     """A certificate for localhost that signs itself: (certificate, key)."""
     folder = tmp_path_factory.mktemp("tls")
     cert, key = folder / "cert.pem", folder / "key.pem"
-    subprocess.run(
-        [
-            "openssl",
-            "req",
-            "-x509",
-            "-newkey",
-            "ec",
-            "-pkeyopt",
-            "ec_paramgen_curve:P-256",
-            "-nodes",
-            "-days",
-            "2",
-            "-subj",
-            "/CN=localhost",
-            "-addext",
-            "subjectAltName=DNS:localhost,IP:127.0.0.1",
-            "-keyout",
-            key,
-            "-out",
-            cert,
-        ],
-        check=True,
-        capture_output=True,
+    command = (
+        "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 -subj /CN=localhost "
+        "-addext subjectAltName=DNS:localhost,IP:127.0.0.1"
     )
+    subprocess.run([*command.split(), "-keyout", key, "-out", cert], check=True, capture_output=True)
     return cert, key

@@ -3,7 +3,7 @@
 import json
 import os
 import re
-import socket
+import signal
 import subprocess
 import sys
 import urllib.request
@@ -15,125 +15,94 @@ import yaml
 from loadtests.cli import load as load_command
 
 ROOT = Path(__file__).parents[2]
-LOCUST = [sys.executable, "-m", "locust", "-f", ROOT / "loadtests" / "locustfile.py"]
+LOCUST = [sys.executable, "-m", "locust", "-f", ROOT / "loadtests" / "locustfile.py", "--headless"]
+NODE = "from loadtests.node import main; main(sys.argv[1:])"
+#: A worker that takes its time between Locust's handshake and listening to our messages.
+DAWDLING = """
+import gevent, locust.runners
+connect = locust.runners.WorkerRunner.connect_to_master
+locust.runners.WorkerRunner.connect_to_master = lambda runner: (connect(runner), gevent.sleep(1))
+"""
+
+
+def ended(*command, **options):
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, **options)
+
+
+def locust_until(reached, *options, folder):
+    """Run Locust until what it prints says enough; returns that and its statistics in the end by name."""
+    process = subprocess.Popen(
+        [*LOCUST, "-t", "60s", *options, "--json-file", "found"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+    )
+    told = ""
+    for line in process.stderr:
+        told += line
+        if reached(told):
+            break
+    process.send_signal(signal.SIGTERM)
+    told += process.communicate(timeout=60)[1]
+    return told, {entry["name"]: entry for entry in json.loads((folder / "found.json").read_text())}
 
 
 def test_plain_locust_calls_everything_over_both_interfaces(toy, tmp_path):
-    run = subprocess.run(
-        [*LOCUST, "--headless", "-u", "8", "-r", "8", "-t", "3s", *toy().both(), "--allow-motion", "--json"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        cwd=tmp_path,
+    series = [f"{interface} {client}" for interface in ("rest", "soap") for client in ("wire", "zeep")]
+    told, entries = locust_until(
+        lambda told: all(name in told for name in series),
+        *("-u", "8", "-r", "8", *toy().both(), "--allow-motion"),
+        folder=tmp_path,
     )
-    entries = {entry["name"]: entry for entry in json.loads(run.stdout[run.stdout.index("[") :])}
-    names = set(entries)
-    assert {name.split()[1] + name.split()[2] for name in names} == {"restwire", "soapwire", "restzeep", "soapzeep"}, (
-        run
-    )
+    assert {name.split(maxsplit=1)[1] for name in entries} == set(series), told
     assert all(entry["num_failures"] == 0 for entry in entries.values())
     times = [float(time) for entry in entries.values() for time in entry["response_times"]]
     assert any(time % 1 for time in times), "Locust's own percentiles have microseconds"
 
 
 def test_plain_locust_moves_nothing_unasked_and_says_when_it_cannot_begin(toy, tmp_path):
-    robot = toy()
-    run = subprocess.run(
-        [*LOCUST, "--headless", "-u", "16", "-r", "16", "-t", "4s", "--rest", robot.url, "--json"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        cwd=tmp_path,
+    told, entries = locust_until(
+        lambda told: len(re.findall("GET +pose rest", told)) > 2,
+        *("-u", "16", "-r", "16", "--rest", toy().url),
+        folder=tmp_path,
     )
-    assert "pose rest" in run.stdout
-    assert "delivery" not in run.stdout
-    lost = subprocess.run(
-        [*LOCUST, "--headless", "-u", "1", "-t", "2s"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        cwd=tmp_path,
-    )
+    assert {name.split()[0] for name in entries} == {"pose"}, told
+    lost = ended(*LOCUST, "-u", "1", "-t", "2s", cwd=tmp_path)
     assert "cannot begin: no endpoint" in lost.stderr
 
 
-def test_a_worker_from_elsewhere_joins_the_master(toy, load, tmp_path):
+@pytest.mark.parametrize("habit", ["", DAWDLING], ids=["prompt", "dawdling"])
+def test_a_worker_from_elsewhere_joins_the_master(toy, load, wait_for, free_port, tmp_path, habit):
     token = tmp_path / "token"
     token.write_text("s3same")
-    robot = toy("--token", "s3same")
     process, finish = load.begin(
-        *robot.both(),
-        "--token-file",
-        token,
-        "--rate",
-        "60",
-        "--duration",
-        "2",
-        "--warmup",
-        "0.4",
-        "--client",
-        "wire",
-        "--processes",
-        "0",
-        "--expect-workers",
-        "1",
-        "--web-port",
-        free_port(),
+        *toy("--token", "s3same").both(),
+        f"--token-file={token} --rate 60 --duration 2 --warmup 0.4 --client wire",
+        f"--processes 0 --expect-workers 1 --web-port {free_port}",
     )
-    port = next(found[1] for line in process.stderr if (found := re.search(r"master on 127\.0\.0\.1:(\d+)", line)))
-    worker = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "loadtests.node",
-            "--worker",
-            "--master-host",
-            "127.0.0.1",
-            f"--master-port={port}",
-            "--token-file",
-            token,
-            "--rate",
-            "60",
-        ],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    run = finish()
-    assert worker.wait(20) == 0, worker.stderr.read()
-    worker.stderr.close()
+    port = wait_for(process, r"master on 127\.0\.0\.1:(\d+)")[1]
+    options = f"--worker --master-host 127.0.0.1 --master-port={port} --token-file {token} --rate 60"
+    with subprocess.Popen([sys.executable, "-c", f"import sys\n{habit}\n{NODE}", *options.split()]) as worker:
+        run = finish()
+        assert worker.wait(20) == 0
     result = run.result
     assert [entry["state"] for entry in result["workers"]] == ["finished"]
     assert result["generator"]["scheduled"] == result["generator"]["started"] == 120
     assert all(entry["count"] and not entry["errors"] for entry in result["series"])
 
 
-def test_the_web_ui_shows_the_runs_numbers(toy, load):
-    port = free_port()
+def test_the_web_ui_shows_the_runs_numbers(toy, load, free_port):
     process, finish = load.begin(
-        "--rest",
-        toy().url,
-        "--rate",
-        "60",
-        "--duration",
-        "3",
-        "--warmup",
-        "0.2",
-        "--client",
-        "wire",
-        "--web-port",
-        port,
+        f"--rest {toy().url} --rate 60 --duration 3 --warmup 0.2 --client wire --web-port {free_port}"
     )
     counts = []
     for line in process.stderr:
         if re.search(r"[1-9]\d* requests answered", line):
-            with urllib.request.urlopen(f"http://127.0.0.1:{port}/stats/requests", timeout=5) as answer:
+            with urllib.request.urlopen(f"http://127.0.0.1:{free_port}/stats/requests", timeout=5) as answer:
                 entries = {entry["name"]: entry for entry in json.load(answer)["stats"]}
             counts.append(entries.get("pose rest wire", {"num_requests": 0})["num_requests"])
-    run = finish()
-    assert run.code in {0, 4}
+    assert finish().code in {0, 4}
     assert counts == sorted(counts)
     assert 0 < counts[-1] <= 180
 
@@ -144,18 +113,13 @@ def test_the_kubernetes_manifest_gives_options_that_there_are():
     words = manifest["spec"]["args"].split()
     load_command.make_context("load", list(words), resilient_parsing=False)
     assert words[words.index("--expect-workers") + 1] == str(manifest["spec"]["workers"])
-    assert not any(
-        "resources" in role and "cpu" in role["resources"]["limits"] for role in (manifest["spec"]["worker"],)
-    )
+    worker = manifest["spec"]["worker"]
+    assert "resources" not in worker or "cpu" not in worker["resources"]["limits"]
 
 
 def test_the_master_lingers_for_its_result_to_be_fetched():
-    run = subprocess.run(
-        [sys.executable, "-m", "loadtests.node", "--master", "--expect-workers", "1"],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
+    run = ended(
+        *(sys.executable, "-m", "loadtests.node", "--master", "--expect-workers", "1"),
         env=os.environ | {"ROAAS_LINGER_S": "0.1"},
     )
     assert run.returncode == 2
@@ -163,16 +127,8 @@ def test_the_master_lingers_for_its_result_to_be_fetched():
     assert "kept for 0.1 s" in run.stderr
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 @pytest.mark.parametrize("words", [["--worker"], ["--worker", "--master-port", "1"]])
 def test_a_worker_has_to_know_its_master(words):
-    run = subprocess.run(
-        [sys.executable, "-m", "loadtests.node", *words], capture_output=True, text=True, timeout=30, check=False
-    )
+    run = ended(sys.executable, "-m", "loadtests.node", *words)
     assert run.returncode == 1
     assert "--master-host" in run.stderr
