@@ -57,14 +57,7 @@ def is_success(status: int) -> bool:
 
 
 def answer_error(status: int, location: str | None, body: bytes, expects: bytes) -> CallError | None:
-    """Judge an answer: None when it is what was asked for.
-
-    Args:
-        status: HTTP status.
-        location: the Location header, if any.
-        body: the whole body.
-        expects: octets that a good body holds; empty when any 2xx will do.
-    """
+    """Judge an answer: None when it is a 2xx that holds the octets that it `expects`, if any."""
     if is_success(status):
         if expects not in body:
             return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {shown(body)}")

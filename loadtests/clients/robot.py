@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,10 +32,6 @@ class Robot:
     ca_file: str | None = None
     token: str | None = None
     timeout_s: float = 10.0
-
-    def at(self, *, publishers: str | None = None, subscribers: str | None = None) -> Robot:
-        """The same robot with the SOAP services' addresses, as far as they are given."""
-        return replace(self, publishers=publishers or self.publishers, subscribers=subscribers or self.subscribers)
 
     @cached_property
     def tls(self) -> Any:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit, urlunsplit
 
 import requests
@@ -94,13 +95,13 @@ def with_addresses(robot: Robot) -> Robot:
         WsdlError: a WSDL cannot be used.
         CallError: nobody answers at a WSDL's URL.
     """
-    found = {}
+    found: dict[str, Any] = {}
     for name, operation in CATALOGUE.items():
         location = robot.wsdl(name)
         if location is None or robot.address("soap", name) is not None or operation.service in found:
             continue
         found[operation.service] = address_in(fetch(location, robot), location, operation.element)
-    return robot.at(**found)
+    return replace(robot, **found)
 
 
 def _reachable(url: str, location: str) -> str:

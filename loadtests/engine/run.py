@@ -21,9 +21,9 @@ from loadtests.clients.failures import CallError
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.engine.liveness import Liveness
 from loadtests.engine.planning import duel_plan
-from loadtests.measuring.distributed_executor import DistributedExecutor
+from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
 from loadtests.measuring.errors import GeneratorError
-from loadtests.measuring.executor import REPORT_S, Executor, LocalExecutor, busiest
+from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
 from loadtests.measuring.metrics import Collector, serve
 from loadtests.measuring.preflight import preflight
 from loadtests.measuring.step_load import step_load
@@ -45,11 +45,7 @@ def tell(message: str) -> None:
 
 
 class Run:
-    """One run, from settings to result.
-
-    Args:
-        settings: what to do.
-    """
+    """One run, from settings to result."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
@@ -132,7 +128,7 @@ class Run:
                 ) from None
             self._tell_plan(plan, executor)
             self._carry_out(plan, executor)
-            self.outcome.cpu_share = busiest(executor)
+            self.outcome.cpu_share = busiest(executor.members)
             if settings.steps.rates and not self.outcome.interrupted and self.outcome.dead_at is None:
                 self.outcome.steps += step_load(
                     plan, executor, settings, lambda: self.outcome.interrupted, self._number, tell

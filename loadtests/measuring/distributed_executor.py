@@ -15,7 +15,7 @@ from locust.runners import STATE_MISSING
 
 from loadtests.clients.library import LIBRARY
 from loadtests.measuring.errors import GeneratorError
-from loadtests.measuring.executor import LEAD_S, Member, boot_id, new_environment, now_ns
+from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, boot_id, new_environment, now_ns
 from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
@@ -67,11 +67,6 @@ class DistributedExecutor:
         self.runner.register_message("roaas_ready", self._on_ready)
         self.runner.register_message("roaas_done", self._on_done)
         self.environment.events.worker_report.add_listener(self._on_report)
-
-    @property
-    def workers(self) -> int:
-        """How many processes share the work."""
-        return self._expected
 
     def prepare(self, robot: Robot, plan: Plan) -> None:
         """Start the workers of this machine, wait for all, and have their users come up.
@@ -212,3 +207,7 @@ class DistributedExecutor:
             except subprocess.TimeoutExpired:
                 child.kill()
                 child.wait()
+
+
+#: Who carries plans out, one after the other.
+Executor = LocalExecutor | DistributedExecutor

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import gevent
 from locust import User, task
@@ -63,36 +63,14 @@ class Member:
     done: bool = True
 
 
-class Executor(Protocol):
-    """Carries out plans."""
-
-    recorder: Recorder
-    members: list[Member]
-    pacing: str
-    environment: Any
-
-    @property
-    def workers(self) -> int:
-        """How many processes share the work."""
-
-    def prepare(self, robot: Robot, plan: Plan) -> None:
-        """Get ready: clients built, users waiting."""
-
-    def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
-        """Carry out a plan; `watch` is called with the seconds since its start, and True from it ends the plan."""
-
-    def close(self) -> None:
-        """Let everybody go."""
-
-
 def new_environment() -> Any:
     """Locust's environment with our user."""
     return Environment(user_classes=[RobotUser], events=Events(), stop_timeout=0)
 
 
-def busiest(executor: Executor) -> float | None:
+def busiest(members: list[Member]) -> float | None:
     """The busiest process's share of a core in the plan that was carried out last."""
-    return max((member.cpu_share for member in executor.members if member.cpu_share is not None), default=None)
+    return max((member.cpu_share for member in members if member.cpu_share is not None), default=None)
 
 
 def boot_id() -> str:
@@ -114,11 +92,6 @@ class LocalExecutor:
         self.pacing = ""
         self._session: Session | None = None
 
-    @property
-    def workers(self) -> int:
-        """One."""
-        return 1
-
     def prepare(self, robot: Robot, plan: Plan) -> None:
         """Get ready: clients built, users waiting."""
         session = Session(self.environment, robot, plan.operations, plan.load.seed, library=LIBRARY in plan.clients)
@@ -131,7 +104,7 @@ class LocalExecutor:
                 gevent.sleep(0.01)
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
-        """Carry out a plan."""
+        """Carry out a plan; `watch` is called with the seconds since its start, and True from it ends the plan."""
         session = self._session
         if session is None:
             raise GeneratorError("run before prepare")

@@ -19,12 +19,7 @@ if TYPE_CHECKING:
 
 
 class LocustFeed:
-    """Adds to an environment's statistics.
-
-    Args:
-        environment: Locust's environment.
-        operations: names, by number.
-    """
+    """Adds to an environment's statistics."""
 
     def __init__(self, environment: Any, operations: tuple[str, ...]) -> None:
         self._environment = environment

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 from gevent.pywsgi import WSGIServer
 from prometheus_client import CollectorRegistry, make_wsgi_app
 from prometheus_client.core import CounterMetricFamily, HistogramMetricFamily, Metric
 
 from loadtests.measuring.errors import GeneratorError
 from loadtests.schedule.plan import SERIES
-from loadtests.statistics.histogram import Histogram, Ints, edges_us
+from loadtests.statistics.histogram import Histogram, edges_us
 from loadtests.statistics.recorder import Cell, Recorder
 
 if TYPE_CHECKING:
@@ -23,30 +24,16 @@ _LABELS = ("operation", "interface", "client", "phase")
 
 def buckets(histogram: Histogram) -> list[tuple[str, float]]:
     """Cumulative counts at the bounds, in Prometheus' form: (bound in seconds, count)."""
-    found, seen = [], 0
     bins, counts = histogram.arrays()
-    upper = _upper_edges(bins)
-    position = 0
-    for bound in BOUNDS_US:
-        while position < len(upper) and upper[position] <= bound:
-            seen += int(counts[position])
-            position += 1
-        found.append((repr(bound / 1e6), float(seen)))
-    return [*found, ("+Inf", float(histogram.total))]
-
-
-def _upper_edges(bins: Ints) -> list[int]:
     lower, width = edges_us(bins)
-    return [int(edge) for edge in lower + width - 1]
+    within = np.searchsorted(lower + width - 1, BOUNDS_US, side="right")
+    cumulative = np.concatenate([[0], np.cumsum(counts)])[within].astype(float).tolist()
+    bounds = [repr(bound / 1e6) for bound in BOUNDS_US]
+    return [*zip(bounds, cumulative, strict=True), ("+Inf", float(histogram.total))]
 
 
 class Collector:
-    """Reads a recorder whenever Prometheus asks.
-
-    Args:
-        recorder: what to read.
-        operations: names, by number.
-    """
+    """Reads a recorder whenever Prometheus asks."""
 
     def __init__(self, recorder: Callable[[], Recorder], operations: tuple[str, ...]) -> None:
         self._recorder = recorder

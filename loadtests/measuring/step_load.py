@@ -13,7 +13,7 @@ from loadtests.statistics import steps
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from loadtests.measuring.executor import Executor
+    from loadtests.measuring.distributed_executor import Executor
     from loadtests.schedule.plan import Plan
     from loadtests.settings.settings import Settings
 
@@ -26,15 +26,9 @@ def step_load(
     announce: Callable[[Plan], None],
     tell: Callable[[str], None],
 ) -> list[dict[str, Any]]:
-    """Step the load up; returns the `steps` of latency.json.
+    """Step the load up after the `first` plan, until it is `stopped`; returns the `steps` of latency.json.
 
-    Args:
-        first: the plan that was carried out before.
-        executor: who carries the steps out.
-        settings: rates, length and thresholds.
-        stopped: whether somebody wants an end.
-        announce: told of each step's plan before it begins.
-        tell: says how things stand.
+    `announce` hears of each step's plan before it begins, and `tell` how things stand, for the terminal.
     """
     operation = step_operation(first.operations)
     criterion = steps.Criterion.of(settings.thresholds, first.operations[operation])
@@ -59,7 +53,7 @@ def step_load(
         for interface in list(standing):
             asked = arrivals_due(plan, plan.length_s, phase="step", interface=interface)
             result = steps.step_result(plan, executor.recorder, interface, asked, criterion)
-            found.append(result | {"cpu_share": busiest(executor)})
+            found.append(result | {"cpu_share": busiest(executor.members)})
             kept = "" if result["meets"] else f": {result['reason']}"
             tell(
                 f"step {rate:g}/s over {interface}: p50 {result['p50_ms'] or 0:.3f} ms, "

@@ -104,10 +104,8 @@ def _code(outcome: Outcome, aborted: RunAborted | None, reasons: list[str], judg
 def _early_errors(findings: Findings) -> list[dict[str, Any]]:
     """Calls that failed before the run."""
     return [
-        {
-            "operation": operation,
-            "interface": interface,
-            "client": client,
+        figures.named(name)
+        | {
             "phase": "preflight",
             "kind": failure.kind,
             "message": str(failure),
@@ -115,7 +113,7 @@ def _early_errors(findings: Findings) -> list[dict[str, Any]]:
             "first_s": None,
             "last_s": None,
         }
-        for (operation, interface, client), failure in findings.failures.items()
+        for name, failure in findings.failures.items()
     ]
 
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from loadtests.clients.robot import Robot
-    from loadtests.measuring.executor import Executor
+    from loadtests.measuring.distributed_executor import Executor
     from loadtests.settings.settings import Settings
 
 

@@ -15,13 +15,7 @@ _NS = 1_000_000_000
 
 
 class Schedule:
-    """A worker's share of a plan; the pacer's timetable.
-
-    Args:
-        plan: what to do.
-        worker: this worker's number, from 0.
-        workers: how many share the schedule.
-    """
+    """The share of a plan that falls to one of so many workers; they are numbered from 0."""
 
     def __init__(self, plan: Plan, worker: int, workers: int) -> None:
         if not 0 <= worker < workers:

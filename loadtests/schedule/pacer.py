@@ -9,7 +9,7 @@ gate of each segment: every user takes its next request as soon as it has finish
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import gevent
 from gevent.event import Event
@@ -20,6 +20,8 @@ from loadtests.schedule.alarm import make_alarm
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from loadtests.schedule.arrivals import Schedule
 
 
 class Arrival(NamedTuple):
@@ -33,25 +35,6 @@ class Arrival(NamedTuple):
     payload: int
     due_ns: int
     queued: bool = False
-
-
-class Timetable(Protocol):
-    """What a pacer starts from: segments one after the other."""
-
-    def count(self) -> int:
-        """How many segments there are."""
-
-    def starts_ns(self, segment: int) -> int:
-        """Offset of a segment's start from the run's."""
-
-    def ends_ns(self, segment: int) -> int:
-        """Offset of a segment's end."""
-
-    def arrivals(self, segment: int) -> Sequence[tuple[int, int, int]]:
-        """This worker's arrivals in a segment, in order: (offset from the run's start, operation, payload)."""
-
-    def operations(self, segment: int) -> Sequence[int]:
-        """The operations to go through in turn, in the closed model."""
 
 
 class Pacer:
@@ -70,8 +53,7 @@ class Pacer:
         self.on_segment = on_segment
         self.on_drop = on_drop
         self.done = Event()
-        self.scheduled = 0
-        self._timetable: Timetable | None = None
+        self._schedule: Schedule | None = None
         self._origin = 0
         self._free_at = 0
         self._segment = -1
@@ -89,16 +71,12 @@ class Pacer:
         """Users that are ready to take a request."""
         return len(self._idle)
 
-    def start(self, timetable: Timetable, origin_ns: int, *, open_model: bool, interval_ns: int = 0) -> None:
-        """Begin a timetable; the one before it must be over.
+    def start(self, schedule: Schedule, origin_ns: int, *, open_model: bool, interval_ns: int = 0) -> None:
+        """Begin a schedule, whose offsets count from `origin_ns` (monotonic); the one before it must be over.
 
-        Args:
-            timetable: what to start.
-            origin_ns: what its offsets count from (monotonic).
-            open_model: hand out the timetable's arrivals; else open the gate for each segment.
-            interval_ns: in the closed model the least time between two starts: a ceiling on the rate.
+        In the closed model `interval_ns` is the least time between two starts: a ceiling on the rate.
         """
-        self._timetable, self._origin = timetable, origin_ns
+        self._schedule, self._origin = schedule, origin_ns
         self.open_model, self.interval_ns = open_model, interval_ns
         self._segment, self._closes, self._free_at = -1, 0, 0
         self.done.clear()
@@ -106,7 +84,7 @@ class Pacer:
 
     def stop(self) -> None:
         """End now; users that wait are left waiting (their runner ends them)."""
-        self._timetable = None
+        self._schedule = None
         self._closes = 0
         self.done.set()
 
@@ -128,8 +106,8 @@ class Pacer:
             now = now_ns()
             if self.interval_ns and now < self._closes:
                 now = self._wait_turn(now)
-            if self._timetable is not None and now < self._closes:
-                return self._in_turn(self._timetable, now)
+            if self._schedule is not None and now < self._closes:
+                return self._in_turn(self._schedule, now)
         waiter = Waiter()
         self._idle.append(waiter)
         try:
@@ -148,44 +126,43 @@ class Pacer:
             gevent.sleep((mine - now) / 1e9)
         return now_ns()
 
-    def _in_turn(self, timetable: Timetable, now: int) -> Arrival:
+    def _in_turn(self, schedule: Schedule, now: int) -> Arrival:
         """The closed model's next request: operations one after the other, payloads likewise."""
-        operations = timetable.operations(self._segment)
+        operations = schedule.operations(self._segment)
         self._turn += 1
-        self.scheduled += 1
         return Arrival(self._segment, operations[self._turn % len(operations)], self._turn // len(operations), now)
 
     def _next_segment(self) -> None:
-        timetable = self._timetable
+        schedule = self._schedule
         self._segment += 1
-        if timetable is None or self._segment >= timetable.count():
+        if schedule is None or self._segment >= schedule.count():
             self.stop()
             return
-        self._due = timetable.arrivals(self._segment) if self.open_model else ()
+        self._due = schedule.arrivals(self._segment) if self.open_model else ()
         self._position = 0
         self.on_segment(self._segment)
-        self._arm(timetable)
+        self._arm(schedule)
 
-    def _arm(self, timetable: Timetable) -> None:
+    def _arm(self, schedule: Schedule) -> None:
         """Set the alarm to what comes next: an arrival, or the end of the segment."""
         if self._position < len(self._due):
             at = self._due[self._position][0]
         elif not self.open_model and self._closes == 0:
-            at = timetable.starts_ns(self._segment)
+            at = schedule.starts_ns(self._segment)
         else:
-            at = timetable.ends_ns(self._segment)
+            at = schedule.ends_ns(self._segment)
         self._alarm.set(self._origin + at)
 
     def _ring(self) -> None:
-        timetable = self._timetable
-        if timetable is None:
+        schedule = self._schedule
+        if schedule is None:
             return
         if self.open_model:
-            self._hand_out(timetable)
+            self._hand_out(schedule)
         else:
-            self._open_gate(timetable)
+            self._open_gate(schedule)
 
-    def _hand_out(self, timetable: Timetable) -> None:
+    def _hand_out(self, schedule: Schedule) -> None:
         due, origin, idle = self._due, self._origin, self._idle
         count = len(due)
         if self._position >= count:
@@ -197,21 +174,20 @@ class Pacer:
             if at > now_ns():
                 break
             self._position += 1
-            self.scheduled += 1
             if idle:
                 idle.pop().switch(Arrival(self._segment, operation, payload, at))
             else:
                 self._backlog.append(Arrival(self._segment, operation, payload, at, queued=True))
-        self._arm(timetable)
+        self._arm(schedule)
 
-    def _open_gate(self, timetable: Timetable) -> None:
+    def _open_gate(self, schedule: Schedule) -> None:
         """The closed model: the segment begins, or is over."""
         if self._closes:
             self._closes = 0
             self._next_segment()
             return
-        self._closes = self._origin + timetable.ends_ns(self._segment)
+        self._closes = self._origin + schedule.ends_ns(self._segment)
         waiting, self._idle = self._idle, []
         for waiter in waiting:
-            waiter.switch(self._in_turn(timetable, now_ns()))
-        self._arm(timetable)
+            waiter.switch(self._in_turn(schedule, now_ns()))
+        self._arm(schedule)

@@ -8,7 +8,7 @@ clients get quartets of their own, for their CPU time would delay the wire clien
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -180,18 +180,7 @@ class Plan:
         placed = []
         for index, segment in enumerate(made[: self.blocks]):
             start, end = (int((origin + self.block_s * edge) * _NS) for edge in (index, index + 1))
-            placed.append(
-                Segment(
-                    start,
-                    end,
-                    segment.phase,
-                    segment.interface,
-                    segment.client,
-                    segment.label,
-                    index // 2,
-                    segment.rate,
-                )
-            )
+            placed.append(replace(segment, start_ns=start, end_ns=end, pair=index // 2))
         return placed
 
     def _quartet(self, number: int, *, swapped: bool) -> list[Segment]:

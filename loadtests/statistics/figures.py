@@ -25,6 +25,11 @@ WIDTH_S = 1.0
 _DIGITS = 6  # nanoseconds
 
 
+def named(name: SeriesName) -> dict[str, Any]:
+    """A series' name, as latency.json gives it."""
+    return dict(zip(("operation", "interface", "client"), name, strict=True))
+
+
 def rounded(value: float | None) -> float | None:
     """A figure without the noise of binary fractions."""
     return None if value is None else round(value, _DIGITS)
@@ -56,12 +61,7 @@ def plain_quantiles(histogram: Histogram) -> dict[str, float | None]:
 
 
 class Measured:
-    """A plan's cells in order, by series.
-
-    Args:
-        plan: what was done.
-        recorder: what happened.
-    """
+    """A plan's cells in order, by series."""
 
     def __init__(self, plan: Plan, recorder: Recorder) -> None:
         self.plan = plan
@@ -89,6 +89,12 @@ class Measured:
             whole.merge(cell)
         return whole
 
+    def interval(self, name: SeriesName, time: str, quantile: str) -> tuple[list[float] | None, str | None]:
+        """The 95 % interval in ms of a series' service or response time in the duel; or None, and why."""
+        histograms = [getattr(cell, time) for _, cell in self.blocks("duel", name)]
+        interval, reason = quantile_interval_ms(histograms, quantile, self.plan.load.seed)
+        return rounded_interval(interval), reason
+
     def spans(self, phase: str, name: SeriesName) -> Spans:
         """Where a series' time went."""
         operation, interface, client = name
@@ -103,19 +109,16 @@ def series(measured: Measured, sizes: dict[SeriesName, tuple[int, int]]) -> list
         whole = measured.total("duel", name)
         spans = measured.spans("duel", name)
         service, reasons = quantiles(whole.service)
-        blocks = [cell for _, cell in measured.blocks("duel", name)]
         intervals: dict[str, dict[str, Any]] = {"service": {}, "response": {}}
         for quantile in ("p50", "p99"):
             for time, kept in intervals.items():
-                kept[quantile], reason = _interval_of(blocks, time, quantile, measured.plan.load.seed)
+                kept[quantile], reason = measured.interval(name, time, quantile)
                 if reason:
                     reasons[f"ci95 {quantile}"] = reason
         request, response = sizes.get(name, (None, None))
         found.append(
-            {
-                "operation": name[0],
-                "interface": name[1],
-                "client": name[2],
+            named(name)
+            | {
                 "count": whole.service.total,
                 "errors": whole.errors,
                 "late": whole.late,
@@ -136,11 +139,6 @@ def series(measured: Measured, sizes: dict[SeriesName, tuple[int, int]]) -> list
             }
         )
     return found
-
-
-def _interval_of(blocks: list[Cell], time: str, quantile: str, seed: int) -> tuple[list[float] | None, str | None]:
-    interval, reason = quantile_interval_ms([getattr(cell, time) for cell in blocks], quantile, seed)
-    return rounded_interval(interval), reason
 
 
 def comparisons(measured: Measured) -> list[dict[str, Any]]:
@@ -172,8 +170,7 @@ def noise_floor(measured: Measured) -> list[dict[str, Any]]:
             first, second = (dict(_services(measured.blocks("aa", name, label))) for label in ("a", "b"))
             pairs = [(first[pair], second[pair]) for pair in sorted(set(first) & set(second))]
             found += [
-                {"operation": name[0], "interface": interface, "client": client}
-                | _compared(pairs, quantile, measured.plan.load.seed, "difference_ms")
+                named(name) | _compared(pairs, quantile, measured.plan.load.seed, "difference_ms")
                 for quantile in COMPARED
             ]
     return found
@@ -226,7 +223,7 @@ def time_series(measured: Measured) -> dict[str, Any]:
             }
             for second, cell in sorted(seconds.items())
         ]
-        found.append({"operation": operation, "interface": interface, "client": client, "points": points})
+        found.append(named((operation, interface, client)) | {"points": points})
     return {"width_s": width, "series": found}
 
 
@@ -236,10 +233,8 @@ def errors(recorder: Recorder, operations: tuple[str, ...]) -> list[dict[str, An
     for (number, operation, kind), failure in recorder.failures.items():
         phase, interface, client = SERIES[number]
         found.append(
-            {
-                "operation": operations[operation],
-                "interface": interface,
-                "client": client,
+            named((operations[operation], interface, client))
+            | {
                 "phase": phase,
                 "kind": kind,
                 "message": failure.message,

@@ -9,7 +9,8 @@ by the histogram. Cells add, so that those of processes and machines merge into 
 from __future__ import annotations
 
 from array import array
-from dataclasses import dataclass, field
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -102,11 +103,14 @@ class Recorder:
     ) -> None:
         self.series_of = series_of if series_of is not None else {}
         self.listener = listener
-        self.cells: dict[CellKey, Cell] = {}
-        self.spans: dict[tuple[int, int], Spans] = {}
-        self.failures: dict[FailureKey, Failure] = {}
-        self.counters: dict[str, int] = {}
         self._buffer = array("q")
+        self._begin()
+
+    def _begin(self) -> None:
+        self.cells: defaultdict[CellKey, Cell] = defaultdict(Cell)
+        self.spans: defaultdict[tuple[int, int], Spans] = defaultdict(Spans)
+        self.failures: dict[FailureKey, Failure] = {}
+        self.counters: Counter[str] = Counter()
 
     def record(
         self,
@@ -130,32 +134,26 @@ class Recorder:
 
     def fail(self, segment: int, operation: int, kind: str, message: str, due_ns: int) -> None:
         """Record a failed request; `due_ns` counts from the run's start."""
-        self.cell(segment, operation).errors += 1
+        self.cells[segment, operation].errors += 1
         key = (self.series_of.get(segment, -1), operation, kind)
-        known = self.failures.get(key)
-        if known is None and len(self.failures) >= _MAX_KINDS:
+        if key not in self.failures and len(self.failures) >= _MAX_KINDS:
             key = (key[0], operation, "other")
-            known = self.failures.get(key)
+        self._add(key, Failure(message, 1, due_ns, due_ns))
+
+    def _add(self, key: FailureKey, failure: Failure) -> None:
+        known = self.failures.get(key)
         if known is None:
-            self.failures[key] = Failure(message, 1, due_ns, due_ns)
+            self.failures[key] = failure
         else:
-            known.merge(Failure(message, 1, due_ns, due_ns))
+            known.merge(failure)
 
     def drop(self, segment: int, operation: int) -> None:
         """Record an arrival that nobody started before its deadline."""
-        self.cell(segment, operation).dropped += 1
+        self.cells[segment, operation].dropped += 1
 
     def count(self, name: str, number: int = 1) -> None:
         """Count something that belongs to no series."""
-        self.counters[name] = self.counters.get(name, 0) + number
-
-    def cell(self, segment: int, operation: int) -> Cell:
-        """The cell of an operation in a segment."""
-        key = (segment, operation)
-        found = self.cells.get(key)
-        if found is None:
-            found = self.cells[key] = Cell()
-        return found
+        self.counters[name] += number
 
     def flush(self) -> None:
         """Bin what is buffered."""
@@ -172,7 +170,7 @@ class Recorder:
 
     def _bin(self, segment: int, operation: int, rows: Ints, queued: Ints) -> None:
         due, start, built, received, done, server = (rows[:, column] for column in range(2, _FIELDS))
-        cell = self.cell(segment, operation)
+        cell = self.cells[segment, operation]
         cell.service.record(done - start)
         response = Histogram()
         response.record(done - due)
@@ -180,7 +178,7 @@ class Recorder:
         if self.listener is not None:
             self.listener(self.series_of.get(segment, -1), operation, response)
         cell.late += int(((start - due > LATE_NS) | queued).sum())
-        spans = self.spans.setdefault((self.series_of.get(segment, -1), operation), Spans())
+        spans = self.spans[self.series_of.get(segment, -1), operation]
         told = np.clip(server, 0, received - built)  # the robot's clock may be coarser than ours
         spans.build.record(built - start)
         spans.wire.record(received - built - told)
@@ -191,17 +189,12 @@ class Recorder:
     def merge(self, other: Recorder) -> None:
         """Add what another recorder holds."""
         for key, cell in other.cells.items():
-            self.cell(*key).merge(cell)
+            self.cells[key].merge(cell)
         for series, spans in other.spans.items():
-            self.spans.setdefault(series, Spans()).merge(spans)
+            self.spans[series].merge(spans)
         for kind, failure in other.failures.items():
-            known = self.failures.get(kind)
-            if known is None:
-                self.failures[kind] = Failure(failure.message, failure.count, failure.first_ns, failure.last_ns)
-            else:
-                known.merge(failure)
-        for name, number in other.counters.items():
-            self.count(name, number)
+            self._add(kind, replace(failure))
+        self.counters.update(other.counters)
 
     def take(self) -> dict[str, Any]:
         """Hand over everything in a form that msgpack carries, and begin anew."""
@@ -220,7 +213,7 @@ class Recorder:
             ],
             "counters": dict(self.counters),
         }
-        self.cells, self.spans, self.failures, self.counters = {}, {}, {}, {}
+        self._begin()
         return packed
 
     @classmethod
@@ -235,5 +228,5 @@ class Recorder:
             made.spans[series, operation] = Spans(**{name: Histogram.unpack(part) for name, part in parts.items()})
         for series, operation, kind, message, count, first, last in packed["failures"]:
             made.failures[series, operation, kind] = Failure(message, count, first, last)
-        made.counters = dict(packed["counters"])
+        made.counters.update(packed["counters"])
         return made

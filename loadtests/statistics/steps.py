@@ -67,15 +67,7 @@ def figure(histogram: Histogram, name: str) -> float | None:
 
 
 def step_result(plan: Plan, recorder: Recorder, interface: str, asked: int, criterion: Criterion) -> dict[str, Any]:
-    """One interface's step.
-
-    Args:
-        plan: the step's plan.
-        recorder: what happened.
-        interface: which interface.
-        asked: arrivals that it should have had.
-        criterion: what it has to keep to.
-    """
+    """One interface's step of a plan, in which it should have had `asked` arrivals."""
     whole, last, seconds = Cell(), Histogram(), 0.0
     for index, segment in enumerate(plan.segments):
         if segment.interface != interface:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from loadtests.statistics.figures import Measured, plain_quantiles, quantiles, rounded
 from loadtests.statistics.histogram import Histogram, edges_us
-from loadtests.statistics.intervals import SHARES, at_most, quantile_interval_ms
+from loadtests.statistics.intervals import SHARES, at_most
+from loadtests.statistics.recorder import Cell
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -27,25 +28,19 @@ MOST_ERRORS = 0.01
 def generator_figures(measured: Measured, asked: int, elapsed_s: float, cpu_share: float | None) -> dict[str, Any]:
     """The `generator` object: what the load generator did, over all measured phases.
 
-    Args:
-        measured: what happened.
-        asked: arrivals that should have started so far.
-        elapsed_s: measured time, without the warm-up.
-        cpu_share: the busiest worker's.
+    `asked` arrivals should have started so far, in `elapsed_s` without the warm-up; the busiest worker has `cpu_share`.
     """
     plan, recorder = measured.plan, measured.recorder
     lag, wire = Histogram(), "wire" in plan.clients
-    completed = errors = late = dropped = 0
+    total = Cell()
     for name in measured.plan.series_names():
         for phase in ("duel", "aa"):
             cell = measured.total(phase, name)
-            completed += cell.service.total
-            errors += cell.errors
-            late += cell.late
-            dropped += cell.dropped
+            total.merge(cell)
             if name[2] == "wire" or not wire:
                 lag.merge(measured.spans(phase, name).lag)
-    started = completed + errors
+    completed = total.service.total
+    started = completed + total.errors
     return {
         "cpu_share": rounded(cpu_share),
         "lag_ms": plain_quantiles(lag),
@@ -54,10 +49,10 @@ def generator_figures(measured: Measured, asked: int, elapsed_s: float, cpu_shar
         "scheduled": asked if plan.open_model else started,
         "started": started,
         "completed": completed,
-        "late": late,
-        "dropped": dropped,
-        "errors": errors,
-        "error_share": rounded(errors / started) if started else 0.0,
+        "late": total.late,
+        "dropped": total.dropped,
+        "errors": total.errors,
+        "error_share": rounded(total.errors / started) if started else 0.0,
         "connects": recorder.counters.get("connects", 0),
         "resends": recorder.counters.get("resends", 0),
     }
@@ -121,16 +116,13 @@ def judge(measured: Measured, thresholds: Iterable[Threshold]) -> list[dict[str,
             entry["reason"] = "not measured in this run"
             found.append(entry)
             continue
-        blocks = [cell for _, cell in measured.blocks("duel", name)]
         whole = getattr(measured.total("duel", name), threshold.time)
         entry["measured_ms"] = quantiles(whole)[0][threshold.quantile]
         if threshold.quantile == "max":
             bound, reason = entry["measured_ms"], None if whole.total else "no samples"
         else:
-            interval, reason = quantile_interval_ms(
-                [getattr(cell, threshold.time) for cell in blocks], threshold.quantile, measured.plan.load.seed
-            )
-            bound = rounded(interval[1]) if interval else None
+            interval, reason = measured.interval(name, threshold.time, threshold.quantile)
+            bound = interval[1] if interval else None
         entry["bound_ms"], entry["reason"] = bound, reason
         if bound is None and threshold.quantile in SHARES and _surely_above(whole, threshold):
             entry["outcome"] = "missed"

@@ -34,12 +34,11 @@ class Toy:
 
     def both(self):
         """Options that name both interfaces."""
-        services = [
-            f"--{name}-{kind}={value}"
+        services = (
+            f"--{name}-wsdl {CONTRACT / name}.wsdl --{name}-endpoint {self.url}/{name}"
             for name in ("publishers", "subscribers")
-            for kind, value in (("wsdl", CONTRACT / f"{name}.wsdl"), ("endpoint", f"{self.url}/{name}"))
-        ]
-        return [f"--rest={self.url}", *services]
+        )
+        return f"--rest {self.url} {' '.join(services)}".split()
 
 
 @pytest.fixture
@@ -78,12 +77,12 @@ class Loaded:
         jsonschema.Draft202012Validator(SCHEMA).validate(result)
         return result
 
-    def series(self, *wanted):
-        """The series of an operation, interface and client."""
+    def series(self, operation, interface):
+        """A series of the wire client."""
         return next(
             entry
             for entry in self.result["series"]
-            if (entry["operation"], entry["interface"], entry["client"]) == wanted
+            if (entry["operation"], entry["interface"], entry["client"]) == (operation, interface, "wire")
         )
 
 
@@ -101,7 +100,7 @@ def load(tmp_path):
         folder = tmp_path / "out"
         words = [word for option in options for word in (option.split() if isinstance(option, str) else [option])]
         process = subprocess.Popen(
-            [*COMMAND, *words, f"--out={folder}"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*COMMAND, *words, "--out", folder], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
 
         def finish():

@@ -7,32 +7,11 @@ import socket
 import urllib.request
 from pathlib import Path
 
-import jsonschema
 import psutil
 import pytest
 
-ROOT = Path(__file__).parents[2]
-SCHEMA = json.loads((ROOT / "reports" / "schemas" / "roaas-latency-1.schema.json").read_text())
-CONTRACT = ROOT / "conformance" / "contract"
-SHORT = ["--rate", "60", "--duration", "2", "--warmup", "0.4"]
-
-
-def well_formed(run):
-    jsonschema.Draft202012Validator(SCHEMA).validate(run.result)
-    return run.result
-
-
-def wait_for(process, pattern):
-    for line in process.stderr:
-        if re.search(pattern, line):
-            return
-    pytest.fail(f"no {pattern!r} on stderr")
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+CONTRACT = Path(__file__).parents[2] / "conformance" / "contract"
+SHORT = "--rate 60 --duration 2 --warmup 0.4"
 
 
 def test_a_good_robot_is_measured(toy, load, tmp_path):
@@ -42,23 +21,11 @@ def test_a_good_robot_is_measured(toy, load, tmp_path):
     )
     run = load(
         *toy().both(),
-        "--allow-motion",
-        "--operation",
-        "delivery",
-        "--operation",
-        "coffee",
-        "--operation",
-        "pose",
-        *SHORT,
-        "--thresholds",
-        limits,
-        "--steps",
-        "--step-rates",
-        "40,80",
-        "--step-duration",
-        "0.5",
+        SHORT,
+        f"--thresholds {limits} --allow-motion --operation delivery --operation coffee --operation pose",
+        "--steps --step-rates 40,80 --step-duration 0.5",
     )
-    result = well_formed(run)
+    result = run.result
     assert run.code == (0 if result["valid"] else 4), run.out + run.err
     wanted = {(o, i, c) for o in ("delivery", "coffee", "pose") for i in ("rest", "soap") for c in ("wire", "zeep")}
     assert {(entry["operation"], entry["interface"], entry["client"]) for entry in result["series"]} == wanted
@@ -82,8 +49,8 @@ def test_a_slow_robot_is_seen_to_be_slow_and_misses_its_threshold(toy, load, tmp
     limits = tmp_path / "limits.toml"
     limits.write_text('[[threshold]]\noperation="pose"\ninterface="rest"\nquantile="p50"\nbelow_ms=30\n')
     robot = toy("--delay", "0.04", "--silent")
-    run = load("--rest", robot.url, *SHORT, "--client", "wire", "--thresholds", limits)
-    result = well_formed(run)
+    run = load("--rest", robot.url, SHORT, "--client wire --thresholds", limits)
+    result = run.result
     series = run.series("pose", "rest")
     assert series["service_ms"]["p50"] >= 40
     assert series["spans_ms"]["server"] is None, "the robot does not say"
@@ -96,8 +63,8 @@ def test_a_slow_robot_is_seen_to_be_slow_and_misses_its_threshold(toy, load, tmp
 
 def test_a_stall_is_seen_by_every_request_that_it_meets(toy, load):
     robot = toy("--stall", "1.5", "--stall-at", "2", "--ready-after", "60")
-    run = load(*robot.both(), "--rate", "100", "--duration", "6", "--warmup", "0.5", "--client", "wire")
-    result = well_formed(run)
+    run = load(*robot.both(), "--rate 100 --duration 6 --warmup 0.5 --client wire")
+    result = run.result
     worst = max(entry["response_ms"]["p95"] for entry in result["series"])
     assert worst > 900, "a stall of 1.5 s in 6 s met a quarter of the requests"
     points = [point for entry in result["time_series"]["series"] for point in entry["points"]]
@@ -105,68 +72,61 @@ def test_a_stall_is_seen_by_every_request_that_it_meets(toy, load):
     assert min(point["max_ms"] for point in points) < 500
 
 
-def test_faults_to_every_call(toy, load):
-    run = load(*toy("--fault").both(), *SHORT)
-    result = well_formed(run)
+@pytest.mark.parametrize(
+    ("fault", "kinds", "told"),
+    [
+        ("--fault", {"fault"}, "out of coffee"),
+        ("--redirect", {"redirect"}, "status 307 to 'http://elsewhere.invalid/robot/pose/'"),
+        ("--short", set(), "payloads are not equivalent: pose: "),
+    ],
+)
+def test_a_robot_that_answers_otherwise_gives_no_valid_run(toy, load, fault, kinds, told):
+    run = load(*toy(fault).both(), SHORT)
     assert run.code == 4
-    assert "out of coffee" in run.err
-    assert not result["valid"]
-    assert {"fault"} <= {entry["kind"] for entry in result["errors"]}
-
-
-def test_redirects_are_named_and_not_followed(toy, load):
-    run = load("--rest", toy("--redirect").url, *SHORT)
-    assert run.code == 4
-    assert "status 307 to 'http://elsewhere.invalid/robot/pose/'" in run.err
-    assert not well_formed(run)["valid"]
-
-
-def test_answers_that_leave_things_out_are_no_fair_duel(toy, load):
-    run = load(*toy("--short").both(), *SHORT, "--client", "wire")
-    assert run.code == 4
-    assert "payloads are not equivalent: pose: " in run.out
-    assert not well_formed(run)["valid"]
+    assert told in run.out + run.err
+    assert not run.result["valid"]
+    assert kinds <= {entry["kind"] for entry in run.result["errors"]}
 
 
 def test_a_token_and_a_base_path(toy, load, tmp_path):
     token = tmp_path / "token"
     token.write_text("s3same\n")
     robot = toy("--token", "s3same", "--prefix", "/fleet/7")
-    refused = load("--rest", robot.url, *SHORT)
+    refused = load("--rest", robot.url, SHORT)
     assert refused.code == 4
     assert "--token-file" in refused.err
-    run = load(*robot.both(), *SHORT, "--client", "zeep", "--token-file", token)
-    result = well_formed(run)
+    run = load(*robot.both(), SHORT, "--client zeep --token-file", token)
+    result = run.result
     assert all(entry["count"] and not entry["errors"] for entry in result["series"])
     assert "s3same" not in run.out + run.err + json.dumps(result)
 
 
 def test_tls(toy, load, certificate):
     robot = toy("--tls", *certificate)
-    distrusting = load("--rest", robot.url, *SHORT)
+    distrusting = load("--rest", robot.url, SHORT)
     assert distrusting.code == 3
     assert "ca_file" in distrusting.err
-    run = load(*robot.both(), *SHORT, "--ca-file", certificate[0])
-    assert all(entry["count"] and not entry["errors"] for entry in well_formed(run)["series"])
+    run = load(*robot.both(), SHORT, "--ca-file", certificate[0])
+    assert all(entry["count"] and not entry["errors"] for entry in run.result["series"])
 
 
-def test_nobody_there(load):
-    run = load("--rest", f"http://127.0.0.1:{free_port()}", *SHORT)
+def test_nobody_there(load, free_port):
+    run = load("--rest", f"http://127.0.0.1:{free_port}", SHORT)
     assert run.code == 3
     assert "connection refused" in run.err
-    assert not well_formed(run)["valid"]
+    assert not run.result["valid"]
 
 
 def test_a_wrong_wsdl(toy, load):
-    run = load("--rest", toy().url, "--publishers-wsdl", CONTRACT / "subscribers.wsdl", *SHORT)
+    run = load("--rest", toy().url, "--publishers-wsdl", CONTRACT / "subscribers.wsdl", SHORT)
     assert run.code == 2
     assert "has no operation 'ExecuteDeliveryRequest'" in run.err
 
 
 def test_a_robot_that_dies_leaves_what_was_measured(toy, load):
     robot = toy("--die-after", "120")
-    run = load(*robot.both(), "--rate", "100", "--duration", "15", "--warmup", "0.4", "--client", "wire")
-    result = well_formed(run)
+    run = load(*robot.both(), "--rate 100 --duration 15 --warmup 0.4 --client wire")
+    result = run.result
     assert run.code == 4
     assert any("no request succeeded from" in reason for reason in result["invalid_because"])
     assert sum(entry["count"] for entry in result["series"]) > 30
@@ -175,22 +135,20 @@ def test_a_robot_that_dies_leaves_what_was_measured(toy, load):
     assert result["interrupted"]
 
 
-def test_ctrl_c_leaves_what_was_measured(toy, load):
-    process, finish = load.begin("--rest", toy().url, "--rate", "60", "--duration", "60", "--warmup", "0.2")
+def test_ctrl_c_leaves_what_was_measured(toy, load, wait_for):
+    process, finish = load.begin("--rest", toy().url, "--rate 60 --duration 60 --warmup 0.2")
     wait_for(process, r"[1-9]\d* requests answered")
     process.send_signal(signal.SIGINT)
     run = finish()
-    result = well_formed(run)
+    result = run.result
     assert run.code == 130
     assert result["interrupted"]
     assert sum(entry["count"] for entry in result["series"]) > 20
     assert "interrupted after" in result["invalid_because"][0]
 
 
-def test_a_worker_that_is_killed_is_missed_and_named(toy, load):
-    process, finish = load.begin(
-        *toy().both(), "--rate", "80", "--duration", "5", "--warmup", "0.4", "--processes", "2", "--client", "wire"
-    )
+def test_a_worker_that_is_killed_is_missed_and_named(toy, load, wait_for):
+    process, finish = load.begin(*toy().both(), "--rate 80 --duration 5 --warmup 0.4 --processes 2 --client wire")
     wait_for(process, r"[1-9]\d* requests answered")
     workers = [
         child
@@ -202,7 +160,7 @@ def test_a_worker_that_is_killed_is_missed_and_named(toy, load):
         wait_for(process, "requests answered")
     workers[0].kill()
     run = finish()
-    result = well_formed(run)
+    result = run.result
     lost = next(worker for worker in result["workers"] if worker["state"] == "lost")
     assert lost["pid"] == workers[0].pid
     assert 0 < lost["arrivals_lost"] <= 216
@@ -218,18 +176,15 @@ def test_a_worker_that_is_killed_is_missed_and_named(toy, load):
 @pytest.mark.parametrize("option", ["--master-port", "--web-port", "--metrics-port"])
 def test_ports_in_use(toy, load, option):
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        run = load("--rest", toy().url, *SHORT, option, taken.getsockname()[1], "--processes", "2")
+        run = load("--rest", toy().url, SHORT, f"{option} {taken.getsockname()[1]} --processes 2")
     assert run.code == 2
     assert option in run.err
 
 
-def test_the_closed_model_and_the_histograms_while_they_grow(toy, load):
-    port = free_port()
-    process, finish = load.begin(
-        "--rest", toy().url, "--users", "2", "--duration", "3", "--warmup", "0.2", "--metrics-port", port
-    )
+def test_the_closed_model_and_the_histograms_while_they_grow(toy, load, wait_for, free_port):
+    process, finish = load.begin(f"--rest {toy().url} --users 2 --duration 3 --warmup 0.2 --metrics-port {free_port}")
     wait_for(process, r"[1-9]\d* requests answered")
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=5) as answer:
+    with urllib.request.urlopen(f"http://127.0.0.1:{free_port}/metrics", timeout=5) as answer:
         text = answer.read().decode()
     run = finish()
     counted = re.findall(
@@ -237,7 +192,7 @@ def test_the_closed_model_and_the_histograms_while_they_grow(toy, load):
     )
     assert int(float(counted[0])) > 0, text
     assert 'le="+Inf"' in text
-    result = well_formed(run)
+    result = run.result
     assert result["plan"]["model"] == "closed"
     assert result["plan"]["users"] == 2
     series = run.series("pose", "rest")
@@ -245,14 +200,17 @@ def test_the_closed_model_and_the_histograms_while_they_grow(toy, load):
     assert series["response_ms"]["p50"] == pytest.approx(series["service_ms"]["p50"], rel=0.2)
 
 
-def test_usage_errors_touch_no_robot(load, tmp_path):
-    for options, message in [
-        (["--operation", "delivery"], "--allow-motion"),
-        (["--thresholds", tmp_path / "none.toml"], "No such file"),
-        ([tmp_path / "none.toml"], "No such file"),
-        (["--step-rates", "1,x"], "no list of rates"),
-    ]:
-        run = load("--rest", "http://127.0.0.1:9", *options)
-        assert run.code == 2
-        assert message in run.err
-        assert not (run.folder / "latency.json").exists()
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--operation delivery", "--allow-motion"),
+        ("--thresholds none.toml", "No such file"),
+        ("none.toml", "No such file"),
+        ("--step-rates 1,x", "no list of rates"),
+    ],
+)
+def test_usage_errors_touch_no_robot(load, options, message):
+    run = load("--rest http://127.0.0.1:9", options)
+    assert run.code == 2
+    assert message in run.err
+    assert not (run.folder / "latency.json").exists()
