@@ -5,8 +5,8 @@ from typing import NoReturn
 
 import click
 
-from reports.errors import ReportError, ResultUnreadableError
-from reports.pages.page import write_page
+from reports.errors import ReportError
+from reports.pages.page import write_pages
 from reports.pages.untrusted import visible
 from reports.reading import LATENCY_NAME, read_latency
 from reports.rendering import render
@@ -69,7 +69,8 @@ def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
                 "compare.html": comparison_page.comparison_html(found, texts),
                 "compare.md": comparison_page.comparison_markdown(found, texts),
             }
-            _write(out, pages)
+            for path in write_pages(out, pages):
+                click.echo(path, err=True)
     except ReportError as error:
         _refuse(error)
     verdict = comparison_page.verdict(found)
@@ -84,15 +85,6 @@ def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
 
 def _latency_file(path: Path) -> Path:
     return path / LATENCY_NAME if path.is_dir() else path
-
-
-def _write(directory: Path, pages: dict[str, str]) -> None:
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        for name, text in pages.items():
-            click.echo(write_page(directory / name, text), err=True)
-    except OSError as error:
-        raise ResultUnreadableError(f"{directory}: cannot write there: {error.strerror or error}") from error
 
 
 def _refuse(error: ReportError) -> NoReturn:

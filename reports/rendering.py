@@ -4,8 +4,8 @@ from pathlib import Path
 
 from reports.certificate.junit import junit
 from reports.certificate.page import certificate_html, certificate_markdown
-from reports.errors import ReportError, ResultMissingError, ResultUnreadableError
-from reports.pages.page import write_page
+from reports.errors import ReportError, ResultMissingError
+from reports.pages.page import write_pages
 from reports.reading import LATENCY_NAME, RESULT_NAME, read_latency, read_result
 
 
@@ -37,20 +37,13 @@ def render(directory: Path) -> list[Path]:
         if not path.exists():
             continue
         try:
-            written += _write(directory, pages_of(path))
+            written += write_pages(directory, pages_of(path))
         except ReportError as error:
             problems.append(error)
     if problems:
         # One result is no worse for the other's fault: what could be written is there by now.
         raise problems[0]
     return written
-
-
-def _write(directory: Path, pages: dict[str, str]) -> list[Path]:
-    try:
-        return [write_page(directory / name, text) for name, text in pages.items()]
-    except OSError as error:
-        raise ResultUnreadableError(f"{directory}: cannot write there: {error.strerror or error}") from error
 
 
 def _conformance(path: Path) -> dict[str, str]:

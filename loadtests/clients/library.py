@@ -136,11 +136,7 @@ def read_document(location: str, robot: Robot) -> Document:
 
 
 class LibrarySoap:
-    """A user's zeep client.
-
-    Args:
-        documents: the parsed WSDL by operation, shared within the process.
-    """
+    """A user's zeep client, with parsed WSDLs by operation that the process shares."""
 
     def __init__(self, robot: Robot, documents: dict[str, Document]) -> None:
         self._robot = robot

@@ -50,12 +50,7 @@ def fetch(location: str, robot: Robot) -> bytes:
 
 
 def address_in(content: bytes, location: str, element: str) -> str:
-    """The address of the service whose port type offers an operation.
-
-    Args:
-        content: the WSDL.
-        location: where it came from, for messages and for its host.
-        element: the operation's name.
+    """The address of the service whose port type offers an operation; `location` gives messages, and the host.
 
     Raises:
         WsdlError: no XML, no WSDL, another service's WSDL, or no address in it.

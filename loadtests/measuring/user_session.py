@@ -42,15 +42,7 @@ class _Sink:
 
 
 class Session:
-    """A process's part in a run.
-
-    Args:
-        environment: Locust's environment, whose statistics are fed.
-        robot: what to call.
-        operations: names, in the order in which plans number them.
-        seed: fixes the payloads.
-        library: whether plans may use the library client.
-    """
+    """A process's part in a run: operations by their plans' numbers, and whether plans may use the library client."""
 
     def __init__(
         self, environment: Any, robot: Robot, operations: tuple[str, ...], seed: int, *, library: bool
@@ -105,13 +97,10 @@ class Session:
             caller.close()
 
     def run(self, plan: Plan, worker: int, origin_ns: int, ceiling: float | None = None) -> None:
-        """Carry out a share of a plan; returns when its last request has come back, or `stop` was called.
+        """Carry out a worker's share of a plan, whose times count from `origin_ns` (monotonic).
 
-        Args:
-            plan: what to do.
-            worker: this process's number, from 0.
-            origin_ns: when the plan begins (monotonic).
-            ceiling: in the closed model the most starts per second of this process.
+        Returns when its last request has come back, or `stop` was called. In the closed model `ceiling` is the most
+        starts per second of this process.
         """
         self._first = plan.first_segment
         self.series_of.update(plan.series_of())

@@ -26,12 +26,7 @@ _NS = 1_000_000_000
 
 
 class Worker:
-    """Carries out what the master says.
-
-    Args:
-        environment: Locust's environment; its runner is set up here.
-        token: the robot's bearer token.
-    """
+    """Carries out what the master says."""
 
     def __init__(self, environment: Any, host: str, port: int, token: str | None) -> None:
         locust.runners.WORKER_REPORT_INTERVAL = REPORT_S

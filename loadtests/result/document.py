@@ -29,13 +29,7 @@ CLIENT_WORDS = {
 
 
 def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[int, dict[str, Any]]:
-    """Exit code and latency.json.
-
-    Args:
-        outcome: what happened.
-        plan: the duel's plan, carried out or not.
-        aborted: why the run ended before it measured, if it did.
-    """
+    """Exit code and latency.json of a duel's plan, carried out or `aborted` before."""
     executor, settings = outcome.executor, outcome.settings
     recorder = executor.recorder if executor is not None else Recorder()
     measured = figures.Measured(plan, recorder)

@@ -32,13 +32,11 @@ _MESSAGE = 600
 
 @dataclass(frozen=True, slots=True)
 class _Case:
-    """One test case.
+    """One test case: of a requirement or a class.
 
     Attributes:
-        name: of the requirement or class.
         outcome: "passed", "failure", "error" or "skipped".
-        message: one line for it.
-        detail: what belongs to it, in full.
+        message, detail: one line for it, and what belongs to it in full.
         output: what a passed case has to say.
     """
 

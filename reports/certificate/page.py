@@ -71,13 +71,7 @@ class Untested:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What both pages show.
-
-    Attributes:
-        result: the result file.
-        classes: claimed classes first, each group with the worst verdict first.
-        untested: requirements of claimed classes without a verdict, grouped by reason.
-    """
+    """What both pages show: claimed classes first, each group with the worst verdict first."""
 
     result: Mapping[str, Any]
     classes: tuple[ClassSummary, ...]

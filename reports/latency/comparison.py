@@ -35,20 +35,15 @@ class Change:
     """One quantile of one series in both results.
 
     Attributes:
-        operation: of the series.
-        interface: of the series.
-        client: of the series.
         time: "service" or "response".
         quantile: "p50" or "p99".
-        old_ms: the old value; None where that run supports none.
-        new_ms: the new one.
+        old_ms, new_ms: the values; None where that run supports none.
         ratio: new / old.
         interval: the ratio's interval; those of all changes hold together at 95 %.
         threshold: the share by which it has to change to count, 0.05 for 5 %.
         lag_ms: the generator's own lag at the quantile, which is in a response time; 0 for a service time.
-        verdict: "slower", "faster", "same", "unclear" (the interval lies neither beyond the threshold nor
-            within the one
-            that was asked for) or "no figure".
+        verdict: "slower", "faster", "same", "unclear" (the interval lies neither beyond the threshold nor within the
+            one that was asked for) or "no figure".
     """
 
     operation: str
@@ -75,13 +70,8 @@ class Comparison:
     """Two results and what changed between them.
 
     Attributes:
-        old: the old result.
-        new: the new result.
-        old_series: its series with their distributions.
-        new_series: the new one's.
         changes: one for each series, time and quantile that both hold.
-        remarks: what else a reader has to know: other machine, more errors, series that only one result
-            holds.
+        remarks: what else a reader has to know: other machine, more errors, series that only one result holds.
     """
 
     old: Mapping[str, Any]
@@ -108,13 +98,7 @@ class Comparison:
 
 
 def compare(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, str], threshold: float) -> Comparison:
-    """Compare two valid `roaas-latency/1` documents.
-
-    Args:
-        old: the result to compare with.
-        new: the result in question.
-        names: their paths, for messages.
-        threshold: the least share by which a quantile has to change, 0.05 for 5 %.
+    """Compare two valid `roaas-latency/1` documents; `threshold` is a share, 0.05 for 5 %, and `names` are their paths.
 
     Raises:
         ResultsIncompatibleError: they were measured under different loads, or have no series in common.
@@ -239,10 +223,8 @@ def ratio_interval(
 def judge(interval: tuple[float, float], threshold: float, asked: float) -> str:
     """What an interval of new / old says.
 
-    Args:
-        interval: of the ratio.
-        threshold: the share beyond which a change is none of the noise's.
-        asked: the share within which there is no change worth a word; the noise does not make it greater.
+    Beyond the share `threshold` a change is none of the noise's; within `asked`, which no noise makes greater, there
+    is none worth a word.
     """
     low, high = interval
     if low > 1 + threshold:

@@ -19,8 +19,6 @@ class Verdict:
 
     Attributes:
         tone: "good", "bad", "warning" or "quiet".
-        sign: what stands before the words.
-        words: a few words.
         sentence: what was found, with its interval.
     """
 

@@ -30,14 +30,9 @@ QUANTILE_WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class PaperRow:
-    """One line of the comparison with the paper: means, because that is what the paper gives.
+    """One line of the comparison with the paper: means, because that is what it gives; None where not measured.
 
-    Attributes:
-        label: whose figures.
-        rest_ms: REST's mean, None where it was not measured.
-        soap_ms: SOAP's.
-        ratio: of the two.
-        bounds: the ratio's 95 % interval.
+    `bounds` are the ratio's 95 % interval.
     """
 
     label: str
@@ -48,11 +43,7 @@ class PaperRow:
 
 
 def latency_html(result: Mapping[str, Any], path: str = "latency.json") -> str:
-    """The report as one HTML file.
-
-    Args:
-        result: a valid `roaas-latency/1` document.
-        path: where it came from, for messages.
+    """A valid `roaas-latency/1` document as one HTML file; `path` is where it came from, for messages.
 
     Raises:
         ResultInvalidError: a histogram in it cannot be decoded.

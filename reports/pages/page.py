@@ -16,6 +16,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from reports.errors import ResultUnreadableError
 from reports.pages.untrusted import beginning, code_block, code_span, excerpt, plain, visible
 
 TEMPLATE_DIR = Path(__file__).parent / "templates"
@@ -48,11 +49,23 @@ def markdown_page(template: str, **values: Any) -> str:
     return _environment(html=False).get_template(template).render(generator_name=f"RoAAS {suite_version()}", **values)
 
 
-def write_page(path: Path, text: str) -> Path:
-    """Write a page beside its final name first: whoever is interrupted leaves the old page or the new one."""
-    draft = path.with_name(f".{path.name}.part")
-    draft.write_text(text, encoding="utf-8")
-    return draft.replace(path)
+def write_pages(directory: Path, pages: dict[str, str]) -> list[Path]:
+    """Write pages by their names; returns their paths.
+
+    Each is written beside its final name first: whoever is interrupted leaves the old page or the new one.
+
+    Raises:
+        ResultUnreadableError: the directory cannot be made or written to.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for name, text in pages.items():
+            draft = directory / f".{name}.part"
+            draft.write_text(text, encoding="utf-8")
+            draft.replace(directory / name)
+    except OSError as error:
+        raise ResultUnreadableError(f"{directory}: cannot write there: {error.strerror or error}") from error
+    return [directory / name for name in pages]
 
 
 def suite_version() -> str:

@@ -54,13 +54,7 @@ class Excerpt:
 
 
 def beginning(text: str, limit: int, octets: int | None = None) -> Excerpt:
-    """The first `limit` characters of a body.
-
-    Args:
-        text: the body as the result file has it.
-        limit: characters to show at most.
-        octets: length of the body before the producer cut it, where it did.
-    """
+    """The first `limit` characters of a body, which was `octets` long before its producer cut it, where it did."""
     shown = visible(text[:limit])
     present = len(text.encode("utf-8", "surrogatepass"))
     if octets is not None and octets > present:

@@ -73,15 +73,15 @@ def test_a_stall_is_seen_by_every_request_that_it_meets(toy, load):
 
 
 @pytest.mark.parametrize(
-    ("fault", "kinds", "told"),
+    ("fault", "options", "kinds", "told"),
     [
-        ("--fault", {"fault"}, "out of coffee"),
-        ("--redirect", {"redirect"}, "status 307 to 'http://elsewhere.invalid/robot/pose/'"),
-        ("--short", set(), "payloads are not equivalent: pose: "),
+        ("--fault", "", {"fault"}, "out of coffee"),
+        ("--redirect", "--interface rest", {"redirect"}, "status 307 to 'http://elsewhere.invalid/robot/pose/'"),
+        ("--short", "--client wire", set(), "payloads are not equivalent: pose: "),
     ],
 )
-def test_a_robot_that_answers_otherwise_gives_no_valid_run(toy, load, fault, kinds, told):
-    run = load(*toy(fault).both(), SHORT)
+def test_a_robot_that_answers_otherwise_gives_no_valid_run(toy, load, fault, options, kinds, told):
+    run = load(*toy(fault).both(), SHORT, options)
     assert run.code == 4
     assert told in run.out + run.err
     assert not run.result["valid"]

@@ -10,14 +10,7 @@ from reports.latency.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Pictu
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """One row.
-
-    Attributes:
-        label: what is compared.
-        ratio: the estimate.
-        interval: its 95 % interval, or None where the run supports none.
-        colour: of its mark.
-    """
+    """One row; `interval` is the ratio's 95 % interval, or None where the run supports none."""
 
     label: str
     ratio: float
@@ -28,14 +21,9 @@ class Ratio:
 def ratios(
     name: str, title: str, rows: Sequence[Ratio], caption: str, *, mark: tuple[float, str] | None = None
 ) -> Picture | None:
-    """A panel with a dot and a bar for each row, on a logarithmic axis with 1 in it.
+    """A panel with a dot and a bar for each row, from top to bottom, on a logarithmic axis with 1 in it.
 
-    Args:
-        name: id of the picture.
-        title: of the panel.
-        rows: from top to bottom.
-        caption: of the picture.
-        mark: a figure to compare with, and what it is called.
+    `mark` is a figure to compare with, and what it is called.
     """
     if not rows:
         return None

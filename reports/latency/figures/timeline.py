@@ -17,11 +17,9 @@ _STALL_COLOUR = "#F0E442"
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """A time in which a request waited far longer than usual.
+    """A time, counted from the run's start, in which a request waited far longer than usual.
 
     Attributes:
-        start_s: from the start of the run.
-        end_s: the end of its last interval.
         longest_ms: the longest response time in it; None where not one request came back.
         series: operation, client, interface.
     """

@@ -17,13 +17,9 @@ def robot() -> Iterator[str]:
     """Yield the REST address of an independent robot."""
     command = [
         sys.executable,
-        "-m",
-        "conformance.selftest.independent_robots",
-        "plain",
-        "--rest-port=0",
-        "--soap-port=0",
+        *["-m", "conformance.selftest.independent_robots", "plain", "--rest-port=0", "--soap-port=0"],
     ]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen([*command, "--soap-port=0"], stdout=subprocess.PIPE, text=True) as process:
         try:
             yield process.stdout.readline().split()[1].removeprefix("rest=")
         finally:

@@ -19,6 +19,12 @@ from reports.latency.page import latency_html
 DATA = Path(__file__).parents[1] / "data"
 WIDTHS = (1280, 390)
 PAGES = ("certificate", "latency", "compare")
+# Pages of one folder may look into each other's files: that is how the wrapper measures.
+OPTIONS = (
+    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync --allow-file-access-from-files --window-size=1400,1000 "
+    "--virtual-time-budget=20000 --dump-dom"
+)
 MEASURE = """<!doctype html><meta charset="utf-8"><title>wrapper</title><body><pre id="out"></pre><script>
 "use strict";
 const found = {};
@@ -72,24 +78,7 @@ def seen(tmp_path_factory):
     wrapper = folder / "wrapper.html"
     wrapper.write_text(MEASURE.replace("FRAMES", json.dumps(frames)), encoding="utf-8")
     done = subprocess.run(
-        [
-            browser,
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--disable-quic",
-            "--no-first-run",
-            "--disable-background-networking",
-            "--disable-component-update",
-            "--disable-sync",
-            # Pages of one folder may look into each other: that is how the wrapper measures.
-            "--allow-file-access-from-files",
-            f"--user-data-dir={folder / 'profile'}",
-            "--window-size=1400,1000",
-            "--virtual-time-budget=20000",
-            "--dump-dom",
-            wrapper.as_uri(),
-        ],
+        [browser, *OPTIONS.split(), f"--user-data-dir={folder / 'profile'}", wrapper.as_uri()],
         capture_output=True,
         text=True,
         timeout=120,
