@@ -60,11 +60,4 @@ def robot(**options: object) -> None:
             sys.exit(ExitCode.USAGE)
     # Only now: it imports ROS and the web server.
     launch = import_module("reference_robot.launch")
-    try:
-        launch.run(launch.Options(**options))
-    except launch.UnusableError as error:
-        click.echo(f"Error: {error}", err=True)
-        sys.exit(ExitCode.USAGE)
-    except launch.RobotLostError as error:
-        click.echo(f"Error: {error}", err=True)
-        sys.exit(ExitCode.FAILED)
+    launch.run(launch.Options(**options))

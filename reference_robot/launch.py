@@ -11,6 +11,9 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
+import click
+
+from conformance.contract.exit_codes import ExitCode
 from conformance.contract.toml_file import TomlFileError
 from reference_robot.simulated import SimulatedRobot, SimulationError
 from reference_robot.webservices.assembly import Endpoints
@@ -23,12 +26,16 @@ from reference_robot.webservices.soap.publishers import PATH as PUBLISHERS_PATH
 _DISCOVERY_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
-class UnusableError(Exception):
+class UnusableError(click.ClickException):
     """The robot cannot be started as asked: the message names the option, file or port, and what is wrong with it."""
 
+    exit_code = ExitCode.USAGE
 
-class RobotLostError(Exception):
+
+class RobotLostError(click.ClickException):
     """The simulated robot did not come up, or ended by itself."""
+
+    exit_code = ExitCode.FAILED
 
 
 @dataclass(frozen=True)
@@ -67,9 +74,9 @@ def run(options: Options) -> None:
         with contextlib.suppress(_Stopped), _stopped_by_signals(), _simulation(options):
             runner.run(ready, wait_for_robot=not options.attach)
     except (TomlFileError, TokenFileError, PortInUseError) as error:
-        raise UnusableError(error) from error
+        raise UnusableError(str(error)) from error
     except (SimulationError, RobotNotFoundError) as error:
-        raise RobotLostError(error) from error
+        raise RobotLostError(str(error)) from error
 
 
 class _Stopped(BaseException):

@@ -17,7 +17,7 @@ import os
 import threading
 import traceback
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Final, Self
 
 import rclpy
 from rclpy.action import ActionClient, ActionServer
@@ -63,12 +63,10 @@ class RosRuntime:
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
 
-    def create_node(self, name: str, **options: Any) -> Node:
-        """Make a node that this runtime spins and destroys; ``options`` are those of ``rclpy.node.Node``.
-
-        Parameter services are off unless asked for: they would stand among the robot's own services.
-        """
-        node = Node(name, context=self.context, **{"start_parameter_services": False, **options})
+    def create_node(self, name: str) -> Node:
+        """Make a node that this runtime spins and destroys."""
+        # Its parameter services would stand among the robot's own services.
+        node = Node(name, context=self.context, start_parameter_services=False)
         self._nodes.append(node)
         self._executor.add_node(node)
         return node

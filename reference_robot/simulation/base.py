@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from reference_robot.names import RosNames
-from reference_robot.simulation.kinematics import Limits, Motion, advance
+from reference_robot.simulation.kinematics import Motion, advance
 from reference_robot.simulation.messages import quaternion_of
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE
 
@@ -39,7 +39,6 @@ class Base:
         self._node = node
         self._clock = node.get_clock()
         self._time_scale = time_scale
-        self._limits = Limits()
         self._solid = OFFICE.grown(BODY_RADIUS)
         self._setpoint = (0.0, 0.0)
         self._commanded_at = -math.inf
@@ -74,7 +73,7 @@ class Base:
         self._moved_at = now
         if now - self._commanded_at > HOLD_S:
             self._setpoint = (0.0, 0.0)
-        self.motion = advance(self.motion, self._setpoint, seconds, self._limits, self._solid.is_free)
+        self.motion = advance(self.motion, self._setpoint, seconds, self._solid.is_free)
         self._report()
 
     def _report(self) -> None:

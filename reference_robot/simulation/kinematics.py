@@ -11,18 +11,12 @@ from typing import Final
 _STRAIGHT: Final = 1e-6  # rad turned in a step; below it an arc's radius is numerically meaningless
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What the drive can do: m/s, rad/s, m/s², rad/s².
-
-    The accelerations let any permitted velocity follow any other within 0.45 s, which is inside the
-    0.6 s settle time that the robot declares.
-    """
-
-    linear: float = 0.7
-    angular: float = 2.5
-    linear_acceleration: float = 4.0
-    angular_acceleration: float = 12.0
+# What the drive can do. The accelerations let any permitted velocity follow any other within 0.45 s, which is inside
+# the 0.6 s settle time that the robot declares.
+MAX_LINEAR: Final = 0.7  # m/s
+MAX_ANGULAR: Final = 2.5  # rad/s
+_LINEAR_ACCELERATION: Final = 4.0  # m/s²
+_ANGULAR_ACCELERATION: Final = 12.0  # rad/s²
 
 
 @dataclass(frozen=True)
@@ -47,19 +41,15 @@ def within(value: float, bound: float) -> float:
 
 
 def advance(
-    motion: Motion,
-    setpoint: tuple[float, float],
-    seconds: float,
-    limits: Limits,
-    is_free: Callable[[float, float], bool],
+    motion: Motion, setpoint: tuple[float, float], seconds: float, is_free: Callable[[float, float], bool]
 ) -> Motion:
     """Move on for some seconds towards a velocity setpoint (m/s, rad/s), which is clamped to the limits.
 
     Against a wall the body stays where it is while its wheels go on turning: the velocity is the one
     that wheel encoders would measure.
     """
-    linear = _approach(motion.linear, within(setpoint[0], limits.linear), limits.linear_acceleration * seconds)
-    angular = _approach(motion.angular, within(setpoint[1], limits.angular), limits.angular_acceleration * seconds)
+    linear = _approach(motion.linear, within(setpoint[0], MAX_LINEAR), _LINEAR_ACCELERATION * seconds)
+    angular = _approach(motion.angular, within(setpoint[1], MAX_ANGULAR), _ANGULAR_ACCELERATION * seconds)
     turned = angular * seconds
     distance = linear * seconds
     # The chord of the arc: its direction is the mean heading, its length distance · sin(a/2) / (a/2).

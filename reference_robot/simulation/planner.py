@@ -40,11 +40,11 @@ class PlanError(ValueError):
 
 
 class Planner:
-    """Plans paths in one office, with a clearance (m) from its walls."""
+    """Plans paths in one office."""
 
-    def __init__(self, office: Office, clearance: float = CLEARANCE) -> None:
+    def __init__(self, office: Office) -> None:
         self._walls = office
-        self._grown = office.grown(clearance)
+        self._grown = office.grown(CLEARANCE)
         x_min, y_min, x_max, y_max = self._grown.grown(_BESIDE).boxes.T
         corners = np.concatenate(
             [np.column_stack(pair) for pair in ((x_min, y_min), (x_min, y_max), (x_max, y_min), (x_max, y_max))]

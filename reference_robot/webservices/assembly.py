@@ -11,7 +11,7 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.resources.delivery import Delivery, DeliveryList
 from reference_robot.webservices.resources.description import OpenApi, Wadl
 from reference_robot.webservices.resources.goal import Goal
-from reference_robot.webservices.resources.graph import NavigationServices, Sensors
+from reference_robot.webservices.resources.graph import GraphList
 from reference_robot.webservices.resources.plan import Plan
 from reference_robot.webservices.resources.pose import Pose
 from reference_robot.webservices.resources.velocity import LinearVelocity
@@ -66,8 +66,8 @@ def interfaces(
         Pose(odometry),
         VelocityResource(velocity),
         LinearVelocity(velocity),
-        Sensors(subscribers),
-        NavigationServices(subscribers),
+        GraphList("/robot/sensors/", "Sensors", subscribers.sensors),
+        GraphList("/robot/navigation/services/", "NavigationServices", subscribers.navigation_services),
         Goal(goals),
         Plan(planner),
         DeliveryList(deliveries),

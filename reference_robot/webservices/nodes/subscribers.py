@@ -1,5 +1,6 @@
 """RobotSubscribersNode: everything that the web services learn from ROS."""
 
+from functools import partial
 from typing import Final
 
 from nav2_msgs.action import ComputePathToPose
@@ -38,23 +39,17 @@ class RobotSubscribersNode:
         self.last_rejection = ""
         topics = names.topics
         self.node.create_subscription(Odometry, topics.odom, self._keep_odometry, qos_profile_sensor_data)
-        self.node.create_subscription(String, topics.missions, self._keep_missions, _LATCHED_QOS)
-        self.node.create_subscription(String, topics.current_goal, self._keep_current_goal, _LATCHED_QOS)
-        self.node.create_subscription(String, topics.last_rejection, self._keep_last_rejection, _LATCHED_QOS)
+        for told in ("missions", "current_goal", "last_rejection"):
+            keep = partial(self._keep_text, told)
+            self.node.create_subscription(String, getattr(topics, told), keep, _LATCHED_QOS)
         self._planner_service = self.node.create_client(GetPlan, names.services.get_plan)
         self._planner_action = ActionClient(self.node, ComputePathToPose, names.actions.compute_path_to_pose)
 
     def _keep_odometry(self, message: Odometry) -> None:
         self.odometry = message
 
-    def _keep_missions(self, message: String) -> None:
-        self.missions = message.data
-
-    def _keep_current_goal(self, message: String) -> None:
-        self.current_goal = message.data
-
-    def _keep_last_rejection(self, message: String) -> None:
-        self.last_rejection = message.data
+    def _keep_text(self, attribute: str, message: String) -> None:
+        setattr(self, attribute, message.data)
 
     # The graph
 

@@ -1,7 +1,7 @@
 """The delivery application's resources: the paper's PUT, and the list of what was accepted."""
 
 import re
-from typing import ClassVar, Final
+from typing import Final
 from urllib.parse import unquote_to_bytes
 
 from conformance.contract.delivery import PATH_NAMES
@@ -27,7 +27,7 @@ _NUMBER: Final = re.compile(NUMBER.encode())
 class Delivery(Resource):
     """PUT publishes one DeliveryRequestMsg. The only resource with values in its path."""
 
-    path: ClassVar = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in PATH_NAMES)
+    path = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in PATH_NAMES)
 
     def __init__(self, deliveries: Deliveries) -> None:
         self._deliveries = deliveries
@@ -52,7 +52,7 @@ class Delivery(Resource):
 class DeliveryList(Resource):
     """The requests accepted last, newest first, with their state: an extension of the contract."""
 
-    path: ClassVar = _PREFIX
+    path = _PREFIX
 
     def __init__(self, deliveries: Deliveries) -> None:
         self._deliveries = deliveries

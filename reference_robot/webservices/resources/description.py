@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import yaml
 from lxml import etree
@@ -17,7 +17,7 @@ _WADL_NAMESPACE: Final = "{http://wadl.dev.java.net/2009/02}"
 class OpenApi(Resource):
     """The OpenAPI description, as JSON."""
 
-    path: ClassVar = "/openapi.json"
+    path = "/openapi.json"
 
     def __init__(self, address: Callable[[Request], str]) -> None:
         self._address = address
@@ -33,7 +33,7 @@ class OpenApi(Resource):
 class Wadl(Resource):
     """The WADL description."""
 
-    path: ClassVar = "/application.wadl"
+    path = "/application.wadl"
 
     def __init__(self, address: Callable[[Request], str]) -> None:
         self._address = address

@@ -1,6 +1,6 @@
 """/robot/navigation/action/goal/: sending and cancelling a goal location."""
 
-from typing import ClassVar, Final
+from typing import Final
 
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.problems import Problem
@@ -13,7 +13,7 @@ _CREATED: Final = 201
 class Goal(Resource):
     """The active goal, move_base_msgs/MoveBaseActionGoal with the status that the robot adds."""
 
-    path: ClassVar = "/robot/navigation/action/goal/"
+    path = "/robot/navigation/action/goal/"
 
     def __init__(self, goals: Goals) -> None:
         self._goals = goals

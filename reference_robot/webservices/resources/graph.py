@@ -1,34 +1,19 @@
 """/robot/sensors/ and /robot/navigation/services/: what is on the robot's graph."""
 
-from typing import ClassVar
+from collections.abc import Callable
 
 from reference_robot.webservices.http.messages import Request, Response
-from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
 
 
-class Sensors(Resource):
-    """Name, topic and type of every sensor."""
+class GraphList(Resource):
+    """A list of what is on the graph, made anew for each request; ``root`` is its name in XML."""
 
-    path: ClassVar = "/robot/sensors/"
-
-    def __init__(self, subscribers: RobotSubscribersNode) -> None:
-        self._subscribers = subscribers
-
-    def get(self, request: Request) -> Response:
-        """Return the list."""
-        return represented(self._subscribers.sensors(), "Sensors", wanted_format(request))
-
-
-class NavigationServices(Resource):
-    """Name and type of every service of the navigation stack."""
-
-    path: ClassVar = "/robot/navigation/services/"
-
-    def __init__(self, subscribers: RobotSubscribersNode) -> None:
-        self._subscribers = subscribers
+    def __init__(self, path: str, root: str, entries: Callable[[], list[dict[str, str]]]) -> None:
+        self.path = path
+        self._root = root
+        self._entries = entries
 
     def get(self, request: Request) -> Response:
         """Return the list."""
-        services = self._subscribers.navigation_services()
-        return represented(services, "NavigationServices", wanted_format(request))
+        return represented(self._entries(), self._root, wanted_format(request))

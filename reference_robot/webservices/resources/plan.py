@@ -2,7 +2,7 @@
 
 import math
 import re
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 from urllib.parse import unquote_to_bytes
 
 from reference_robot.webservices.http.messages import Request, Response
@@ -20,7 +20,7 @@ _NUMBERS: Final = (*_REQUIRED, "yaw", "tolerance", "start_x", "start_y", "start_
 class Plan(Resource):
     """A nav_msgs/GetPlan response for the pose in the query."""
 
-    path: ClassVar = "/robot/navigation/service/plan"
+    path = "/robot/navigation/service/plan"
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner

@@ -1,6 +1,6 @@
 """/robot/pose/: the robot's pose."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
@@ -13,7 +13,7 @@ class Pose(Resource):
     Each message is written at most once in each format, however often it is asked for.
     """
 
-    path: ClassVar = "/robot/pose/"
+    path = "/robot/pose/"
 
     def __init__(self, odometry: LatestOdometry) -> None:
         self._odometry = odometry

@@ -1,7 +1,7 @@
 """What all REST resources share."""
 
 from collections.abc import Awaitable, Callable
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.http.negotiation import chosen
@@ -21,7 +21,7 @@ class Resource:
     A handler returns its answer, or an awaitable of it; it raises a Problem to refuse.
     """
 
-    path: ClassVar[str]
+    path: str
 
     def handlers(self) -> dict[str, Callable[[Request], Response | Awaitable[Response]]]:
         """Return the handlers by HTTP method; HEAD is GET without content (RFC 9110 9.3.2)."""

@@ -1,7 +1,5 @@
 """/robot/velocity/ and /robot/velocity/linear/."""
 
-from typing import ClassVar
-
 from geometry_msgs.msg import Twist, Vector3
 
 from reference_robot.webservices.http.messages import Request, Response
@@ -13,7 +11,7 @@ from reference_robot.webservices.robot.velocity import Velocity as RobotVelocity
 class Velocity(Resource):
     """The measured velocity, geometry_msgs/Twist; PUT sets a new one."""
 
-    path: ClassVar = "/robot/velocity/"
+    path = "/robot/velocity/"
 
     def __init__(self, velocity: RobotVelocity) -> None:
         self._velocity = velocity
@@ -33,7 +31,7 @@ class Velocity(Resource):
 class LinearVelocity(Resource):
     """The linear part, geometry_msgs/Vector3; PUT leaves the angular part as it was."""
 
-    path: ClassVar = "/robot/velocity/linear/"
+    path = "/robot/velocity/linear/"
 
     def __init__(self, velocity: RobotVelocity) -> None:
         self._velocity = velocity

@@ -6,7 +6,7 @@ from lxml import etree
 
 from conformance.contract.files import CONTRACT_DIR
 from reference_robot.webservices.representation.checking import shown
-from reference_robot.webservices.soap.faults import Fault, client_fault
+from reference_robot.webservices.soap.faults import client_fault
 
 _WSDL_SOAP: Final = "{http://schemas.xmlsoap.org/wsdl/soap/}"
 _XSD: Final = "{http://www.w3.org/2001/XMLSchema}"
@@ -35,10 +35,7 @@ class ServiceDescription:
     def require_valid(self, element: etree._Element) -> None:
         """Raise the Client fault for an element that the XSD does not allow (R2724)."""
         if not self._schema.validate(element):
-            raise self._invalid(element)
-
-    def _invalid(self, element: etree._Element) -> Fault:
-        # libxml2 quotes names and values of the message itself, and nothing of the robot's.
-        log: Any = self._schema.error_log
-        told = "; ".join(entry.message for entry in log[:_ERRORS_TOLD])
-        return client_fault(f"{shown(element.tag)} is not what the description says: {told}")
+            # libxml2 quotes names and values of the message itself, and nothing of the robot's.
+            log: Any = self._schema.error_log
+            told = "; ".join(entry.message for entry in log[:_ERRORS_TOLD])
+            raise client_fault(f"{shown(element.tag)} is not what the description says: {told}")

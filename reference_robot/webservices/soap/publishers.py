@@ -1,5 +1,6 @@
 """RobotPublishersWebService: the web methods that make the robot act."""
 
+from functools import partial
 from typing import Final
 
 from lxml import etree
@@ -7,9 +8,8 @@ from lxml import etree
 from conformance.contract.delivery import COFFEE, COORDINATES
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
-from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import Operation, SoapService
+from reference_robot.webservices.soap.service import SoapService
 
 PATH: Final = "/turtlesim_publisher_ws"
 
@@ -18,25 +18,12 @@ class PublishersWebService(SoapService):
     """ExecuteDeliveryRequest and ExecuteCoffeeRequest: both return nothing (paper), the empty wrapper."""
 
     def __init__(self, deliveries: Deliveries) -> None:
-        self.path = PATH
-        self.description = ServiceDescription("publishers", PATH)
+        codes = {"ExecuteDeliveryRequest": None, "ExecuteCoffeeRequest": COFFEE}
+        super().__init__("publishers", PATH, {name: partial(self._execute, name, code) for name, code in codes.items()})
         self._deliveries = deliveries
-        self._done = {name: self._empty_response(name) for name in self.operations()}
-        super().__init__()
+        self._done = {name: self._empty_response(name) for name in codes}
 
-    def operations(self) -> dict[str, Operation]:
-        """Return the two operations."""
-        return {"ExecuteDeliveryRequest": self._execute_delivery, "ExecuteCoffeeRequest": self._execute_coffee}
-
-    def _execute_delivery(self, wrapper: etree._Element) -> bytes:
-        self._accept(wrapper)
-        return self._done["ExecuteDeliveryRequest"]
-
-    def _execute_coffee(self, wrapper: etree._Element) -> bytes:
-        self._accept(wrapper, COFFEE)
-        return self._done["ExecuteCoffeeRequest"]
-
-    def _accept(self, wrapper: etree._Element, code: int | None = None) -> None:
+    def _execute(self, operation: str, code: int | None, wrapper: etree._Element) -> bytes:
         """Hand over a request that is valid by the XSD, which allows ``INF``, ``NaN`` and a missing ``arg0``.
 
         Raises:
@@ -50,6 +37,7 @@ class PublishersWebService(SoapService):
             self._deliveries.accept(_request(sent, code), "soap")
         except UnusableFieldError as error:
             raise error.refusal(error.field, sent[error.field]) from error
+        return self._done[operation]
 
     def _empty_response(self, operation: str) -> bytes:
         return (

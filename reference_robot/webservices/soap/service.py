@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
 from typing import Final
 
@@ -25,22 +24,17 @@ _MEDIA_TYPE: Final = "text/xml"
 _SERVERS_FAULT: Final = 500
 
 
-class SoapService(ABC):
-    """A service: a subclass gives the description and the operations.
+class SoapService:
+    """A service: a subclass gives the operations by local name.
 
     An operation takes the wrapper element, valid by the XSD, and returns the answering envelope.
     """
 
-    path: str
-    description: ServiceDescription
-
-    @abstractmethod
-    def operations(self) -> dict[str, Operation]:
-        """Return the operations by local name."""
-
-    def __init__(self) -> None:
+    def __init__(self, name: str, path: str, operations: dict[str, Operation]) -> None:
+        self.path = path
+        self.description = ServiceDescription(name, path)
         namespace = self.description.namespace
-        self._operations = {f"{{{namespace}}}{name}": operation for name, operation in self.operations().items()}
+        self._operations = {f"{{{namespace}}}{name}": operation for name, operation in operations.items()}
 
     async def post(self, request: Request) -> Response:
         """Answer a message: 200, or 500 with a fault (WS-I BP R1126).

@@ -1,5 +1,7 @@
 """RobotSubscribersWebService: the web methods that tell the robot's state, each as its REST resource does."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 from lxml import etree
@@ -11,9 +13,8 @@ from reference_robot.webservices.robot.goals import Goals
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.robot.velocity import Velocity
-from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import Operation, SoapService
+from reference_robot.webservices.soap.service import SoapService
 
 PATH: Final = "/turtlesim_subscriber_ws"
 
@@ -29,27 +30,19 @@ class SubscribersWebService(SoapService):
         goals: Goals,
         planner: Planner,
     ) -> None:
-        self.path = PATH
-        self.description = ServiceDescription("subscribers", PATH)
-        self._subscribers = subscribers
-        self._odometry = odometry
-        self._velocity = velocity
-        self._goals = goals
-        self._planner = planner
-        super().__init__()
-
-    def operations(self) -> dict[str, Operation]:
-        """Return the six operations."""
-        return {
-            "GetPose": lambda _: self._response("GetPose", [self._odometry.plain()]),
-            "GetVelocity": lambda _: self._response("GetVelocity", [self._velocity.measured()]),
-            "GetSensors": lambda _: self._response("GetSensors", self._subscribers.sensors()),
-            "GetNavigationServices": lambda _: self._response(
-                "GetNavigationServices", self._subscribers.navigation_services()
-            ),
-            "GetGoal": lambda _: self._response("GetGoal", [goal] if (goal := self._goals.current()) else []),
-            "GetPlan": self._get_plan,
+        returned: dict[str, Callable[[], list[Any]]] = {
+            "GetPose": lambda: [odometry.plain()],
+            "GetVelocity": lambda: [velocity.measured()],
+            "GetSensors": subscribers.sensors,
+            "GetNavigationServices": subscribers.navigation_services,
+            "GetGoal": lambda: [goal] if (goal := goals.current()) else [],
         }
+        operations = {name: partial(self._tell, name, values) for name, values in returned.items()}
+        super().__init__("subscribers", PATH, operations | {"GetPlan": self._get_plan})
+        self._planner = planner
+
+    def _tell(self, operation: str, values: Callable[[], list[Any]], _wrapper: etree._Element) -> bytes:
+        return self._response(operation, values())
 
     async def _get_plan(self, wrapper: etree._Element) -> bytes:
         given: dict[str, Any] = {}

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from nav2_msgs.action import ComputePathToPose
 
-from reference_robot.simulation.kinematics import Limits, Motion, advance
+from reference_robot.simulation.kinematics import Motion, advance
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, DESTINATION, OFFICE, SOURCE
 from reference_robot.simulation.planner import CLEARANCE, STEP, PlanError, PlanFailure, Planner
 from reference_robot.simulation.pursuit import Pursuit
@@ -61,7 +61,7 @@ def test_pursuit_drives_a_plan_to_its_end(start, goal):
         if command.arrived:
             break
         late.append((command.linear, command.angular))
-        motion = advance(motion, late.pop(0), 0.02, Limits(), SOLID.is_free)
+        motion = advance(motion, late.pop(0), 0.02, SOLID.is_free)
     assert command.arrived
     assert math.dist((motion.x, motion.y), goal[:2]) < 0.05
     assert abs(math.remainder(motion.yaw - goal[2], math.tau)) < 0.05

@@ -110,9 +110,7 @@ def refused(served: Served, foreign: ForeignRobot, answer, status: int) -> None:
         for name, body in bodies.items()
     ],
 )
-def test_what_is_no_document_is_400_and_a_wrong_one_422(
-    served: Served, foreign: ForeignRobot, media_type: str, status: int, body: str | bytes
-):
+def test_what_is_no_document_is_400_and_a_wrong_one_422(served, foreign, media_type, status, body):
     answer = served.call("PUT", VELOCITY, content=body, headers={"Content-Type": media_type})
     refused(served, foreign, answer, status)
 
@@ -131,19 +129,19 @@ def test_what_is_no_document_is_400_and_a_wrong_one_422(
         {"Content-Type": "multipart/form-data; boundary=x"},
     ],
 )
-def test_other_media_types_and_codings_are_415(served: Served, foreign: ForeignRobot, headers: dict[str, str]):
+def test_other_media_types_and_codings_are_415(served, foreign, headers):
     refused(served, foreign, served.call("PUT", VELOCITY, content=GOOD, headers=headers), 415)
 
 
 @pytest.mark.parametrize("charset", ["", "; charset=utf-8", '; charset="UTF-8"', ";charset=us-ascii", "; x=y"])
-def test_json_is_read_with_or_without_a_charset(served: Served, foreign: ForeignRobot, charset: str):
+def test_json_is_read_with_or_without_a_charset(served, foreign, charset):
     headers = {"Content-Type": "application/json" + charset}
     assert served.call("PUT", VELOCITY, content=GOOD, headers=headers).status_code == 200
     foreign.next("velocity")
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
-def test_xml_is_read_in_both_encodings(served: Served, foreign: ForeignRobot, encoding: str):
+def test_xml_is_read_in_both_encodings(served, foreign, encoding):
     answer = served.call(
         "PUT", VELOCITY, content=XML.format(0.1).encode(encoding), headers={"Content-Type": "application/xml"}
     )
@@ -163,7 +161,7 @@ BAD_PARTS = {
 
 
 @pytest.mark.parametrize(("name", "sent"), [(name, value) for name, values in BAD_PARTS.items() for value in values])
-def test_deliveries_with_bad_values_are_422(served: Served, foreign: ForeignRobot, name: str, sent: str):
+def test_deliveries_with_bad_values_are_422(served, foreign, name, sent):
     """The refusal names the part of the path, and repeats it as it was sent."""
     answer = served.call("PUT", delivery_path(**{name: sent}))
     refused(served, foreign, answer, 422)
@@ -175,7 +173,7 @@ def test_deliveries_with_bad_values_are_422(served: Served, foreign: ForeignRobo
     assert foreign.next("delivery")["source_x"] == "3fe0000000000000"
 
 
-def test_two_large_doubles_are_no_infinity(served: Served, foreign: ForeignRobot):
+def test_two_large_doubles_are_no_infinity(served, foreign):
     assert served.call("PUT", delivery_path(source_x="1.7e308", source_y="1.7e308")).status_code == 204
     foreign.next("delivery")
 
@@ -200,17 +198,17 @@ def test_two_large_doubles_are_no_infinity(served: Served, foreign: ForeignRobot
         ("x=1&y=1&tolerance=1e39", "tolerance"),
     ],
 )
-def test_plans_with_bad_parameters_are_422(served: Served, query: str, named: str):
+def test_plans_with_bad_parameters_are_422(served, query, named):
     answer = served.call("GET", f"/robot/navigation/service/plan?{query}")
     assert answer.status_code == 422
     assert named in answer.json()["detail"]
 
 
-def test_a_parameter_given_twice_is_400(served: Served):
+def test_a_parameter_given_twice_is_400(served):
     assert served.call("GET", "/robot/navigation/service/plan?x=1&x=2&y=1").status_code == 400
 
 
-def test_a_goal_id_with_half_a_character_is_422(served: Served, foreign: ForeignRobot):
+def test_a_goal_id_with_half_a_character_is_422(served, foreign):
     body = json.dumps(goal("HALF")).replace("HALF", "\\ud83d")
     answer = served.call("PUT", GOAL, content=body, headers={"Content-Type": "application/json"})
     refused(served, foreign, answer, 422)
@@ -218,9 +216,7 @@ def test_a_goal_id_with_half_a_character_is_422(served: Served, foreign: Foreign
 
 @pytest.mark.parametrize("sent", ["1e400", "-1E+999", "2" * 309])
 @pytest.mark.parametrize(("media_type", "document"), [("application/json", GOOD), ("application/xml", XML.format(0.1))])
-def test_a_body_s_number_is_repeated_as_it_was_sent(
-    served: Served, foreign: ForeignRobot, media_type: str, document: str, sent: str
-):
+def test_a_body_s_number_is_repeated_as_it_was_sent(served, foreign, media_type, document, sent):
     headers = {"Content-Type": media_type}
     answer = served.call("PUT", VELOCITY, content=document.replace("0.1", sent), headers=headers)
     refused(served, foreign, answer, 422)

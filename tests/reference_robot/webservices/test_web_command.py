@@ -40,7 +40,7 @@ def failed(*options: str) -> str:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_one_line_and_a_clean_end(domain_id: int, number: signal.Signals):
+def test_one_line_and_a_clean_end(domain_id, number):
     with subprocess.Popen(
         [*COMMAND, f"--domain-id={domain_id}"],
         stdout=subprocess.PIPE,
@@ -58,7 +58,7 @@ def test_one_line_and_a_clean_end(domain_id: int, number: signal.Signals):
     eventually(lambda: not alive(child))
 
 
-def test_a_signal_while_starting_ends_it_cleanly(domain_id: int):
+def test_a_signal_while_starting_ends_it_cleanly(domain_id):
     with subprocess.Popen([*COMMAND, f"--domain-id={domain_id}"], env=ros_environment()) as process:
         child = eventually(lambda: children(process.pid))[0]
         process.terminate()
@@ -66,14 +66,14 @@ def test_a_signal_while_starting_ends_it_cleanly(domain_id: int):
     eventually(lambda: not alive(child))
 
 
-def test_the_simulation_does_not_outlive_a_killed_robot(domain_id: int):
+def test_the_simulation_does_not_outlive_a_killed_robot(domain_id):
     with running_robot(domain_id) as served:
         (child,) = children(served.process.pid)
         served.process.kill()
         eventually(lambda: not alive(child))
 
 
-def test_the_robot_ends_with_its_simulation(domain_id: int):
+def test_the_robot_ends_with_its_simulation(domain_id):
     with running_robot(domain_id) as served:
         (child,) = children(served.process.pid)
         os.kill(child, signal.SIGKILL)
@@ -82,7 +82,7 @@ def test_the_robot_ends_with_its_simulation(domain_id: int):
 
 
 @pytest.mark.parametrize("package", ["rclpy", "mybot_delivery_app", "nav2_msgs", "uvicorn"])
-def test_a_missing_package_is_named_with_its_remedy(package: str):
+def test_a_missing_package_is_named_with_its_remedy(package):
     program = f"import sys; sys.modules[{package!r}] = None; from reference_robot.cli import robot; robot(['--attach'])"
     done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
@@ -101,25 +101,25 @@ def test_an_address_that_is_not_ours_is_named():
     assert "192.0.2.1" in failed("--host=192.0.2.1", "--attach")
 
 
-def test_a_configuration_that_cannot_be_used_is_named(tmp_path: Path):
+def test_a_configuration_that_cannot_be_used_is_named(tmp_path):
     config = tmp_path / "robot.toml"
     config.write_text("[web]\nhold = 0\n")
     assert f"{config}: [web] hold = 0 must be a positive number" in failed(f"--config={config}", "--attach")
 
 
 @pytest.mark.parametrize("text", ["", "  \n", "two words", "é"])
-def test_a_token_file_that_cannot_be_used_is_named(tmp_path: Path, text: str):
+def test_a_token_file_that_cannot_be_used_is_named(tmp_path, text):
     token = tmp_path / "token"
     token.write_text(text)
     assert str(token) in failed(f"--token-file={token}", "--attach")
 
 
 @pytest.mark.parametrize("option", ["--rest-port=70000", "--domain-id=102", "--time-scale=0", "--config=/nowhere"])
-def test_options_out_of_range_are_refused(option: str):
+def test_options_out_of_range_are_refused(option):
     assert option.split("=", maxsplit=1)[0] in failed(option)
 
 
-def test_both_interfaces_ask_for_the_token(domain_id: int, tmp_path: Path):
+def test_both_interfaces_ask_for_the_token(domain_id, tmp_path):
     file = tmp_path / "token"
     file.write_text("s3cret\n")
     right = {"Authorization": "Bearer s3cret"}
@@ -137,7 +137,7 @@ def test_both_interfaces_ask_for_the_token(domain_id: int, tmp_path: Path):
         assert served.call("GET", "/robot/app/delivery/", headers={"Authorization": "bearer s3cret"}).json() == []
 
 
-def test_the_simulated_robot_behind_the_web(domain_id: int):
+def test_the_simulated_robot_behind_the_web(domain_id):
     """From the web to the simulation and back: sensors, plan, goal, mission, and the states of deliveries."""
     with running_robot(domain_id, "--time-scale=20") as served:
         sensors = {(entry["name"], entry["type"]) for entry in served.call("GET", "/robot/sensors/").json()}

@@ -8,7 +8,6 @@ import threading
 import time
 
 from web_messages import delivery_envelope, delivery_path, twist
-from web_robot import ForeignRobot, Served
 
 BODY = b'{"linear": {"x": 0.1, "y": 0, "z": 0},'
 HALVES = {
@@ -24,7 +23,7 @@ HALVES = {
 }
 
 
-def test_half_a_request_is_given_up(served: Served):
+def test_half_a_request_is_given_up(served):
     with contextlib.ExitStack() as stack:
         waiting = {}
         for name, half in HALVES.items():
@@ -49,12 +48,12 @@ def is_readable(connection: socket.socket) -> bool:
     return bool(select.select([connection], [], [], 0)[0])
 
 
-def test_a_broken_chunk_is_400(served: Served):
+def test_a_broken_chunk_is_400(served):
     head = b"PUT /robot/velocity/ HTTP/1.1\r\nHost: robot\r\nContent-Type: application/json\r\n"
     assert served.raw(head + b"Transfer-Encoding: chunked\r\n\r\nxyz\r\n{}\r\n").startswith(b"HTTP/1.1 400 ")
 
 
-def test_clients_that_vanish_leave_nothing_behind(served: Served, foreign: ForeignRobot):
+def test_clients_that_vanish_leave_nothing_behind(served, foreign):
     for half in HALVES.values():
         for _ in range(5):
             with served.connection() as connection:
@@ -68,7 +67,7 @@ def test_clients_that_vanish_leave_nothing_behind(served: Served, foreign: Forei
     foreign.next("velocity")
 
 
-def test_pipelined_requests_are_answered_in_order(served: Served):
+def test_pipelined_requests_are_answered_in_order(served):
     two = (
         b"GET /robot/pose HTTP/1.1\r\nHost: a\r\n\r\nGET /robot/pose/ HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
     )
@@ -76,7 +75,7 @@ def test_pipelined_requests_are_answered_in_order(served: Served):
     assert re.findall(rb"HTTP/1\.1 (\d+)", answer) == [b"404", b"200"]
 
 
-def test_a_client_that_expects_100_is_told_to_continue(served: Served, foreign: ForeignRobot):
+def test_a_client_that_expects_100_is_told_to_continue(served, foreign):
     body = delivery_envelope().encode()
     head = b"POST /turtlesim_publisher_ws HTTP/1.1\r\nHost: a\r\nContent-Type: text/xml\r\nConnection: close\r\n"
     with served.connection(soap=True) as connection:
@@ -87,7 +86,7 @@ def test_a_client_that_expects_100_is_told_to_continue(served: Served, foreign: 
     foreign.next("delivery")
 
 
-def test_an_offer_of_http_2_is_ignored_and_the_content_read(served: Served, foreign: ForeignRobot):
+def test_an_offer_of_http_2_is_ignored_and_the_content_read(served, foreign):
     """As Java's HttpClient sends its first request."""
     body = delivery_envelope().encode()
     answer = served.raw(
@@ -100,7 +99,7 @@ def test_an_offer_of_http_2_is_ignored_and_the_content_read(served: Served, fore
     foreign.next("delivery")
 
 
-def test_500_connections_at_once(served: Served):
+def test_500_connections_at_once(served):
     request = b"GET /robot/pose/ HTTP/1.1\r\nHost: robot\r\nConnection: close\r\n\r\n"
     with contextlib.ExitStack() as stack:
         connections = [stack.enter_context(served.connection()) for _ in range(500)]
@@ -110,7 +109,7 @@ def test_500_connections_at_once(served: Served):
         assert all(connection.recv(100).startswith(b"HTTP/1.1 200 ") for connection in connections)
 
 
-def test_many_clients_at_once_lose_nothing(served: Served, foreign: ForeignRobot):
+def test_many_clients_at_once_lose_nothing(served, foreign):
     def deliver() -> None:
         for _ in range(10):
             assert served.client.put(served.rest + delivery_path()).status_code == 204

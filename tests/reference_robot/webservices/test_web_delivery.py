@@ -4,7 +4,6 @@ import struct
 
 import pytest
 from web_messages import delivery_envelope, delivery_path
-from web_robot import ForeignRobot, Served
 
 from conformance.contract.delivery import EXAMPLE
 
@@ -16,7 +15,7 @@ def as_bits(values: dict[str, float], code: int) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("code", [3, 4])
-def test_each_interface_publishes_the_paper_s_request_once(served: Served, foreign: ForeignRobot, code: int):
+def test_each_interface_publishes_the_paper_s_request_once(served, foreign, code):
     answer = served.call("PUT", delivery_path(code))
     assert (answer.status_code, answer.content) == (204, b"")
     assert foreign.next("delivery") == as_bits(EXAMPLE, code)
@@ -27,14 +26,14 @@ def test_each_interface_publishes_the_paper_s_request_once(served: Served, forei
     assert foreign.heard_nothing()
 
 
-def test_coffee_is_code_4_whatever_the_message_says(served: Served, foreign: ForeignRobot):
+def test_coffee_is_code_4_whatever_the_message_says(served, foreign):
     answer = served.soap(delivery_envelope("ExecuteCoffeeRequest", message_code=3))
     assert "ExecuteCoffeeRequestResponse" in answer.text
     assert foreign.next("delivery") == as_bits(EXAMPLE, 4)
 
 
 @pytest.mark.parametrize("text", DOUBLES)
-def test_doubles_arrive_bit_for_bit(served: Served, foreign: ForeignRobot, text: str):
+def test_doubles_arrive_bit_for_bit(served, foreign, text):
     values = EXAMPLE | {"source_x": float(text)}
     assert served.call("PUT", delivery_path(source_x=text)).status_code == 204
     assert foreign.next("delivery") == as_bits(values, 4)
@@ -42,18 +41,18 @@ def test_doubles_arrive_bit_for_bit(served: Served, foreign: ForeignRobot, text:
     assert foreign.next("delivery") == as_bits(values, 4)
 
 
-def test_percent_encoded_numbers_are_numbers(served: Served, foreign: ForeignRobot):
+def test_percent_encoded_numbers_are_numbers(served, foreign):
     assert served.call("PUT", delivery_path("%34", source_x="1%65%2B2")).status_code == 204
     assert foreign.next("delivery") == as_bits(EXAMPLE | {"source_x": 100.0}, 4)
 
 
-def test_a_body_on_the_put_is_ignored(served: Served, foreign: ForeignRobot):
+def test_a_body_on_the_put_is_ignored(served, foreign):
     answer = served.call("PUT", delivery_path(), content=b"\xff{", headers={"Content-Type": "image/png"})
     assert answer.status_code == 204
     assert foreign.next("delivery") == as_bits(EXAMPLE, 4)
 
 
-def test_the_list_shows_what_was_accepted_newest_first(served: Served, foreign: ForeignRobot):
+def test_the_list_shows_what_was_accepted_newest_first(served, foreign):
     served.call("PUT", delivery_path(3, source_x=1.25))
     served.soap(delivery_envelope(source_x=2.5))
     foreign.next("delivery")
@@ -66,7 +65,7 @@ def test_the_list_shows_what_was_accepted_newest_first(served: Served, foreign: 
     assert newest["accepted"]["sec"] >= before["accepted"]["sec"] > 1_600_000_000
 
 
-def test_the_list_holds_the_last_50_and_is_bounded(served: Served, foreign: ForeignRobot):
+def test_the_list_holds_the_last_50_and_is_bounded(served, foreign):
     for number in range(120):
         assert served.call("PUT", delivery_path(source_x=number)).status_code == 204
     for _ in range(120):

@@ -14,7 +14,7 @@ def run(example: str, url: str) -> str:
     return subprocess.run(command, check=True, capture_output=True, text=True, timeout=120).stdout
 
 
-def test_the_examples_deliver_coffee(domain_id: int):
+def test_the_examples_deliver_coffee(domain_id):
     with running_robot(domain_id, "--time-scale=30") as served:
         assert "fetches the coffee" in run("deliver_soap.py", served.publishers + "?wsdl")
         told = run("deliver_rest.py", served.rest)

@@ -3,12 +3,12 @@
 import pytest
 from lxml import etree
 from web_messages import goal, query_envelope, twist
-from web_robot import ForeignRobot, Served, eventually
+from web_robot import eventually
 
 PATH = "/robot/navigation/action/goal/"
 
 
-def test_a_goal_is_sent_shown_and_cancelled(served: Served, foreign: ForeignRobot):
+def test_a_goal_is_sent_shown_and_cancelled(served, foreign):
     assert served.call("GET", PATH).status_code == 404
     answer = served.call("PUT", PATH, json=goal(x=3.5))
     assert (answer.status_code, answer.headers["Location"]) == (201, PATH)
@@ -29,7 +29,7 @@ def test_a_goal_is_sent_shown_and_cancelled(served: Served, foreign: ForeignRobo
     assert etree.fromstring(soap.content).find(".//return") is None
 
 
-def test_a_repeat_is_a_no_op_and_another_pose_a_conflict(served: Served, foreign: ForeignRobot):
+def test_a_repeat_is_a_no_op_and_another_pose_a_conflict(served, foreign):
     assert served.call("PUT", PATH, json=goal()).status_code == 201
     foreign.next("goal")
     assert served.call("PUT", PATH, json=goal()).status_code == 200
@@ -40,7 +40,7 @@ def test_a_repeat_is_a_no_op_and_another_pose_a_conflict(served: Served, foreign
     assert served.call("GET", PATH).json()["goal"]["target_pose"]["pose"]["position"]["x"] == 3.0
 
 
-def test_another_goal_preempts(served: Served, foreign: ForeignRobot):
+def test_another_goal_preempts(served, foreign):
     served.call("PUT", PATH, json=goal("first"))
     foreign.next("goal")
     assert served.call("PUT", PATH, json=goal("second", x=5.0)).status_code == 202
@@ -48,7 +48,7 @@ def test_another_goal_preempts(served: Served, foreign: ForeignRobot):
     assert served.call("GET", PATH).json()["goal_id"]["id"] == "second"
 
 
-def test_a_goal_that_has_ended_is_not_current_and_its_id_starts_a_new_one(served: Served, foreign: ForeignRobot):
+def test_a_goal_that_has_ended_is_not_current_and_its_id_starts_a_new_one(served, foreign):
     served.call("PUT", PATH, json=goal())
     foreign.next("goal")
     foreign.do(finish=True)
@@ -57,7 +57,7 @@ def test_a_goal_that_has_ended_is_not_current_and_its_id_starts_a_new_one(served
     foreign.next("goal")
 
 
-def test_id_and_header_may_be_left_out(served: Served, foreign: ForeignRobot):
+def test_id_and_header_may_be_left_out(served, foreign):
     answer = served.call("PUT", PATH, json=goal(identity=None))
     assert answer.status_code == 201
     filled = answer.json()
@@ -71,7 +71,7 @@ def test_id_and_header_may_be_left_out(served: Served, foreign: ForeignRobot):
 
 
 @pytest.mark.parametrize("identity", ["x" * 255, "für 猫 🐈", " ", "\t\x01\x7f", "</id>"])
-def test_any_id_comes_back_unchanged(served: Served, foreign: ForeignRobot, identity: str):
+def test_any_id_comes_back_unchanged(served, foreign, identity):
     assert served.call("PUT", PATH, json=goal(identity)).status_code == 201
     foreign.next("goal")
     assert served.call("GET", PATH).json()["goal_id"]["id"] == identity
@@ -97,14 +97,14 @@ def test_any_id_comes_back_unchanged(served: Served, foreign: ForeignRobot, iden
         ({"goal_id": {"id": "x"}}, "goal"),
     ],
 )
-def test_a_goal_of_the_wrong_shape_or_value_is_refused(served: Served, foreign: ForeignRobot, sent: object, named: str):
+def test_a_goal_of_the_wrong_shape_or_value_is_refused(served, foreign, sent, named):
     answer = served.call("PUT", PATH, json=sent)
     assert answer.status_code == 422
     assert named in answer.json()["detail"]
     assert foreign.heard_nothing()
 
 
-def test_a_goal_that_the_robot_refuses_is_422(served: Served, foreign: ForeignRobot):
+def test_a_goal_that_the_robot_refuses_is_422(served, foreign):
     answer = served.call("PUT", PATH, json=goal(x=1000.0))
     assert answer.status_code == 422
     assert foreign.next("goal")["x"] == 1000.0
@@ -116,7 +116,7 @@ def told(identity: str) -> dict[str, object]:
     return {"goal_id": identity, "status": 2, "pose": pose}
 
 
-def test_a_mission_s_goal_is_shown_and_cancelled(served: Served, foreign: ForeignRobot):
+def test_a_mission_s_goal_is_shown_and_cancelled(served, foreign):
     foreign.do(current_goal=told("ab" * 16))
     shown = eventually(lambda: (answer := served.call("GET", PATH)).is_success and answer.json())
     assert shown["goal_id"] == {"stamp": {"sec": 5, "nanosec": 6}, "id": "ab" * 16}
@@ -127,7 +127,7 @@ def test_a_mission_s_goal_is_shown_and_cancelled(served: Served, foreign: Foreig
     foreign.do(current_goal={})
 
 
-def test_a_goal_of_ours_is_never_taken_for_a_mission_s(served: Served, foreign: ForeignRobot):
+def test_a_goal_of_ours_is_never_taken_for_a_mission_s(served, foreign):
     """The robot's word on its current goal may lag behind: here it stays with a goal that was displaced."""
     foreign.do(tell_next_goal_as=told(""))
     assert served.call("PUT", PATH, json=goal("first")).status_code == 201
@@ -141,7 +141,7 @@ def test_a_goal_of_ours_is_never_taken_for_a_mission_s(served: Served, foreign: 
 
 
 @pytest.mark.parametrize("report", ["", [], {"goal_id": "x"}, {"goal_id": "x", "status": "2", "pose": {}}, 7])
-def test_a_report_amiss_is_no_goal(served: Served, foreign: ForeignRobot, report: object):
+def test_a_report_amiss_is_no_goal(served, foreign, report):
     foreign.do(current_goal=report)
     foreign.do(odometry={"x": 4.0, "covariance": 0.0})
     eventually(lambda: served.call("GET", "/robot/velocity/").json()["linear"]["x"] == 0.4)

@@ -30,7 +30,7 @@ def fields(served: Served, path: str, method: str) -> tuple[int, dict[str, str]]
 
 
 @pytest.mark.parametrize("path", ALLOWED)
-def test_methods_that_are_not_offered_are_405_with_allow(served: Served, path: str):
+def test_methods_that_are_not_offered_are_405_with_allow(served, path):
     for method in METHODS - ALLOWED[path]:
         status, answered = fields(served, path, method)
         assert status == 405
@@ -39,14 +39,14 @@ def test_methods_that_are_not_offered_are_405_with_allow(served: Served, path: s
 
 
 @pytest.mark.parametrize("path", ALLOWED)
-def test_options_tells_the_methods(served: Served, path: str):
+def test_options_tells_the_methods(served, path):
     answer = served.call("OPTIONS", path)
     assert (answer.status_code, answer.content) == (204, b"")
     assert set(answer.headers["Allow"].split(", ")) == ALLOWED[path]
 
 
 @pytest.mark.parametrize("path", [path for path in ALLOWED if "GET" in ALLOWED[path] and "navigation" not in path])
-def test_head_is_get_without_content(served: Served, path: str):
+def test_head_is_get_without_content(served, path):
     head, get = served.call("HEAD", path), served.call("GET", path)
     assert (head.status_code, head.content) == (200, b"")
     assert head.headers["Content-Type"] == get.headers["Content-Type"]
@@ -57,7 +57,7 @@ def test_head_is_get_without_content(served: Served, path: str):
     "path",
     ["/", "/robot", "/robot/", "/robot/pose", "/robot/pose/x", "/robot//pose/", "/robot/app/delivery/4", "/%00", "/.."],
 )
-def test_unknown_paths_are_404_whatever_the_method(served: Served, path: str, method: str):
+def test_unknown_paths_are_404_whatever_the_method(served, path, method):
     assert fields(served, path, method)[0] == 404
 
 
@@ -80,7 +80,7 @@ def test_unknown_paths_are_404_whatever_the_method(served: Served, path: str, me
         ("application/json; charset=utf-8", "application/json"),
     ],
 )
-def test_accept_chooses_the_format(served: Served, accept: str | None, media_type: str):
+def test_accept_chooses_the_format(served, accept, media_type):
     answer = served.call("GET", "/robot/velocity/", headers={} if accept is None else {"Accept": accept})
     assert answer.status_code == 200
     assert answer.headers["Content-Type"].partition(";")[0] == media_type
@@ -90,19 +90,19 @@ def test_accept_chooses_the_format(served: Served, accept: str | None, media_typ
 @pytest.mark.parametrize(
     "accept", ["image/png", "application/json;q=0", "*/*;q=0", "text/html", "application/json;q=zero", "nonsense"]
 )
-def test_nothing_acceptable_is_406(served: Served, accept: str):
+def test_nothing_acceptable_is_406(served, accept):
     for path in ("/robot/pose/", "/robot/sensors/", "/robot/app/delivery/", "/robot/navigation/action/goal/"):
         answer = served.call("GET", path, headers={"Accept": accept})
         assert answer.status_code == 406
         assert "accept" in answer.headers["Vary"].lower()
 
 
-def test_several_accept_lines_are_one_list(served: Served):
+def test_several_accept_lines_are_one_list(served):
     lines = [("Accept", "text/html"), ("Accept", "application/xml")]
     assert served.call("GET", "/robot/pose/", headers=lines).headers["Content-Type"] == "application/xml"
 
 
-def test_errors_are_problem_details_in_the_format_asked_for(served: Served):
+def test_errors_are_problem_details_in_the_format_asked_for(served):
     answer = served.call("PUT", "/robot/velocity/", json=twist(x=9))
     assert answer.headers["Content-Type"] == "application/problem+json"
     assert answer.json() == {
@@ -119,13 +119,13 @@ def test_errors_are_problem_details_in_the_format_asked_for(served: Served):
 
 
 @pytest.mark.parametrize("url", ["rest", "publishers"])
-def test_every_answer_is_dated_and_timed(served: Served, url: str):
+def test_every_answer_is_dated_and_timed(served, url):
     for answer in (served.client.get(getattr(served, url)), served.client.options(served.publishers)):
         assert answer.headers["Date"].endswith("GMT")
         assert float(answer.headers["Server-Timing"].removeprefix("app;dur=")) >= 0
 
 
-def test_lists_have_an_element_for_each_entry(served: Served):
+def test_lists_have_an_element_for_each_entry(served):
     served.call("PUT", delivery_path())
     xml = etree.fromstring(served.call("GET", "/robot/app/delivery/", headers={"Accept": "application/xml"}).content)
     assert xml.tag == "Deliveries"
@@ -155,7 +155,7 @@ def test_lists_have_an_element_for_each_entry(served: Served):
         (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 400),
     ],
 )
-def test_requests_that_are_no_good_http(served: Served, request_head: bytes, status: int):
+def test_requests_that_are_no_good_http(served, request_head, status):
     answer = served.raw(request_head)
     assert answer.startswith(b"HTTP/1.1 %d " % status)
     assert status < 400 or b"application/problem+json" in answer
@@ -163,7 +163,7 @@ def test_requests_that_are_no_good_http(served: Served, request_head: bytes, sta
     assert served.call("GET", "/robot/pose/").status_code == 200
 
 
-def test_a_body_over_the_limit_is_413_and_one_of_64_kib_is_read(served: Served):
+def test_a_body_over_the_limit_is_413_and_one_of_64_kib_is_read(served):
     spaces = " " * (2 * 1024 * 1024)
     fields = {"Content-Type": "application/json"}
     assert served.call("PUT", "/robot/velocity/", content=spaces, headers=fields).status_code == 413
@@ -173,7 +173,7 @@ def test_a_body_over_the_limit_is_413_and_one_of_64_kib_is_read(served: Served):
     assert served.soap(" " * (2 * 1024 * 1024)).status_code == 413
 
 
-def test_descriptions_carry_the_address_by_which_they_were_asked_for(served: Served):
+def test_descriptions_carry_the_address_by_which_they_were_asked_for(served):
     assert served.call("GET", "/openapi.json").json()["servers"] == [{"url": served.rest}]
     named = served.call("GET", "/openapi.json", headers={"Host": "robot.example:81"}).json()
     assert named["servers"] == [{"url": "http://robot.example:81"}]

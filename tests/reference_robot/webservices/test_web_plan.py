@@ -10,7 +10,7 @@ from web_robot import ForeignRobot, eventually, running_robot
 PATH = "/robot/navigation/service/plan"
 
 
-def test_a_planner_of_nav2_is_asked(domain_id: int):
+def test_a_planner_of_nav2_is_asked(domain_id):
     robot = ForeignRobot(domain_id, "Twist", "planner")
     with running_robot(domain_id, "--attach") as served:
         robot.do(odometry={"x": 2.5, "covariance": 0.0})

@@ -29,7 +29,7 @@ def published(served: Served, foreign: ForeignRobot, x: float) -> None:
     eventually(lambda: served.call("GET", PATH).json()["pose"]["pose"]["position"]["x"] == x)
 
 
-def test_odometry_of_a_foreign_node_is_the_pose(served: Served, foreign: ForeignRobot):
+def test_odometry_of_a_foreign_node_is_the_pose(served, foreign):
     published(served, foreign, 0.1)
     pose = served.call("GET", PATH).json()
     assert list(pose) == ["header", "child_frame_id", "pose", "twist"]
@@ -40,7 +40,7 @@ def test_odometry_of_a_foreign_node_is_the_pose(served: Served, foreign: Foreign
     assert later["header"]["stamp"] != pose["header"]["stamp"]
 
 
-def test_all_formats_and_interfaces_tell_the_same(served: Served, foreign: ForeignRobot):
+def test_all_formats_and_interfaces_tell_the_same(served, foreign):
     foreign.do(odometry={"x": 1 / 3, "covariance": 1e-05, "stopped_clock": True})
     as_json = eventually(lambda: (p := served.call("GET", PATH).json())["pose"]["pose"]["position"]["x"] == 1 / 3 and p)
     xml = etree.fromstring(served.call("GET", PATH, headers={"Accept": "application/xml"}).content)
@@ -51,14 +51,14 @@ def test_all_formats_and_interfaces_tell_the_same(served: Served, foreign: Forei
     assert plain(soap.find(".//return")) == as_json
 
 
-def test_velocity_is_the_odometry_s(served: Served, foreign: ForeignRobot):
+def test_velocity_is_the_odometry_s(served, foreign):
     published(served, foreign, 0.5)
     velocity = served.call("GET", "/robot/velocity/").json()
     assert velocity == {"linear": {"x": 0.05, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
     assert served.call("GET", "/robot/velocity/linear/").json() == velocity["linear"]
 
 
-def test_before_the_first_odometry_there_is_503(domain_id: int):
+def test_before_the_first_odometry_there_is_503(domain_id):
     silent = ForeignRobot(domain_id, "Twist", "silent")
     with running_robot(domain_id, "--attach") as served:
         for path in (PATH, "/robot/velocity/", "/robot/velocity/linear/"):

@@ -25,7 +25,7 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 
 @given(st.lists(finite, min_size=6, max_size=6))
 @settings(max_examples=50, deadline=None)
-def test_a_twist_survives_every_format_bit_for_bit(numbers: list[float]):
+def test_a_twist_survives_every_format_bit_for_bit(numbers):
     plain = {
         "linear": dict(zip("xyz", numbers[:3], strict=True)),
         "angular": dict(zip("xyz", numbers[3:], strict=True)),
@@ -39,14 +39,14 @@ def test_a_twist_survives_every_format_bit_for_bit(numbers: list[float]):
 
 @given(st.text(max_size=30))
 @settings(max_examples=100, deadline=None)
-def test_text_survives_json_and_yaml(text: str):
+def test_text_survives_json_and_yaml(text):
     assert json.loads(write_json({"id": text})) == {"id": text}
     assert yaml.safe_load(write_text({"id": text})) == {"id": text}
     write_xml({"id": text}, "GoalID")  # what XML cannot hold is replaced
 
 
 @pytest.mark.parametrize("kind", [Odometry, Path, LaserScan, BatteryState])
-def test_messages_of_all_kinds_come_back_equal(kind: type):
+def test_messages_of_all_kinds_come_back_equal(kind):
     message = kind()
     if kind is BatteryState:  # unknown figures are NaN there by definition
         shape = shape_of(kind)
@@ -75,7 +75,7 @@ def test_what_is_not_finite_is_named():
 
 
 @pytest.mark.parametrize(("kind", "value"), [(Path, '{"header": {"frame_id": "map"}, "poses": 1}')])
-def test_a_value_for_a_list_is_refused(kind: type, value: str):
+def test_a_value_for_a_list_is_refused(kind, value):
     with pytest.raises(Problem, match="poses must be a list, not 1"):
         read(value.encode(), b"application/json", shape_of(kind))
 
@@ -100,6 +100,6 @@ def test_names_of_strangers_do_not_fill_the_memory():
 
 
 @pytest.mark.parametrize("text", [b"", b"=", b"   = ", b"<", b"<=", b"\t=\n=", b"<a ="])
-def test_what_only_looks_like_names_is_malformed(text: bytes):
+def test_what_only_looks_like_names_is_malformed(text):
     with pytest.raises(Problem):
         parsed(text)

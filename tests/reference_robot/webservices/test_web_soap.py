@@ -7,7 +7,6 @@ import pytest
 import zeep
 from lxml import etree
 from web_messages import ENVELOPE, NAMESPACE, delivery_envelope, goal, query_envelope
-from web_robot import ForeignRobot, Served
 
 from conformance.contract.delivery import EXAMPLE
 
@@ -64,7 +63,7 @@ CLIENTS_FAULTS = {
 
 
 @pytest.mark.parametrize("message", CLIENTS_FAULTS.values(), ids=CLIENTS_FAULTS)
-def test_what_the_description_does_not_allow_is_a_client_fault(served: Served, foreign: ForeignRobot, message: str):
+def test_what_the_description_does_not_allow_is_a_client_fault(served, foreign, message):
     assert fault_of(served.soap(message)) == "Client"
     assert served.soap(delivery_envelope(source_x=0.5)).status_code == 200
     assert foreign.next("delivery")["source_x"] == "3fe0000000000000"
@@ -85,9 +84,7 @@ def test_what_the_description_does_not_allow_is_a_client_fault(served: Served, f
         ("message_code", "0" * 5000 + "4"),
     ],
 )
-def test_a_value_that_no_delivery_may_have_is_named_and_repeated(
-    served: Served, foreign: ForeignRobot, name: str, sent: str
-):
+def test_a_value_that_no_delivery_may_have_is_named_and_repeated(served, foreign, name, sent):
     answer = served.soap(delivery_envelope(**{name: sent}))
     assert fault_of(answer) == "Client"
     told = etree.fromstring(answer.content).findtext(".//faultstring")
@@ -97,12 +94,12 @@ def test_a_value_that_no_delivery_may_have_is_named_and_repeated(
     assert foreign.heard_nothing()
 
 
-def test_another_envelope_is_a_version_mismatch(served: Served):
+def test_another_envelope_is_a_version_mismatch(served):
     other = GOOD.replace("http://schemas.xmlsoap.org/soap/envelope/", "http://www.w3.org/2003/05/soap-envelope")
     assert fault_of(served.soap(other)) == "VersionMismatch"
 
 
-def test_a_mandatory_header_block_that_is_unknown_stops_the_message(served: Served, foreign: ForeignRobot):
+def test_a_mandatory_header_block_that_is_unknown_stops_the_message(served, foreign):
     mandatory = UNKNOWN.format('s:mustUnderstand="1"')
     assert fault_of(served.soap(delivery_envelope(header=mandatory))) == "MustUnderstand"
     assert foreign.heard_nothing()
@@ -120,7 +117,7 @@ def test_a_mandatory_header_block_that_is_unknown_stops_the_message(served: Serv
         ADDRESSING,
     ],
 )
-def test_other_header_blocks_are_taken(served: Served, foreign: ForeignRobot, header: str):
+def test_other_header_blocks_are_taken(served, foreign, header):
     answer = served.soap(delivery_envelope(header=header))
     assert answer.status_code == 200
     assert "ExecuteDeliveryRequestResponse" in answer.text
@@ -146,7 +143,7 @@ def test_other_header_blocks_are_taken(served: Served, foreign: ForeignRobot, he
         ),
     ],
 )
-def test_another_way_to_write_the_same_is_the_same(served: Served, foreign: ForeignRobot, message: str):
+def test_another_way_to_write_the_same_is_the_same(served, foreign, message):
     assert served.soap(GOOD).status_code == 200
     expected = foreign.next("delivery")
     assert served.soap(message).status_code == 200
@@ -166,14 +163,14 @@ def test_another_way_to_write_the_same_is_the_same(served: Served, foreign: Fore
         ("utf-8", "", "TEXT/XML ; charset=utf-8; action=x"),
     ],
 )
-def test_both_encodings_are_read(served: Served, foreign: ForeignRobot, encoding: str, declared: str, charset: str):
+def test_both_encodings_are_read(served, foreign, encoding, declared, charset):
     answer = served.soap((declared + GOOD).encode(encoding), Content_Type=charset)
     assert answer.status_code == 200, answer.text
     foreign.next("delivery")
 
 
 @pytest.mark.parametrize("action", ["", '""', '"urn:ExecuteCoffeeRequest"', "nonsense"])
-def test_the_soap_action_chooses_nothing(served: Served, foreign: ForeignRobot, action: str):
+def test_the_soap_action_chooses_nothing(served, foreign, action):
     answer = served.soap(delivery_envelope(message_code=3), SOAPAction=action)
     assert "ExecuteDeliveryRequestResponse" in answer.text
     assert foreign.next("delivery")["message_code"] == 3
@@ -204,9 +201,7 @@ def test_the_soap_action_chooses_nothing(served: Served, foreign: ForeignRobot, 
         ('<?xml version="1.0" encoding="iso-8859-1"?>' + GOOD, "text/xml", 415),
     ],
 )
-def test_what_is_no_message_is_4xx_without_a_fault(
-    served: Served, foreign: ForeignRobot, body: str | bytes, content_type: str, status: int
-):
+def test_what_is_no_message_is_4xx_without_a_fault(served, foreign, body, content_type, status):
     answer = served.soap(body, Content_Type=content_type)
     assert answer.status_code == status
     assert "Fault" not in answer.text
@@ -215,7 +210,7 @@ def test_what_is_no_message_is_4xx_without_a_fault(
     assert foreign.next("delivery")["source_x"] == "3fe0000000000000"
 
 
-def test_methods_other_than_post_are_405(served: Served):
+def test_methods_other_than_post_are_405(served):
     for method in ("GET", "PUT", "DELETE", "PATCH", "HEAD"):
         answer = served.client.request(method, served.publishers)
         assert (answer.status_code, answer.headers["Allow"]) == (405, "POST, OPTIONS")
@@ -223,7 +218,7 @@ def test_methods_other_than_post_are_405(served: Served):
 
 
 @pytest.mark.parametrize("service", ["publishers", "subscribers"])
-def test_the_description_carries_the_real_address(served: Served, service: str):
+def test_the_description_carries_the_real_address(served, service):
     url = getattr(served, service)
     wsdl = etree.fromstring(served.client.get(url + "?wsdl").content)
     assert wsdl.find(".//{http://schemas.xmlsoap.org/wsdl/soap/}address").get("location") == url
@@ -231,7 +226,7 @@ def test_the_description_carries_the_real_address(served: Served, service: str):
     assert etree.XMLSchema(etree.fromstring(served.client.get(schema).content))
 
 
-def test_zeep_calls_every_operation(served: Served, foreign: ForeignRobot):
+def test_zeep_calls_every_operation(served, foreign):
     publishers = zeep.Client(served.publishers + "?wsdl").service
     request = EXAMPLE | {"message_code": 3}
     publishers.ExecuteDeliveryRequest(request)
@@ -248,7 +243,7 @@ def test_zeep_calls_every_operation(served: Served, foreign: ForeignRobot):
 
 
 @pytest.mark.parametrize("operation", ["GetPose", "GetVelocity", "GetSensors", "GetNavigationServices", "GetGoal"])
-def test_answers_are_valid_by_the_schema(served: Served, foreign: ForeignRobot, operation: str):
+def test_answers_are_valid_by_the_schema(served, foreign, operation):
     served.call("PUT", "/robot/navigation/action/goal/", json=goal())
     foreign.next("goal")
     schema = etree.XMLSchema(etree.fromstring(served.client.get(served.subscribers + "?xsd=1").content))
@@ -259,7 +254,7 @@ def test_answers_are_valid_by_the_schema(served: Served, foreign: ForeignRobot, 
 
 
 @pytest.mark.parametrize("sent", ["1e400", "9" * 400])
-def test_a_plan_query_s_number_is_repeated(served: Served, sent: str):
+def test_a_plan_query_s_number_is_repeated(served, sent):
     answer = served.soap(query_envelope("GetPlan", f"<x>{sent}</x><y>1</y>"), url=served.subscribers)
     assert fault_of(answer) == "Client"
     told = etree.fromstring(answer.content).findtext(".//faultstring")
@@ -270,11 +265,11 @@ def test_a_plan_query_s_number_is_repeated(served: Served, sent: str):
 @pytest.mark.parametrize(
     "content", ["<x>1</x>", "<x>INF</x><y>1</y>", "<x>1</x><y>1</y><frame_id>mars</frame_id>", "<y>1</y><x>1</x>"]
 )
-def test_a_bad_plan_query_is_a_client_fault(served: Served, content: str):
+def test_a_bad_plan_query_is_a_client_fault(served, content):
     assert fault_of(served.soap(query_envelope("GetPlan", content), url=served.subscribers)) == "Client"
 
 
-def test_a_host_that_is_no_address_does_not_reach_the_description(served: Served):
+def test_a_host_that_is_no_address_does_not_reach_the_description(served):
     where = urlsplit(served.publishers)
     answer = served.client.get(served.publishers + "?wsdl", headers={"Host": 'x"><y'})
     assert f'location="http://{where.netloc}{where.path}"' in answer.text

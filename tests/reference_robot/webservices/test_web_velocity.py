@@ -2,14 +2,14 @@
 
 import pytest
 from web_messages import goal, twist
-from web_robot import ForeignRobot, Served, eventually, running_robot
+from web_robot import ForeignRobot, eventually, running_robot
 
 VELOCITY = "/robot/velocity/"
 LINEAR = "/robot/velocity/linear/"
 GOAL = "/robot/navigation/action/goal/"
 
 
-def test_put_is_published_once_and_answered_with_what_was_accepted(served: Served, foreign: ForeignRobot):
+def test_put_is_published_once_and_answered_with_what_was_accepted(served, foreign):
     answer = served.call("PUT", VELOCITY, json=twist(x=0.5, z=-1))
     assert answer.status_code == 200
     assert answer.json() == twist(x=0.5, z=-1.0)
@@ -17,7 +17,7 @@ def test_put_is_published_once_and_answered_with_what_was_accepted(served: Serve
     assert foreign.heard_nothing()
 
 
-def test_put_takes_xml_as_it_is_sent(served: Served, foreign: ForeignRobot):
+def test_put_takes_xml_as_it_is_sent(served, foreign):
     xml = (
         b"<Twist><linear><x> 1e-1 </x><y>0</y><z>0</z></linear><!-- turn -->"
         b"<angular><x>0</x><y>0</y><z>0.<!-- -->5</z></angular></Twist>"
@@ -30,7 +30,7 @@ def test_put_takes_xml_as_it_is_sent(served: Served, foreign: ForeignRobot):
     assert foreign.next("velocity") == {"type": "Twist", "x": 0.1, "z": 0.5}
 
 
-def test_put_linear_leaves_the_angular_part_that_is_in_force(served: Served, foreign: ForeignRobot):
+def test_put_linear_leaves_the_angular_part_that_is_in_force(served, foreign):
     served.call("PUT", VELOCITY, json=twist(x=0.5, z=1.0))
     foreign.next("velocity")
     answer = served.call("PUT", LINEAR, json={"x": 0.25, "y": 0.0, "z": 0.0})
@@ -50,16 +50,14 @@ def test_put_linear_leaves_the_angular_part_that_is_in_force(served: Served, for
         (LINEAR, {"x": 0.0, "y": 0.0, "z": 1.0}, ("linear.z", "1.0")),
     ],
 )
-def test_beyond_the_limits_is_refused_not_clamped(
-    served: Served, foreign: ForeignRobot, path: str, value: object, names: tuple[str, ...]
-):
+def test_beyond_the_limits_is_refused_not_clamped(served, foreign, path, value, names):
     answer = served.call("PUT", path, json=value)
     assert answer.status_code == 422
     assert all(name in answer.json()["detail"] for name in names)
     assert foreign.heard_nothing()
 
 
-def test_while_a_goal_is_active_velocity_is_refused(served: Served, foreign: ForeignRobot):
+def test_while_a_goal_is_active_velocity_is_refused(served, foreign):
     assert served.call("PUT", GOAL, json=goal()).status_code == 201
     foreign.next("goal")
     assert served.call("PUT", VELOCITY, json=twist()).status_code == 409
@@ -70,7 +68,7 @@ def test_while_a_goal_is_active_velocity_is_refused(served: Served, foreign: For
     foreign.next("velocity")
 
 
-def test_a_robot_that_takes_stamped_twists_gets_them(domain_id: int):
+def test_a_robot_that_takes_stamped_twists_gets_them(domain_id):
     stamped = ForeignRobot(domain_id, "TwistStamped")
     with running_robot(domain_id, "--attach") as served:
         eventually(lambda: served.call("PUT", VELOCITY, json=twist(x=0.3, z=0.2)).status_code == 200)
@@ -78,7 +76,7 @@ def test_a_robot_that_takes_stamped_twists_gets_them(domain_id: int):
     stamped.close()
 
 
-def test_without_a_robot_commands_are_not_accepted(domain_id: int):
+def test_without_a_robot_commands_are_not_accepted(domain_id):
     with running_robot(domain_id, "--attach") as served:
         for answer in (
             served.call("PUT", VELOCITY, json=twist()),
