@@ -122,11 +122,7 @@ _Validator: Final = cast("Any", extend)(Draft202012Validator, type_checker=_TYPE
 
 
 class Shape:
-    """A schema that values are held against; its numbers are those that a double can hold.
-
-    Args:
-        schema: without references.
-    """
+    """A schema without references that values are held against; its numbers are those that a double can hold."""
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema

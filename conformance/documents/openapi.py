@@ -159,22 +159,23 @@ def _operation(path: str, method: str, given: dict[str, Any], shared: list[dict[
         template=path,
         parameters=tuple(_parameter(item) for item in parameters),
         bodies={
-            name.split(";", 1)[0].strip().lower(): Body(
-                name.split(";", 1)[0].strip().lower(), modern(content.get("schema", {})), _examples(content)
-            )
-            for name, content in body.get("content", {}).items()
+            name: Body(name, modern(content.get("schema", {})), _examples(content))
+            for name, content in _by_media_type(body).items()
         },
         body_required=bool(body.get("required", False)),
         responses={
             str(status): {
-                name.split(";", 1)[0].strip().lower(): opened(modern(content.get("schema", {})))
-                for name, content in response.get("content", {}).items()
+                name: opened(modern(content.get("schema", {}))) for name, content in _by_media_type(response).items()
             }
             for status, response in given.get("responses", {}).items()
         },
         motion=bool(given.get("x-roaas-motion", method not in SAFE)),
         optional=bool(given.get("x-roaas-optional", False)),
     )
+
+
+def _by_media_type(given: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    return {name.split(";", 1)[0].strip().lower(): content for name, content in given.get("content", {}).items()}
 
 
 def _parameter(given: dict[str, Any]) -> Parameter:
@@ -201,12 +202,7 @@ def _examples(given: dict[str, Any]) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class Resource:
-    """All operations of one path.
-
-    Attributes:
-        template: the path.
-        operations: by method.
-    """
+    """All operations of one path, by method."""
 
     template: str
     operations: dict[str, Operation]
@@ -249,13 +245,7 @@ def resource_at(contract: Contract, path: str) -> Resource | None:
 
 
 def matching(contract: Contract, method: str, path: str) -> Operation | None:
-    """The operation that a request is for; HEAD counts as GET.
-
-    Args:
-        contract: whose.
-        method: as sent.
-        path: below the base URL, without query.
-    """
+    """The operation that a request is for; HEAD counts as GET. The path is below the base URL, without query."""
     resource = resource_at(contract, path)
     return resource.operations.get("GET" if method == "HEAD" else method) if resource else None
 

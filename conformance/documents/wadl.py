@@ -8,6 +8,7 @@ from urllib.parse import urlsplit
 
 from conformance.documents.openapi import Operation, Parameter
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
+from conformance.documents.xml import elements
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -41,9 +42,7 @@ def _of_resource(
     path = f"{prefix}/{element.get('path', '').lstrip('/')}" if element.get("path") else prefix
     parameters = inherited | _parameters(element)
     found: list[Operation] = []
-    for child in element:
-        if not isinstance(child.tag, str):
-            continue
+    for child in elements(element):
         if local_name(child) == "resource":
             found += _of_resource(child, path.rstrip("/"), parameters, root)
         elif local_name(child) == "method":

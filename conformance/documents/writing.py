@@ -7,6 +7,8 @@ from typing import Any
 
 from lxml import etree
 
+from conformance.documents.xml import elements
+
 
 @dataclass(frozen=True)
 class Token:
@@ -56,11 +58,7 @@ def xml_bytes(value: Any, root: str, like: etree._Element | None = None) -> byte
 def _fill(element: etree._Element, value: Any, like: etree._Element | None) -> None:
     if isinstance(value, dict | Pairs):
         members = list(value.items() if isinstance(value, dict) else value.members)
-        patterns = (
-            {}
-            if like is None
-            else {etree.QName(child).localname: child for child in like if isinstance(child.tag, str)}
-        )
+        patterns = {etree.QName(child).localname: child for child in (elements(like) if like is not None else ())}
         order = {name: index for index, name in enumerate(patterns)}
         members.sort(key=lambda member: order.get(member[0], len(order)))
         for name, item in members:

@@ -5,7 +5,7 @@ One object, given to pytest, is all that connects a run with its checks.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 # Reading first; then what needs a robot at rest; deliveries late, because a robot drives long after them; attacks last.
 PHASES = ("reach", "reading", "describe", "motion", "input", "delivery", "attack")
 
+_NO_ADDRESS = "the robot's {} interface has no address"
+_Interface = TypeVar("_Interface")
+
 
 def ids_of(item: pytest.Item) -> tuple[str, ...]:
     """The requirements that a check judges; empty for a test that is no check."""
@@ -40,6 +43,12 @@ def _turn(item: pytest.Item) -> tuple[int, str]:
     """When a check's turn comes: by its phase, then by its module's name, whichever folder that is in."""
     mark = item.get_closest_marker("phase")
     return PHASES.index(mark.args[0]) if mark else 0, item.path.name
+
+
+def _there(interface: _Interface | None, name: Interface) -> _Interface:
+    if interface is None:
+        pytest.skip(_NO_ADDRESS.format(name))
+    return interface
 
 
 class ChecksPlugin:
@@ -71,12 +80,9 @@ class ChecksPlugin:
             return
         run = self._robot().run
         ledger = run.contract.ledger
-        kept: list[pytest.Item] = []
-        dropped: list[pytest.Item] = []
-        for item in items:
-            ids = ids_of(item)
-            wanted = not ids or any(id_ in ledger and ledger[id_].class_ in run.claims for id_ in ids)
-            (kept if wanted else dropped).append(item)
+        claimed = {id_ for id_, requirement in ledger.items() if requirement.class_ in run.claims}
+        kept = [item for item in items if not ids_of(item) or not claimed.isdisjoint(ids_of(item))]
+        dropped = [item for item in items if item not in kept]
         config.hook.pytest_deselected(items=dropped)
         items[:] = sorted(kept, key=_turn)
 
@@ -100,7 +106,7 @@ class ChecksPlugin:
         """Skip for want of an interface; a vendor who named no classes has not claimed what needs it."""
         run = self._robot().run
         if not self._robot().has(name):
-            reason = f"the robot's {name} interface has no address"
+            reason = _NO_ADDRESS.format(name)
             for id_ in ids if run.statement.claims is None else ():
                 run.judge.unclaimed(id_, reason)
             pytest.skip(reason)
@@ -183,9 +189,7 @@ class ChecksPlugin:
     @pytest.fixture
     def api(self, interfaces: Interfaces) -> RestInterface:
         """The robot's REST interface, with the run that it is judged in."""
-        if interfaces.rest is None:
-            pytest.skip("the robot's rest interface has no address")
-        return interfaces.rest
+        return _there(interfaces.rest, Interface.REST)
 
     @pytest.fixture
     def rest(self, api: RestInterface) -> HttpClient:
@@ -200,16 +204,12 @@ class ChecksPlugin:
     @pytest.fixture
     def publishers(self, soap: SoapServices) -> SoapService:
         """The SOAP service that acts."""
-        if soap.publishers is None:
-            pytest.skip("the robot's publishers interface has no address")
-        return soap.publishers
+        return _there(soap.publishers, Interface.PUBLISHERS)
 
     @pytest.fixture
     def subscribers(self, soap: SoapServices) -> SoapService:
         """The SOAP service that only reads."""
-        if soap.subscribers is None:
-            pytest.skip("the robot's subscribers interface has no address")
-        return soap.subscribers
+        return _there(soap.subscribers, Interface.SUBSCRIBERS)
 
     @pytest.fixture
     def explore(self, request: pytest.FixtureRequest, run: Run) -> Explorer:

@@ -19,12 +19,7 @@ _OFTEN_S = 2.0
 
 
 class Progress:
-    """A pytest plugin that says where a run is.
-
-    Args:
-        robot: that is judged.
-        out: where to write; None for nowhere.
-    """
+    """A pytest plugin that says where a run is; ``out`` is None for nowhere."""
 
     def __init__(self, robot: RobotUnderTest, out: TextIO | None) -> None:
         self._robot, self._out = robot, out

@@ -19,12 +19,7 @@ def record_exception(
 ) -> None:
     """Put down what an exception that ended a check says of the requirements that it was to judge.
 
-    Args:
-        run: the run.
-        alive: whether the robot answers at all, asked anew.
-        ids: the check's requirements.
-        judged: how many cases each of them had before the check.
-        error: what ended it.
+    ``alive`` asks the robot anew; ``judged`` is how many cases each requirement had before the check.
     """
     if isinstance(error, RefutedError):
         return

@@ -188,12 +188,7 @@ def suite_version() -> str:
 
 
 def suite_digest(contract: Contract, package: Path = _PACKAGE) -> str:
-    """Digest over the modules that judge and the contract's files: two runs with the same digest asked the same.
-
-    Args:
-        contract: what is judged by.
-        package: the suite's folder.
-    """
+    """Digest over the package's modules that judge and the contract's files: two runs of one digest asked the same."""
     modules = {
         path.relative_to(package).as_posix(): path for room in JUDGING for path in (package / room).rglob("*.py")
     }

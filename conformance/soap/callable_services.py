@@ -36,24 +36,19 @@ class SoapServices:
 def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
     """The services that may be called, the one that only reads first.
 
-    What was not allowed or does not answer is put down against the requirements that need it, so that they are not
-    passed on half of the evidence.
-
-    Args:
-        soap: the robot's services.
-        ids: the requirements that are judged.
+    What was not allowed or does not answer is put down against those of the requirements that need it, so that they are
+    not passed on half of the evidence.
 
     Raises:
         pytest.skip.Exception: none may be asked.
     """
     found: list[SoapService] = []
     reasons: list[str] = []
-    if soap.subscribers is not None:
-        _add(soap, soap.subscribers, found, reasons)
-    if soap.publishers is not None and soap.run.allow_motion:
-        _add(soap, soap.publishers, found, reasons)
-    elif soap.publishers is not None:
-        reasons.append(_NO_MOTION)
+    for service in reversed(soap.there.values()):
+        if problem := _problem(soap.run, service):
+            reasons.append(problem)
+        else:
+            found.append(service)
     if not found:
         pytest.skip("; ".join(reasons) or "no SOAP service has an address")
     for id_ in ids:
@@ -64,13 +59,13 @@ def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
     return found
 
 
-def _add(soap: SoapServices, service: SoapService, found: list[SoapService], reasons: list[str]) -> None:
-    if service.name in soap.run.unreachable:
-        reasons.append(f"the robot's {service.name} interface does not answer: {soap.run.unreachable[service.name]}")
-    elif service.contract_wsdl_path is None:
-        reasons.append(f"the contract describes no {service.name} service")
-    else:
-        found.append(service)
+def _problem(run: Run, service: SoapService) -> str:
+    """Why a service may not be called; empty where it may."""
+    if service.name == Interface.PUBLISHERS and not run.allow_motion:
+        return _NO_MOTION
+    if service.name in run.unreachable:
+        return f"the robot's {service.name} interface does not answer: {run.unreachable[service.name]}"
+    return f"the contract describes no {service.name} service" if service.contract_wsdl_path is None else ""
 
 
 def repetitions(effort: Effort, standard: int) -> int:

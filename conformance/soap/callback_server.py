@@ -4,7 +4,6 @@ import contextlib
 import socket
 import threading
 import time
-from types import TracebackType
 from typing import Self
 
 _WAIT_S = 0.2
@@ -14,11 +13,7 @@ _REPLY = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nContent-Length: 4\r\nCon
 class CallbackServer:
     """Listens where the robot would reach it, and remembers what was asked for.
 
-    Use as a context manager: it listens as long as the block lasts.
-
-    Args:
-        host: the robot's host name.
-        port: a port of it.
+    Use as a context manager: it listens as long as the block lasts. Host and port are the robot's.
     """
 
     def __init__(self, host: str, port: int) -> None:
@@ -32,7 +27,7 @@ class CallbackServer:
         self._thread.start()
         return self
 
-    def __exit__(self, _t: type[BaseException] | None, _e: BaseException | None, _b: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self._closing = True
         # Closing alone does not wake an accept; on some systems shutting down does not either, but the timeout does.
         with contextlib.suppress(OSError):

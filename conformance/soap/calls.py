@@ -92,12 +92,7 @@ def read_exchange(exchange: Exchange) -> SoapResponse:
 
 
 def send(service: SoapService, message: Node | bytes | str, **how: Any) -> SoapResponse:
-    """Send a message and read the answer.
-
-    Args:
-        service: whom to send to.
-        message: an Envelope as a node, or a document as it is.
-        how: as SoapService.post().
+    """Send an Envelope, or a document as it is, and read the answer; ``how`` is as SoapService.post() has it.
 
     Raises:
         NoAnswerError: no HTTP response came.

@@ -32,9 +32,7 @@ def children_of(element: etree._Element, name: str) -> list[etree._Element]:
 def content_of(wrapper: etree._Element, expected: Element) -> etree._Element | None:
     """The element in a response wrapper that holds what the operation returns; None where there is none.
 
-    Args:
-        wrapper: the Body's child.
-        expected: declaration of what is returned; a message that has its parts right in the wrapper is read as well.
+    A message that has the parts of what is expected right in the wrapper is read as well.
     """
     names = {local(child.tag) for child in expected.children}
     inside = elements(wrapper)

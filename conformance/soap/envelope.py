@@ -116,12 +116,6 @@ def _fault(element: etree._Element) -> Fault:
 
 
 def envelope(body: Iterable[Node], headers: Iterable[Node] | None = None, space: str = ENVELOPE) -> Node:
-    """Make a message.
-
-    Args:
-        body: children of the Body.
-        headers: header blocks; None: no Header at all.
-        space: namespace of Envelope, Header and Body.
-    """
+    """Make a message of children of the Body and header blocks (None: no Header), in SOAP's namespace or another."""
     header = () if headers is None else (Node(clark(space, "Header"), children=tuple(headers)),)
     return Node(clark(space, "Envelope"), children=(*header, Node(clark(space, "Body"), children=tuple(body))))

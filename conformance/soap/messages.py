@@ -19,12 +19,9 @@ if TYPE_CHECKING:
 
 
 def ordinary(element: Element, *, optional: bool = False) -> Node:
-    """One valid message with ordinary values.
+    """One valid message with ordinary values, with optional elements or without.
 
-    Args:
-        element: what to make.
-        optional: whether to make optional elements as well. An optional element that alone is in its parent is always
-            made: a wrapper without its argument says nothing.
+    An optional element that alone is in its parent is always made: a wrapper without its argument says nothing.
     """
     kind = element.type
     if isinstance(kind, Simple):
@@ -51,12 +48,9 @@ def _some(item: Element | Group, *, optional: bool) -> tuple[Node, ...]:
 
 
 def filled(element: Element, values: Mapping[str, str]) -> Node:
-    """A message of given values, in the order of the schema.
+    """A message of given values (text by the local name of its element), in the order of the schema.
 
-    Args:
-        element: what to make.
-        values: text by the local name of its element; elements without one are left out, and so are those that would
-            be empty.
+    Elements without a value are left out, and so are those that would be empty.
     """
     children = [filled(child, values) for child in element.children]
     kept = [child for child in children if child.children or child.name in values]
@@ -66,10 +60,7 @@ def filled(element: Element, values: Mapping[str, str]) -> Node:
 def variants(element: Element, base: Node, fixed: frozenset[tuple[int, ...]] = frozenset()) -> SearchStrategy[Node]:
     """Valid messages of the same structure as ``base``, with other values.
 
-    Args:
-        element: the declaration that ``base`` follows.
-        base: a message that the robot takes.
-        fixed: paths of values that are left as they are, because the contract limits them beyond the schema.
+    Those at ``fixed`` paths are left as they are, because the contract limits them beyond the schema.
     """
     leaves = [(path, simple) for path, simple in simple_leaves(element, base) if path not in fixed]
     if not leaves:

@@ -5,6 +5,7 @@ A mutation is a candidate only. Whether the message really is invalid is for bot
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 from conformance.documents import xsd_lexical as lexical
@@ -48,12 +49,7 @@ def invalid_ones(mutations: Iterable[Mutation], types: Types) -> Iterator[Mutati
 
 
 def mutations(element: Element, base: Node) -> Iterator[Mutation]:
-    """All single mutations of a valid message.
-
-    Args:
-        element: declaration of the Body's child.
-        base: a valid one.
-    """
+    """All single mutations of ``base``, a valid child of the Body."""
     for make in (_missing, _unknown, _duplicate, _order, _namespace, _values, _nil, _body):
         yield from make(element, base)
 
@@ -71,17 +67,15 @@ def _unknown(element: Element, base: Node) -> Iterator[Mutation]:
             for space in ("", namespace(base.tag), STRANGE):
                 extra = Node(clark(space, _NOBODY), "1")
                 children = (*parent.children[:position], extra, *parent.children[position:])
-                changed = replace(parent, children=children)
-                made = base.replaced(path, changed)
+                made = base.replaced(path, replace(parent, children=children))
                 yield Mutation("unknown", f"{extra.tag} {where} in {parent.name}", (made,))
 
 
 def _duplicate(element: Element, base: Node) -> Iterator[Mutation]:
     for path, declared in declarations(element, base):
         if declared.maximum is not None:
-            yield Mutation(
-                "duplicate", f"{local(declared.tag)} twice", (base.replaced(path, base.at(path), base.at(path)),)
-            )
+            made = base.replaced(path, base.at(path), base.at(path))
+            yield Mutation("duplicate", f"{local(declared.tag)} twice", (made,))
 
 
 def _order(element: Element, base: Node) -> Iterator[Mutation]:
@@ -89,36 +83,26 @@ def _order(element: Element, base: Node) -> Iterator[Mutation]:
         parent = base.at(path)
         children = parent.children
         orders = [("reversed", children[::-1])]
-        orders += [
-            (
-                f"{children[index].name} after {children[index + 1].name}",
-                (*children[:index], children[index + 1], children[index], *children[index + 2 :]),
-            )
-            for index in range(len(children) - 1)
-        ]
+        for index, (one, other) in enumerate(pairwise(children)):
+            orders.append((f"{one.name} after {other.name}", (*children[:index], other, one, *children[index + 2 :])))
         for what, order in orders:
             if [child.tag for child in order] == [child.tag for child in children]:
                 continue
-            changed = replace(parent, children=tuple(order))
-            made = base.replaced(path, changed)
+            made = base.replaced(path, replace(parent, children=tuple(order)))
             yield Mutation("order", f"children of {parent.name}: {what}", (made,))
 
 
 def _namespace(element: Element, base: Node) -> Iterator[Mutation]:
     own = namespace(base.tag)
     for space in ("", STRANGE):
-        yield Mutation(
-            "namespace", f"{base.name} in {space or 'no'} namespace", (replace(base, tag=clark(space, base.name)),)
-        )
+        made = replace(base, tag=clark(space, base.name))
+        yield Mutation("namespace", f"{base.name} in {space or 'no'} namespace", (made,))
     for path, declared in declarations(element, base):
         for space in ("", own, STRANGE):
             tag = clark(space, local(declared.tag))
             if tag != declared.tag:
-                yield Mutation(
-                    "namespace",
-                    f"{local(declared.tag)} in {space or 'no'} namespace",
-                    (base.replaced(path, replace(base.at(path), tag=tag)),),
-                )
+                made = base.replaced(path, replace(base.at(path), tag=tag))
+                yield Mutation("namespace", f"{local(declared.tag)} in {space or 'no'} namespace", (made,))
 
 
 def _values(element: Element, base: Node) -> Iterator[Mutation]:

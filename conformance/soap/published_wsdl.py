@@ -37,9 +37,7 @@ class PublishedWsdl:
     def interpreted(self, beside: str, connection: Connection) -> tuple[Description | None, str]:
         """What it says, and why that cannot be read (one of the two).
 
-        Args:
-            beside: URL of the service, for a WSDL from a file that refers to documents on the robot.
-            connection: deadline, credentials, ceiling and listeners.
+        A WSDL from a file may refer to documents on the robot, which are looked for ``beside`` the service.
         """
         if self.document is None or self.source is None:
             return None, self.problem
@@ -86,13 +84,10 @@ def obtain(name: str, source: str | None, connection: Connection) -> PublishedWs
 
 
 def fetch(location: str, robot: str, connection: Connection) -> bytes:
-    """A document that a WSDL refers to: beside it when it is a file, else from the robot and no other host.
+    """A document at a resolved location that a WSDL refers to: a file, else from the robot and no other host.
 
-    Args:
-        location: what the WSDL says, resolved.
-        robot: a URL of the robot: one behind a proxy or another name writes locations with its own, and the same path
-            is asked for there.
-        connection: deadline, credentials, ceiling and listeners.
+    A robot behind a proxy or another name writes locations with its own; the same path is asked for at the URL
+    ``robot``.
 
     Raises:
         OSError: it cannot be had.

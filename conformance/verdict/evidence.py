@@ -60,11 +60,7 @@ class Evidence:
 
 
 class Judge:
-    """Collects evidence from checks and observers.
-
-    Args:
-        known: ids of the requirements that there are.
-    """
+    """Collects evidence from checks and observers, for the requirements whose ids are known."""
 
     def __init__(self, known: set[str]) -> None:
         self.evidence: dict[str, Evidence] = {id_: Evidence() for id_ in sorted(known)}

@@ -92,16 +92,8 @@ def test_a_first_statement_is_written_and_can_be_used(tmp_path, web_server):
 
 @contextmanager
 def _independent_robot(name):
-    command = [
-        sys.executable,
-        "-m",
-        "conformance.selftest.independent_robots",
-        name,
-        "--rest-port",
-        "0",
-        "--soap-port",
-        "0",
-    ]
+    command = [sys.executable, "-m", "conformance.selftest.independent_robots", name]
+    command += ["--rest-port", "0", "--soap-port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             words = process.stdout.readline().split()
@@ -121,16 +113,21 @@ def _until(process, text):
     pytest.fail(f"the run ended without {text!r}")
 
 
+def _broken_off(tmp_path, where, break_off):
+    """A run that something happens to while the robot moves: its exit code and its result."""
+    command = [sys.executable, "-m", "roaas", "certify", *where, "--allow-motion", "--out", str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+        _until(run, "motion:")
+        break_off(run)
+        said, errors = run.communicate(timeout=60)
+    assert "Traceback" not in said + errors
+    return run.returncode, json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+
+
 def test_a_robot_that_dies_in_mid_run_is_judged_as_far_as_it_came(tmp_path):
     with _independent_robot("baroque") as (robot, _, where):
-        command = [sys.executable, "-m", "roaas", "certify", *where, "--allow-motion", "--out", str(tmp_path)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
-            _until(run, "motion:")
-            robot.kill()
-            said, errors = run.communicate(timeout=60)
-    assert run.returncode == 4
-    assert "Traceback" not in said + errors
-    result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+        code, result = _broken_off(tmp_path, where, lambda _: robot.kill())
+    assert code == 4
     verdicts = {item["id"]: item for item in result["requirements"]}
     assert verdicts["rest-resources/pose-type"]["verdict"] == "pass"
     assert verdicts["xml-security/doctype"]["verdict"] == "error"
@@ -139,14 +136,8 @@ def test_a_robot_that_dies_in_mid_run_is_judged_as_far_as_it_came(tmp_path):
 
 def test_an_interrupted_run_keeps_what_it_has_and_stops_the_robot(tmp_path):
     with _independent_robot("baroque") as (_, rest, where):
-        command = [sys.executable, "-m", "roaas", "certify", *where, "--allow-motion", "--out", str(tmp_path)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
-            _until(run, "motion:")
-            run.send_signal(signal.SIGINT)
-            said, errors = run.communicate(timeout=60)
-        assert run.returncode == 130
-        assert "Traceback" not in said + errors
-        result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+        code, result = _broken_off(tmp_path, where, lambda run: run.send_signal(signal.SIGINT))
+        assert code == 130
         assert result["interrupted"]
         verdicts = {item["verdict"] for item in result["requirements"]}
         assert {"pass", "error"} <= verdicts

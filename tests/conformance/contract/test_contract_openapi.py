@@ -45,9 +45,7 @@ def test_operation_ids_are_unique():
     assert len(set(ids)) == len(ids)
 
 
-@pytest.mark.parametrize(
-    "operation", [item for item in operations_of(CONTRACT) if item.bodies], ids=lambda item: item.id
-)
+@pytest.mark.parametrize("operation", TAKING, ids=lambda item: item.id)
 def test_examples_of_bodies_are_valid_and_say_the_same(operation):
     plain, xml = operation.bodies["application/json"], operation.bodies["application/xml"]
     for value, text in zip(plain.examples, xml.examples, strict=True):

@@ -15,6 +15,7 @@ WSDL = (CONTRACT_DIR / "publishers.wsdl").read_bytes()
 XSD = (CONTRACT_DIR / "publishers.xsd").read_bytes()
 BASE = "http://robot:5555/ws?wsdl"
 SPACE = "http://soap.turtlebot.mybot.org/"
+COMPARISONS = (comparison.names, comparison.operations, comparison.types, comparison.actions)
 
 
 def layout(wsdl: bytes, documents: dict[str, bytes]):
@@ -30,11 +31,7 @@ def layout(wsdl: bytes, documents: dict[str, bytes]):
 
 
 def compared(robot) -> list[str]:
-    return [
-        problem
-        for compare in (comparison.names, comparison.operations, comparison.types, comparison.actions)
-        for problem in compare(CONTRACT, robot)
-    ]
+    return [problem for compare in COMPARISONS for problem in compare(CONTRACT, robot)]
 
 
 def test_as_jax_ws_ri_imports_it():
@@ -143,8 +140,7 @@ def problems(old: str, new: str) -> dict[str, list[str]]:
     spoiled = [re.sub(old.encode(), new.encode(), document) for document in (WSDL, XSD)]
     assert spoiled != [WSDL, XSD]
     robot, _ = layout(spoiled[0], {"http://robot:5555/publishers.xsd": spoiled[1]})
-    comparisons = (comparison.names, comparison.operations, comparison.types, comparison.actions)
-    found = {compare.__name__: list(compare(CONTRACT, robot)) for compare in comparisons}
+    found = {compare.__name__: list(compare(CONTRACT, robot)) for compare in COMPARISONS}
     return found | {rule: list(check(robot)) for rule, check in RULES.items()}
 
 
