@@ -1,0 +1,154 @@
+"""What the suite's client sends, octet for octet, and that it takes each answer as it is."""
+
+import re
+import socket
+
+import pytest
+
+from conformance.transport.client import Connection, HttpClient
+
+_NOTHING = b"HTTP/1.1 204 No Content\r\n\r\n"
+
+
+class _Recorder:
+    """Keeps what comes in one piece, and answers each with the same octets."""
+
+    def __init__(self, answer: bytes) -> None:
+        self.answer = answer
+        self.requests: list[bytes] = []
+
+    def __call__(self, connection: socket.socket) -> None:
+        while request := self._request(connection):
+            self.requests.append(request)
+            connection.sendall(self.answer)
+
+    @staticmethod
+    def _request(connection: socket.socket) -> bytes:
+        """A whole request, or none when the connection has ended."""
+        octets = b""
+        while b"\r\n\r\n" not in octets:
+            octets += (data := connection.recv(65_536))
+            if not data:
+                return b""
+        head = octets.lower().partition(b"\r\n\r\n")[0]
+        if b"transfer-encoding: chunked" in head:
+            while not octets.endswith(b"0\r\n\r\n"):
+                octets += connection.recv(65_536)
+        elif found := re.search(rb"content-length: (\d+)", head):
+            while len(octets) < len(head) + 4 + int(found[1]):
+                octets += connection.recv(65_536)
+        return octets
+
+
+def _sent(listening, method: str, path: str, base: str = "", token: str | None = None, **options) -> bytes:
+    """The octets of one request, with HOST for the address that differs from run to run."""
+    recorder = _Recorder(_NOTHING)
+    url = listening(recorder)
+    client = HttpClient(url + base, Connection(token=token))
+    assert client.send(method, path, **options).response.status == 204
+    client.close()
+    (octets,) = recorder.requests
+    return octets.replace(url.removeprefix("http://").encode(), b"HOST")
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        "/robot/pose",
+        "//robot//pose",
+        "/a/../b/./c",
+        "/%zz%",
+        "/%2e%2E/%c3%A9",
+        "/a;b=c?x=+1&y=NaN&&z",
+        "/?",
+        "/#fragment",
+        '/<script>"{}|\\^`[]',
+        "*",
+        "/" + "a" * 70_000,
+        "http://elsewhere.example/",
+    ],
+)
+def test_a_target_is_sent_as_it_is_given(listening, target):
+    octets = _sent(listening, "GET", target, headers=[("Accept", "")])
+    assert octets == f"GET {target} HTTP/1.1\r\nHost: HOST\r\n\r\n".encode()
+
+
+@pytest.mark.parametrize(
+    ("base", "path", "target"), [("", "", "/"), ("/", "", "/"), ("/r2d2/", "/x", "/r2d2/x"), ("/r2d2", "", "/r2d2")]
+)
+def test_the_base_path_goes_before_what_is_asked_for(listening, base, path, target):
+    expected = f"GET {target} HTTP/1.1\r\nHost: HOST\r\nAccept: */*\r\n\r\n"
+    assert _sent(listening, "GET", path, base=base) == expected.encode()
+
+
+@pytest.mark.parametrize("method", ["get", "Put", "PROPFIND", "!#$%&'*+-.^_`|~", "HEAD", "OPTIONS", "DELETE"])
+def test_a_method_is_any_token_in_its_own_letters(listening, method):
+    assert _sent(listening, method, "/") == f"{method} / HTTP/1.1\r\nHost: HOST\r\nAccept: */*\r\n\r\n".encode()
+
+
+@pytest.mark.parametrize("method", ["PUT", "POST", "PATCH"])
+def test_a_body_has_its_length_even_when_it_is_empty(listening, method):
+    start = f"{method} / HTTP/1.1\r\nHost: HOST\r\nAccept: */*\r\n"
+    assert _sent(listening, method, "/") == f"{start}Content-Length: 0\r\n\r\n".encode()
+    assert _sent(listening, method, "/", body=b"\x00\xff") == f"{start}Content-Length: 2\r\n\r\n".encode() + b"\x00\xff"
+
+
+def test_fields_keep_their_order_their_letters_and_their_double(listening):
+    fields = [("x-B", "1"), ("X-a", "é"), ("x-b", ""), ("Cookie", "c=d"), ("accept", "a/b;q=0, c/d"), ("X-a", "2")]
+    assert (
+        _sent(listening, "GET", "/", headers=fields)
+        == (
+            "GET / HTTP/1.1\r\nHost: HOST\r\nx-B: 1\r\nX-a: é\r\nx-b: \r\nCookie: c=d\r\n"
+            "accept: a/b;q=0, c/d\r\nX-a: 2\r\n\r\n"
+        ).encode()
+    )
+
+
+def test_what_the_caller_says_of_host_and_length_is_not_said_twice(listening):
+    fields = [("hOST", "other.example"), ("content-length", "3")]
+    assert _sent(listening, "PUT", "/", headers=fields, body=b"abc") == (
+        b"PUT / HTTP/1.1\r\nhOST: other.example\r\ncontent-length: 3\r\nAccept: */*\r\n\r\nabc"
+    )
+
+
+def test_a_chunked_body_has_no_length(listening):
+    octets = _sent(listening, "PUT", "/", headers=[("Transfer-Encoding", "chunked")], body=b"abc")
+    start = b"PUT / HTTP/1.1\r\nHost: HOST\r\nTransfer-Encoding: chunked\r\nAccept: */*\r\n\r\n"
+    assert octets == start + b"3\r\nabc\r\n0\r\n\r\n"
+
+
+def test_the_token_and_the_end_of_a_fresh_connection_come_last(listening):
+    token = "t"  # noqa: S105 - made up
+    assert _sent(listening, "GET", "/", token=token, fresh=True) == (
+        b"GET / HTTP/1.1\r\nHost: HOST\r\nAccept: */*\r\nConnection: close\r\nAuthorization: Bearer t\r\n\r\n"
+    )
+    assert b"Authorization" not in _sent(listening, "GET", "/", token=token, authorized=False)
+    own = _sent(listening, "GET", "/", token=token, headers=[("authorization", "Basic eDp5")])
+    assert own == b"GET / HTTP/1.1\r\nHost: HOST\r\nauthorization: Basic eDp5\r\nAccept: */*\r\n\r\n"
+
+
+def test_the_environment_changes_nothing(listening, monkeypatch, tmp_path):
+    (tmp_path / "netrc").write_text("default login a password b\n")
+    monkeypatch.setenv("NETRC", str(tmp_path / "netrc"))
+    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9/")
+    monkeypatch.setenv("ALL_PROXY", "http://127.0.0.1:9/")
+    assert _sent(listening, "GET", "/") == b"GET / HTTP/1.1\r\nHost: HOST\r\nAccept: */*\r\n\r\n"
+
+
+@pytest.mark.parametrize("location", [b"/elsewhere", b"http://[::1", b"http://%00/", b"\xff\xfe", b""])
+def test_no_redirect_is_followed_and_none_hides_an_answer(listening, location):
+    recorder = _Recorder(b"HTTP/1.1 302 Found\r\nLocation: " + location + b"\r\nContent-Length: 0\r\n\r\n")
+    client = HttpClient(listening(recorder), Connection())
+    assert client.send("GET", "/").response.status == 302
+    assert len(recorder.requests) == 1
+
+
+def test_no_cookie_is_sent_back_and_no_content_is_decoded(listening):
+    recorder = _Recorder(
+        b"HTTP/1.1 200 OK\r\nSet-Cookie: c=d; Path=/\r\nContent-Encoding: gzip\r\nContent-Length: 3\r\n\r\nabc"
+    )
+    client = HttpClient(listening(recorder), Connection())
+    for _ in range(2):
+        assert client.send("GET", "/").response.body == b"abc"
+    assert len(set(recorder.requests)) == 1
+    assert len(recorder.requests) == 2
