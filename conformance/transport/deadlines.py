@@ -1,7 +1,7 @@
 """HTTP to a robot with one deadline for a whole exchange, however slowly its octets drip.
 
 httpcore is used rather than a higher client because it sends what it is given (target, fields and their order) and
-parses answers strictly with h11, which makes it the judge of framing as well.
+parses answers strictly with h11, which makes it the judge of framing as well. What httpx cost instead: docs/design.md.
 """
 
 import ssl
