@@ -5,11 +5,13 @@ from collections.abc import Callable
 
 from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import (
+    JSON,
     altered,
     becomes,
     deliveries,
     hanging_up,
     instead,
+    page,
     plain,
     problem,
     rewritten,
@@ -81,11 +83,6 @@ class _OnlyOnce:
 _mutant = of_class("rest-delivery", "rest")
 
 
-def _page(response: Response) -> None:
-    response.status, response.reason, response.body = 200, "", b'{"accepted":true}'
-    response.put("Content-Type", "application/json")
-
-
 MUTANTS = (
     _mutant("delivery-crashes", "A delivery is answered 500.", "put", altered(deliveries, becomes(500))),
     _mutant(
@@ -104,7 +101,12 @@ MUTANTS = (
         "put-range",
         altered(deliveries, becomes(500), nth=50),
     ),
-    _mutant("delivery-talks", "A delivery is answered 200 with a page.", "put-no-content", altered(deliveries, _page)),
+    _mutant(
+        "delivery-talks",
+        "A delivery is answered 200 with a page.",
+        "put-no-content",
+        altered(deliveries, page(200, b'{"accepted":true}', JSON)),
+    ),
     _mutant(
         "delivery-positive-only",
         "Negative coordinates are refused.",

@@ -10,6 +10,8 @@ from conformance.selftest.mutants.changes import (
     LINEAR,
     POSE,
     VELOCITY,
+    Make,
+    When,
     altered,
     header,
     problem,
@@ -46,8 +48,9 @@ def _any_is_xml(request: Request) -> None:
         request.put("Accept", "application/xml")
 
 
-def _renamed(root: Any) -> None:
-    root.tag = "response"
+def _told(edit: Callable[[Response], object], when: When = success) -> Make:
+    """Answers to GET are altered."""
+    return altered(_GET, edit, when)
 
 
 def _shortened(root: Any) -> None:
@@ -97,30 +100,30 @@ MUTANTS = (
     _mutant(
         "format-xml-by-default", "Without Accept, the answer is XML.", "json-default", rewritten(_GET, _any_is_xml)
     ),
-    _mutant("format-xml-broken", "XML is not closed.", "xml", altered(_GET, text(r"</\w+>\s*$", ""), _XML)),
+    _mutant("format-xml-broken", "XML is not closed.", "xml", _told(text(r"</\w+>\s*$", ""), _XML)),
     _mutant(
         "format-xml-as-html",
         "XML comes as text/html.",
         "xml",
-        altered(_GET, header("Content-Type", "text/html; charset=utf-8"), _XML),
+        _told(header("Content-Type", "text/html; charset=utf-8"), _XML),
     ),
     _mutant(
-        "format-xml-item-missing",
-        "XML lacks the last item of an array.",
-        "same-values",
-        altered(_GET, tree(_shortened), _XML),
+        "format-xml-item-missing", "XML lacks the last item of an array.", "same-values", _told(tree(_shortened), _XML)
     ),
     _mutant(
-        "format-xml-root", "The root of XML is always <response>.", "xml-root", altered(_GET, tree(_renamed), _XML)
+        "format-xml-root",
+        "The root of XML is always <response>.",
+        "xml-root",
+        _told(tree(lambda root: setattr(root, "tag", "response")), _XML),
     ),
-    _mutant("format-text-unreadable", "Text is no YAML.", "text", altered(_GET, _as_properties, _TEXT)),
+    _mutant("format-text-unreadable", "Text is no YAML.", "text", _told(_as_properties, _TEXT)),
     _mutant(
         "format-text-as-octets",
         "Text comes as application/octet-stream.",
         "text",
-        altered(_GET, header("Content-Type", "application/octet-stream"), _TEXT),
+        _told(header("Content-Type", "application/octet-stream"), _TEXT),
     ),
-    _mutant("format-xml-rounded", "XML rounds to one digit.", "same-values", altered(_GET, tree(_rounded), _XML)),
+    _mutant("format-xml-rounded", "XML rounds to one digit.", "same-values", _told(tree(_rounded), _XML)),
     _mutant(
         "format-text-rounded",
         "Text rounds numbers down.",
@@ -147,8 +150,8 @@ MUTANTS = (
             _GET, _accept(lambda given: "*/*" if re.search(r"\*/\*(?!\s*;\s*q=0(\.0*)?\s*(,|$))", given) else given)
         ),
     ),
-    _mutant("format-no-vary", "Answers carry no Vary.", "vary", altered(_GET, header("Vary", None))),
-    _mutant("format-vary-sometimes", "XML answers carry no Vary.", "vary", altered(_GET, header("Vary", None), _XML)),
+    _mutant("format-no-vary", "Answers carry no Vary.", "vary", _told(header("Vary", None))),
+    _mutant("format-vary-sometimes", "XML answers carry no Vary.", "vary", _told(header("Vary", None), _XML)),
     _mutant("format-no-xml-input", "XML is not taken in PUT.", "xml-input", lambda: _no_xml_input),
     _mutant(
         "format-problems-in-json",

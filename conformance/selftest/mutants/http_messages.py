@@ -10,6 +10,8 @@ from conformance.selftest.mutants.changes import (
     JSON,
     POSE,
     RESOURCES,
+    Make,
+    Where,
     altered,
     header,
     instead,
@@ -35,12 +37,11 @@ def _errors(response: Response) -> bool:
     return response.status >= 400
 
 
-def _problems(edit: Callable[[Any], Any]) -> Callable[[Response], None]:
-    def apply(response: Response) -> None:
-        if response.media_type.endswith("problem+json"):
-            values(edit)(response)
-
-    return apply
+def _problems(edit: Callable[[Any], Any], where: Where = _ANY) -> Make:
+    """Problems are altered."""
+    return altered(
+        where, values(edit), lambda response: _errors(response) and response.media_type.endswith("problem+json")
+    )
 
 
 def _valueless(value: Any) -> None:
@@ -52,23 +53,13 @@ def _valueless(value: Any) -> None:
     value["detail"] = kept
 
 
-def _longer(response: Response) -> None:
-    wire = response.octets()
-    response.raw = re.sub(
-        rb"(?i)(content-length: )(\d+)", lambda found: found[1] + str(int(found[2]) + 7).encode(), wire
-    )
+def _on_the_wire(edit: Callable[[bytes], bytes]) -> Callable[[Response], None]:
+    """Alter an answer's octets."""
+    return lambda response: setattr(response, "raw", edit(response.octets()))
 
 
-def _shorter(response: Response) -> None:
-    response.raw = response.octets() + b"left over"
-
-
-def _broken_field(response: Response) -> None:
-    response.raw = response.octets().replace(b"\r\n", b"\r\nThis is no field\r\n", 1)
-
-
-def _two_lengths(response: Response) -> None:
-    response.raw = response.octets().replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1)
+def _longer(octets: bytes) -> bytes:
+    return re.sub(rb"(?i)(content-length: )(\d+)", lambda found: found[1] + str(int(found[2]) + 7).encode(), octets)
 
 
 def _with_field(request: Request, name: str, value: str) -> Request:
@@ -186,20 +177,28 @@ MUTANTS = (
         instead(_large_field, problem(500, "oops")),
     ),
     _mutant(
-        "http-length-too-long", "Content-Length promises 7 octets more than come.", "framing", altered(_GET, _longer)
+        "http-length-too-long",
+        "Content-Length promises 7 octets more than come.",
+        "framing",
+        altered(_GET, _on_the_wire(_longer)),
     ),
     _mutant(
         "http-length-too-short",
         "After an answer come octets that Content-Length does not count.",
         "framing",
-        altered(_GET, _shorter),
+        altered(_GET, _on_the_wire(lambda octets: octets + b"left over")),
     ),
-    _mutant("http-broken-field", "An answer has a line that is no field.", "framing", altered(_POSE, _broken_field)),
+    _mutant(
+        "http-broken-field",
+        "An answer has a line that is no field.",
+        "framing",
+        altered(_POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n", b"\r\nThis is no field\r\n", 1))),
+    ),
     _mutant(
         "http-two-lengths",
         "An answer has two different Content-Length fields.",
         "framing",
-        altered(_POSE, _two_lengths),
+        altered(_POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1))),
     ),
     _mutant("http-host-optional", "A request without Host is served.", "host-missing", lambda: _hosts(0)),
     _mutant("http-host-twice", "A request with two Host fields is served.", "host-twice", lambda: _hosts(2)),
@@ -221,31 +220,31 @@ MUTANTS = (
         "http-problem-other-status",
         "A problem's status is always 400.",
         "problem-status",
-        altered(_ANY, _problems(lambda value: value.update(status=400 if value["status"] != 400 else 422)), _errors),
+        _problems(lambda value: value.update(status=400 if value["status"] != 400 else 422)),
     ),
     _mutant(
         "http-problem-vague",
         "A problem's detail is always 'invalid input'.",
         "problem-detail",
-        altered(_INPUT, _problems(lambda value: value.update(detail="invalid input")), _errors),
+        _problems(lambda value: value.update(detail="invalid input"), _INPUT),
     ),
     _mutant(
         "http-problem-mute",
         "Problems have no detail.",
         "problem-detail",
-        altered(_ANY, _problems(lambda value: value.pop("detail", None) and None), _errors),
+        _problems(lambda value: value.pop("detail", None) and None),
     ),
     _mutant(
         "http-problem-valueless",
         "A problem names the field, but never the value.",
         "problem-value",
-        altered(_INPUT, _problems(_valueless), _errors),
+        _problems(_valueless, _INPUT),
     ),
     _mutant(
         "http-traceback",
         "A problem's detail is a traceback.",
         "no-traceback",
-        altered(_INPUT, _problems(lambda value: value.update(detail=value["detail"] + "\n" + _TRACE)), _errors),
+        _problems(lambda value: value.update(detail=value["detail"] + "\n" + _TRACE), _INPUT),
     ),
     _mutant("http-nan", "JSON holds NaN.", "json-finite", altered(_POSE, text(r'("y"\s*:\s*)[-+.\deE]+', r"\1NaN", 1))),
     _mutant(

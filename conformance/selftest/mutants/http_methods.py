@@ -16,6 +16,7 @@ from conformance.selftest.mutants.changes import (
     becomes,
     header,
     instead,
+    page,
     plain,
     problem,
     refusal,
@@ -39,10 +40,6 @@ def _with_body(request: Request, forward: Forward) -> Response:
         head = response.octets().split(b"\r\n\r\n")[0]
         response.raw = head + b"\r\n\r\n" + body
     return response
-
-
-def _accept_anything(request: Request) -> None:
-    request.put("Accept", JSON)
 
 
 def _q_zero_ignored(request: Request) -> None:
@@ -113,11 +110,6 @@ def _not_found(request: Request, forward: Forward) -> Response:
 
 
 _mutant = of_class("http", "rest")
-
-
-def _page(response: Response) -> None:
-    response.status, response.reason, response.body = 200, "", b"<html><body>Welcome</body></html>"
-    response.put("Content-Type", "text/html")
 
 
 MUTANTS = (
@@ -202,7 +194,11 @@ MUTANTS = (
         "http-unknown-path-page",
         "An unknown path is answered with a page.",
         "not-found",
-        altered(lambda request: _ANY(request) and request.path not in RESOURCES, _page, status(404)),
+        altered(
+            lambda request: _ANY(request) and request.path not in RESOURCES,
+            page(200, b"<html><body>Welcome</body></html>", "text/html"),
+            status(404),
+        ),
     ),
     _mutant("http-unknown-path-405", "An unknown path is 405 for PUT.", "not-found", lambda: _not_found),
     _mutant(
@@ -223,7 +219,12 @@ MUTANTS = (
         "trailing-slash",
         instead(_missing_slash, plain(302, b"", "", ("Location", "/"))),
     ),
-    _mutant("http-accepts-anything", "Accept is not looked at.", "not-acceptable", rewritten(_GET, _accept_anything)),
+    _mutant(
+        "http-accepts-anything",
+        "Accept is not looked at.",
+        "not-acceptable",
+        rewritten(_GET, lambda request: request.put("Accept", JSON)),
+    ),
     _mutant(
         "http-406-as-400",
         "Where nothing is acceptable, the answer is 400.",
@@ -256,13 +257,13 @@ MUTANTS = (
         "http-put-once",
         "The same PUT right after itself is 409.",
         "put-idempotent",
-        (lambda: _SecondTime("PUT", problem(409, "linear.x: that is so already"))),
+        lambda: _SecondTime("PUT", problem(409, "linear.x: that is so already")),
     ),
     _mutant(
         "http-delete-crash",
         "A second DELETE is 500.",
         "delete-idempotent",
-        (lambda: _SecondTime("DELETE", problem(500, "no goal"))),
+        lambda: _SecondTime("DELETE", problem(500, "no goal")),
     ),
     _mutant(
         "http-no-content-type",

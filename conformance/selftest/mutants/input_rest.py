@@ -175,7 +175,6 @@ class _Remembered:
         self._last = {"x": "0", "y": "0"}
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
         if not rest("GET", PLAN)(request):
             return forward(request)
         request = request.copy()

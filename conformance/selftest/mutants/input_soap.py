@@ -7,9 +7,9 @@ from typing import Any
 from lxml import etree
 
 from conformance.contract.delivery import XSD_FIELDS
-from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import SOAP, TNS, altered, rewritten, soap
-from conformance.selftest.mutants.mutant import Mutant
+from conformance.selftest.messages import Request
+from conformance.selftest.mutants.changes import SOAP, TNS, altered, becomes, page, rewritten, soap
+from conformance.selftest.mutants.mutant import Mutant, of_class
 from conformance.selftest.mutants.soap_responses import is_fault
 from conformance.selftest.mutants.xml_trees import named, xml
 
@@ -41,22 +41,21 @@ def _children(message: Any) -> list[Any]:
     return [child for child in message if isinstance(child.tag, str)] if message is not None else []
 
 
+def _neutral(name: str) -> str:
+    return "3" if name == "message_code" else "0"
+
+
 def _filled(body: Any, message: Any) -> None:
-    if message is None:
-        for wrapper in body:
-            if (
-                isinstance(wrapper.tag, str)
-                and etree.QName(wrapper).localname.startswith("Execute")
-                and not len(wrapper)
-            ):
-                message = etree.SubElement(wrapper, "arg0")
+    for wrapper in body if message is None else ():
+        if isinstance(wrapper.tag, str) and etree.QName(wrapper).localname.startswith("Execute") and not len(wrapper):
+            message = etree.SubElement(wrapper, "arg0")
     if message is None:
         return
     there = [child.tag for child in _children(message)]
     for place, name in enumerate(XSD_FIELDS):
         if name not in there:
             made = etree.Element(name)
-            made.text = "3" if name == "message_code" else "0"
+            made.text = _neutral(name)
             message.insert(place, made)
 
 
@@ -103,7 +102,7 @@ def _lexical(_body: Any, message: Any) -> None:
         good = _INT if child.tag == "message_code" else _DOUBLE
         if not good.fullmatch("".join(child.itertext())) or len(child):
             child[:] = []
-            child.text = "3" if child.tag == "message_code" else "0"
+            child.text = _neutral(child.tag)
 
 
 def _wrapped(_body: Any, message: Any) -> None:
@@ -122,7 +121,7 @@ def _finite(_body: Any, message: Any) -> None:
 def _not_nil(_body: Any, message: Any) -> None:
     for child in [message, *_children(message)] if message is not None else []:
         if child.attrib.pop(f"{{{_XSI}}}nil", None) and child is not message and not (child.text or "").strip():
-            child.text = "3" if child.tag == "message_code" else "0"
+            child.text = _neutral(child.tag)
     if message is not None and not len(message):
         _filled(None, message)
 
@@ -142,18 +141,11 @@ def _coded(_body: Any, message: Any) -> None:
             child.text = "3"
 
 
-def _quietly(response: Response) -> None:
-    response.status, response.reason = 200, ""
-
-
-def _bare(response: Response) -> None:
-    response.status, response.reason, response.body = 500, "", b"refused"
-    response.put("Content-Type", "text/plain")
+_of_class = of_class("strict-input", "soap")
 
 
 def _mutant(name: str, says: str, id_: str, edit: Callable[[Any, Any], None]) -> Mutant:
-    where = soap("Execute[A-Z][A-Za-z]+", "Body")
-    return Mutant(name, says, (f"strict-input/{id_}",), "soap", rewritten(where, _repaired(edit)))
+    return _of_class(name, says, id_, rewritten(soap("Execute[A-Z][A-Za-z]+", "Body"), _repaired(edit)))
 
 
 MUTANTS = (
@@ -182,18 +174,16 @@ MUTANTS = (
         _alone,
     ),
     _mutant("input-soap-any-code", "Every code counts as 3.", "soap-code", _coded),
-    Mutant(
+    _of_class(
         "input-soap-fault-200",
         "What is refused over SOAP is refused with status 200.",
-        ("strict-input/soap-fault",),
-        "soap",
-        altered(_ANY, _quietly, is_fault),
+        "soap-fault",
+        altered(_ANY, becomes(200), is_fault),
     ),
-    Mutant(
+    _of_class(
         "input-soap-no-fault",
         "What is refused over SOAP is 500 without a fault.",
-        ("strict-input/soap-fault",),
-        "soap",
-        altered(_ACT, _bare, is_fault),
+        "soap-fault",
+        altered(_ACT, page(500, b"refused", "text/plain"), is_fault),
     ),
 )

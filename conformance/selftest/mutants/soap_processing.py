@@ -7,7 +7,7 @@ from typing import Any
 from lxml import etree
 
 from conformance.selftest.messages import Forward, Request, Response
-from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, posted, rewritten, soap
+from conformance.selftest.mutants.changes import SOAP, TNS, altered, anything, instead, page, posted, rewritten, soap
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import coded, enveloped, fault, is_fault
 from conformance.selftest.mutants.xml_trees import xml
@@ -105,11 +105,6 @@ def _headed(request: Request) -> bool:
         and b"mustUnderstand" not in request.body
         and b"addressing" not in request.body
     )
-
-
-def _paged(response: Response) -> None:
-    response.status, response.reason, response.body = 200, "", b"<html><body>OK</body></html>"
-    response.put("Content-Type", "text/html")
 
 
 def _for_others(request: Request) -> bool:
@@ -211,6 +206,6 @@ MUTANTS = (
         "bp-sometimes-a-page",
         "One answer in 50 is a page with 200.",
         "content-type",
-        altered(posted, _paged, anything, nth=50),
+        altered(posted, page(200, b"<html><body>OK</body></html>", "text/html"), anything, nth=50),
     ),
 )
