@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from conformance.selftest.messages import Forward, Request, Response
-from conformance.selftest.mutants.changes import TNS, instead, plain, posted, rewritten
+from conformance.selftest.mutants.changes import TNS, Where, instead, plain, posted, rewritten
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped, fault
 
@@ -69,23 +69,21 @@ def _leaked(text: str) -> Callable[[Request], Response]:
     return fault("Client", f"not a number: {said}")
 
 
-def _external(request: Request, forward: Forward) -> Response:
-    """An external entity's file is quoted in the fault."""
-    for _, url in _EXTERNAL.findall(request.body) if posted(request) else ():
-        found = _read(url.decode("utf-8", "replace"))
-        if found:
-            return _leaked(found)(request)
-    return forward(request)
+def _quoting(urls: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
+    """The first file that a message refers to, and that can be read, is quoted in the fault."""
 
-
-def _xinclude(request: Request, forward: Forward) -> Response:
-    """An xi:include's file is quoted in the fault."""
-    if posted(request) and b"XInclude" in request.body:
-        for url in re.findall(rb"href=[\"']([^\"']*)[\"']", request.body):
+    def change(request: Request, forward: Forward) -> Response:
+        for url in urls(request.body) if posted(request) else ():
             found = _read(url.decode("utf-8", "replace"))
             if found:
                 return _leaked(found)(request)
-    return forward(request)
+        return forward(request)
+
+    return lambda: change
+
+
+def _included(body: bytes) -> list[bytes]:
+    return re.findall(rb"href=[\"']([^\"']*)[\"']", body) if b"XInclude" in body else []
 
 
 def _call(url: bytes) -> None:
@@ -131,24 +129,9 @@ def _nested(request: Request) -> bool:
     )
 
 
-def _many_entities(request: Request) -> bool:
-    return posted(request) and request.body.count(b"<!ENTITY") > 2
-
-
-def _one_long_entity(request: Request) -> bool:
-    return posted(request) and 0 < request.body.count(b"<!ENTITY") <= 2 and request.body.count(b"&") > 50
-
-
-def _long_name(request: Request) -> bool:
-    return posted(request) and bool(re.search(rb"<[\w:.-]{5000,}", request.body))
-
-
-def _attributed(request: Request) -> bool:
-    return posted(request) and request.body.count(b'="') > 5000
-
-
-def _bomb(request: Request) -> bool:
-    return posted(request) and bool(request.field("Content-Encoding"))
+def _posting(holds: Callable[[bytes], bool]) -> Where:
+    """SOAP requests of whose body something holds."""
+    return lambda request: posted(request) and holds(request.body)
 
 
 def _spoofed(request: Request, forward: Forward) -> Response:
@@ -196,7 +179,10 @@ MUTANTS = (
         "attack-entity-expanded", "Internal entities are expanded.", "internal-entity", rewritten(_declared, _expanded)
     ),
     _mutant(
-        "attack-file-leaked", "An external entity's file appears in the fault.", "external-entity", lambda: _external
+        "attack-file-leaked",
+        "An external entity's file appears in the fault.",
+        "external-entity",
+        _quoting(lambda body: [url for _, url in _EXTERNAL.findall(body)]),
     ),
     _mutant(
         "attack-entity-fetched",
@@ -214,35 +200,38 @@ MUTANTS = (
         "attack-expansion-fine",
         "Entities that expand exponentially are answered like any others.",
         "expansion",
-        rewritten(_many_entities, _undeclared),
+        rewritten(_posting(lambda body: body.count(b"<!ENTITY") > 2), _undeclared),
     ),
     _mutant(
         "attack-quadratic-fine",
         "One long entity many times is answered like any other.",
         "quadratic",
-        rewritten(_one_long_entity, _undeclared),
+        rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared),
     ),
     _mutant("attack-depth-fine", "XML nested without end is answered 200.", "depth", instead(_nested, _DONE)),
     _mutant(
-        "attack-attributes-fine", "Thousands of attributes are passed over.", "attributes", instead(_attributed, _DONE)
+        "attack-attributes-fine",
+        "Thousands of attributes are passed over.",
+        "attributes",
+        instead(_posting(lambda body: body.count(b'="') > 5000), _DONE),
     ),
     _mutant(
         "attack-long-name-fine",
         "A name of a million characters is passed over.",
         "long-name",
-        instead(_long_name, _DONE),
+        instead(_posting(lambda body: bool(re.search(rb"<[\w:.-]{5000,}", body))), _DONE),
     ),
     _mutant(
         "attack-size-fine",
         "A message over 10 MiB is answered 200.",
         "size",
-        instead(lambda request: posted(request) and len(request.body) > _LARGE, _DONE),
+        instead(_posting(lambda body: len(body) > _LARGE), _DONE),
     ),
     _mutant(
         "attack-bomb-unpacked",
         "A compressed message is unpacked, however large it becomes.",
         "compressed",
-        instead(_bomb, _DONE),
+        instead(lambda request: posted(request) and bool(request.field("Content-Encoding")), _DONE),
     ),
     _mutant(
         "attack-instruction-fine",
@@ -250,7 +239,7 @@ MUTANTS = (
         "processing-instruction",
         rewritten(posted, lambda request: setattr(request, "body", _INSTRUCTION.sub(b"", request.body))),
     ),
-    _mutant("attack-included", "XInclude is processed.", "xinclude", lambda: _xinclude),
+    _mutant("attack-included", "XInclude is processed.", "xinclude", _quoting(_included)),
     _mutant("attack-action-chooses", "SOAPAction chooses what is run.", "soapaction-spoofing", lambda: _spoofed),
     _mutant("attack-reply-elsewhere", "ReplyTo is called.", "addressing-spoofing", _calling(_addressing_urls)),
     _mutant(

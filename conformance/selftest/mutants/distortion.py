@@ -9,7 +9,6 @@ from typing import Any
 from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import deliveries, plain, soap
 
-_COFFEE = soap("ExecuteCoffeeRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 _CODE_PLACE = 4
 _DOUBLES = rb"(<(?:\w+:)?(?:depot|destination|source)_[xy][^>]*>\s*)([^<\s]+)(\s*<)"
@@ -115,7 +114,7 @@ def swapped_soap(request: Request) -> None:
 
 def as_delivery(request: Request, forward: Forward) -> Response:
     """A coffee is published with the code that it came with, 3 as it happens."""
-    if not _COFFEE(request):
+    if not soap("ExecuteCoffeeRequest")(request):
         return forward(request)
     body = request.body.replace(b"ExecuteCoffeeRequest", b"ExecuteDeliveryRequest")
     response = forward(request.copy(body=re.sub(rb"(message_code[^>]*>\s*)[+-]?\d+", rb"\g<1>3", body)))

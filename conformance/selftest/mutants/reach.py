@@ -1,17 +1,16 @@
 """Robots of which an interface is not there."""
 
-from collections.abc import Callable
-
 from conformance.selftest.messages import HangUpError, Request, Response
-from conformance.selftest.mutants.changes import hanging_up, instead, plain, rest
+from conformance.selftest.mutants.changes import Make, hanging_up, instead, plain, rest
 from conformance.selftest.mutants.mutant import Mutant
 
 _REST_CLASSES = ("rest-resources", "rest-delivery", "http", "safety", "equivalence", "strict-input")
 _LOST = plain(404, b"<html><body>It works!</body></html>", "text/html")
 
 
-def _service(name: str) -> Callable[[Request], bool]:
-    return lambda request: request.side == "soap" and name in request.path
+def _lost(service: str) -> Make:
+    """Somebody else's web server answers for a service, or for all."""
+    return instead(lambda request: request.side == "soap" and service in request.path, _LOST)
 
 
 def _nothing_there(request: Request) -> Response:
@@ -36,21 +35,17 @@ MUTANTS = (
         "Nothing is at the address of the publishers service but somebody else's web server.",
         ("soap-delivery/reachable", "equivalence/reachable"),
         "soap",
-        instead(_service("publisher"), _LOST),
+        _lost("publisher"),
     ),
     Mutant(
         "subscribers-elsewhere",
         "Nothing is at the address of the subscribers service but somebody else's web server.",
         ("soap-subscribers/reachable", "strict-input/reachable"),
         "soap",
-        instead(_service("subscriber"), _LOST),
+        _lost("subscriber"),
     ),
     Mutant(
-        "soap-elsewhere",
-        "No SOAP service is where it should be.",
-        ("soap-basic-profile/reachable",),
-        "soap",
-        instead(_service(""), _LOST),
+        "soap-elsewhere", "No SOAP service is where it should be.", ("soap-basic-profile/reachable",), "soap", _lost("")
     ),
     Mutant(
         "nothing-elsewhere",

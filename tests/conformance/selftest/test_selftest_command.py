@@ -35,18 +35,8 @@ def test_without_ros_it_says_what_to_do(monkeypatch):
 
 
 def test_a_mutant_is_caught_and_a_good_one_is_not_blamed(tmp_path):
-    words = [
-        "--target",
-        "baroque",
-        "--faults",
-        "sensors-twice",
-        "--seeds",
-        "0",
-        "--no-variants",
-        "--no-compare",
-        "--short",
-    ]
-    done = run(selftest, *words, "--out", str(tmp_path))
+    words = "--target baroque --faults sensors-twice --seeds 0 --no-variants --no-compare --short --out"
+    done = run(selftest, *words.split(), str(tmp_path))
     assert done.exit_code == 0, done.output
     document = json.loads((tmp_path / "selftest.json").read_text())
     assert document["format"] == "roaas-selftest/1"
