@@ -156,7 +156,7 @@ class _Exhausted:
         self._left = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
+        """See messages.Change."""
         if self._left:
             self._left -= 1
             time.sleep(1.6)

@@ -33,7 +33,7 @@ class EveryNth:
         self._seen = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
+        """See messages.Change."""
         if self._where(request):
             self._seen += 1
             if self._seen % self._nth == 0:
@@ -49,7 +49,7 @@ class OutOfOrder:
         self._lock = threading.Lock()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
+        """See messages.Change."""
         overtaking = deliveries(request) or _BOTH(request)
         with self._lock:
             held, self._held = self._held, None

@@ -49,7 +49,7 @@ class Lingering:
         self._last: Response | None = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
+        """See messages.Change."""
         response = forward(request)
         if _DELETE(request):
             self._last = None
@@ -68,7 +68,7 @@ class Previous:
         self._seen: list[Any] = []
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
+        """See messages.Change."""
         response = forward(request)
         value = parsed(response.body)
         if _GET(request) and response.status == 200 and isinstance(value, dict):
@@ -86,7 +86,7 @@ class OnlyOnce:
         self._used: set[str] = set()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
+        """See messages.Change."""
         id_ = identity(request) if _PUT(request) else None
         if id_ is not None and id_ in self._used and active(forward, request) is None:
             return problem(409, f"goal_id.id: {id_!r} was used before")(request)
@@ -100,7 +100,7 @@ class Abandoned:
     """The robot gives a goal up on its way."""
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
+        """See messages.Change."""
         response = forward(request)
         if _PUT(request) and response.status in {201, 202}:
             fields = [("Host", "robot"), ("Connection", "close")]
@@ -115,7 +115,7 @@ class Unreachable:
         self._goal: Any = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See proxy.Change."""
+        """See messages.Change."""
         if request.path != GOAL or request.side != "rest":
             return forward(request)
         if _PUT(request):
