@@ -5,9 +5,25 @@ robot by all the same (contract.md, the statement): the reference robot's limits
 follow.
 """
 
-import msgspec
+from typing import Annotated
 
-from conformance.contract.toml_file import NotNegative
+import msgspec
+from msgspec import Meta
+
+from conformance.contract.toml_file import NotNegative, Positive
+
+
+class Noise(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How far the odometry of a robot at rest is off: the greatest figures that a statement may declare.
+
+    Attributes:
+        position_m: m; heading_rad: rad; linear_m_s: m/s; angular_rad_s: rad/s.
+    """
+
+    position_m: Annotated[float, Meta(ge=0, le=0.05)] = 0.0
+    heading_rad: Annotated[float, Meta(ge=0, le=0.05)] = 0.0
+    linear_m_s: Annotated[float, Meta(ge=0, le=0.05)] = 0.0
+    angular_rad_s: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True):
@@ -19,6 +35,9 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
         settle_s: time within which a commanded velocity is reached, s.
         hold_s: time for which a velocity holds unless renewed, s; None: not declared, not judged.
         tolerance: relative tolerance of a reached velocity; tolerance_abs: the absolute one, m/s or rad/s.
+        noise: of the odometry.
+        odometry_hz: how often there is a new odometry, Hz; None: not declared, and seen by its stamps.
+        time_scale: by how much the robot's clock is faster than the one on the wall.
         linear_declared: whether ``linear_m_s`` is the robot's, so that what lies beyond it can be judged;
             likewise angular_declared.
     """
@@ -29,6 +48,9 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
     hold_s: float | None = None
     tolerance: float = 0.05
     tolerance_abs: float = 0.02
+    noise: Noise = Noise()
+    odometry_hz: float | None = None
+    time_scale: float = 1.0
     linear_declared: bool
     angular_declared: bool
 
@@ -40,8 +62,9 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def tolerances(self) -> dict[str, float]:
-        """The tolerances by name, as a result shows them."""
-        return {"tolerance": self.tolerance, "tolerance_abs": self.tolerance_abs}
+        """The tolerances by name, as a result shows them, and the noise where there is any."""
+        noise = {f"noise_{name}": figure for name, figure in msgspec.structs.asdict(self.noise).items() if figure}
+        return {"tolerance": self.tolerance, "tolerance_abs": self.tolerance_abs, **noise}
 
 
 class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -53,6 +76,9 @@ class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hold_s: NotNegative | None = None
     tolerance: NotNegative | None = None
     tolerance_abs: NotNegative | None = None
+    noise: Noise | None = None
+    odometry_hz: Positive | None = None
+    time_scale: Positive | None = None
 
     def resolved(self) -> Limits:
         """What the robot is judged by."""

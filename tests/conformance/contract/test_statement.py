@@ -3,6 +3,7 @@
 import pytest
 
 from conformance.contract.classes import CLASSES
+from conformance.contract.limits import Noise
 from conformance.contract.statement import Endpoints, Statement, StatementError, load_statement
 from conformance.contract.thresholds import ApiStyle, Operation, Quantile, Threshold
 
@@ -70,6 +71,9 @@ def test_a_full_statement(tmp_path):
         ("[limits]\nlinear_m_s = true", "[limits] linear_m_s = True must be a number, and not negative"),
         ("[limits]\nsettle_s = nan", "[limits] settle_s = nan must be a number, and not negative"),
         ("[limits]\nsettle_s = inf", "[limits] settle_s = inf must be a number, and not negative"),
+        ("[limits]\nodometry_hz = 0", "[limits] odometry_hz = 0 must be a positive number"),
+        ("[limits.noise]\nposition_m = 0.06", "position_m = 0.06 must be"),
+        ("[limits.noise]\nangular_rad_s = 0.2", "angular_rad_s = 0.2 must be"),
         ("[motion]\narena = [1, 2]", "[motion] arena = [1, 2] must be 4 numbers"),
         ("[motion]\ngoals = [[1, 2, 'x']]", "[motion] goals[0][2] = 'x' must be a finite number"),
         ("[motion]\nactuated = ['linear.w']", "[motion] actuated[0] = 'linear.w' must be one of angular.x, angular.y,"),
@@ -104,6 +108,20 @@ def test_a_figure_is_declared_when_the_statement_names_it_whatever_its_value(tmp
     same = _load(tmp_path, f"[limits]\nlinear_m_s = {silent.linear_m_s}").limits
     assert same.linear_m_s == silent.linear_m_s
     assert (same.linear_declared, same.angular_declared) == (True, False)
+
+
+def test_noise_rate_and_clock_are_declared_among_the_limits(tmp_path):
+    text = "[limits]\nodometry_hz = 10\ntime_scale = 2\n[limits.noise]\nposition_m = 0.01\nlinear_m_s = 0.02"
+    limits = _load(tmp_path, text).limits
+    assert (limits.odometry_hz, limits.time_scale) == (10, 2)
+    assert limits.noise == Noise(position_m=0.01, linear_m_s=0.02)
+    assert limits.tolerances == {
+        "tolerance": 0.05,
+        "tolerance_abs": 0.02,
+        "noise_position_m": 0.01,
+        "noise_linear_m_s": 0.02,
+    }
+    assert Statement().limits.odometry_hz is None
 
 
 def test_without_claims_the_classes_follow_from_the_addresses():
