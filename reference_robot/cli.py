@@ -45,6 +45,12 @@ _NEEDED: Final = {
     show_default=True,
     help="How many times faster the simulated robot moves.",
 )
+@click.option(
+    "--realistic",
+    is_flag=True,
+    help="Simulate a robot like a real one: odometry that is slow, noisy and drifts, wheels that slip, late commands.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Which realistic robot.")
 @click.option("--token-file", type=_FILE, help="Ask for the bearer token in this file.")
 @click.option("--attach", is_flag=True, help="Start no simulation; serve the robot on the ROS graph.")
 def robot(**options: object) -> None:

@@ -50,6 +50,8 @@ class Options:
     time_scale: float
     token_file: Path | None
     attach: bool
+    realistic: bool
+    seed: int
 
 
 def run(options: Options) -> None:
@@ -100,4 +102,5 @@ def _simulation(options: Options) -> contextlib.AbstractContextManager[None]:
         return contextlib.nullcontext()
     # A simulated robot is no affair of other machines on the network, unless the environment says so.
     os.environ.setdefault(_DISCOVERY_RANGE, "LOCALHOST")
-    return SimulatedRobot(options.domain_id, options.time_scale, options.config).running()
+    seed = options.seed if options.realistic else None
+    return SimulatedRobot(options.domain_id, options.time_scale, options.config, seed).running()

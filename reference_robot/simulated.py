@@ -21,9 +21,9 @@ class SimulationError(RuntimeError):
 
 
 class SimulatedRobot:
-    """The simulation in a process of its own, with a watch on its end."""
+    """The simulation in a process of its own, with a watch on its end; like a real robot where a seed says which."""
 
-    def __init__(self, domain_id: int, time_scale: float, config: Path | None) -> None:
+    def __init__(self, domain_id: int, time_scale: float, config: Path | None, realistic_seed: int | None) -> None:
         self._command = [
             sys.executable,
             "-m",
@@ -31,6 +31,7 @@ class SimulatedRobot:
             f"--domain-id={domain_id}",
             f"--time-scale={time_scale}",
             *([f"--names={config}"] if config else []),
+            *([] if realistic_seed is None else ["--realistic", f"--seed={realistic_seed}"]),
         ]
         self._ending = threading.Event()
 

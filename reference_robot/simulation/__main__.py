@@ -17,6 +17,7 @@ import click
 from conformance.contract.toml_file import TomlFileError
 from reference_robot.names import load_names
 from reference_robot.ros import RosRuntime
+from reference_robot.simulation.realism import Realism
 from reference_robot.simulation.runner import Simulation
 
 
@@ -24,7 +25,9 @@ from reference_robot.simulation.runner import Simulation
 @click.option("--domain-id", type=click.IntRange(0, 101), help="ROS domain; ROS_DOMAIN_ID by default.")
 @click.option("--time-scale", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True)
 @click.option("--names", "names_file", type=click.Path(path_type=Path), help="Names of topics and actions.")
-def main(domain_id: int | None, time_scale: float, names_file: Path | None) -> None:
+@click.option("--realistic", is_flag=True, help="With slipping wheels, noise, delays; --seed chooses which.")
+@click.option("--seed", type=int, default=0, show_default=True)
+def main(domain_id: int | None, time_scale: float, names_file: Path | None, *, realistic: bool, seed: int) -> None:
     """Run the simulated robot until it is told to stop."""
     # Seen on this machine only, unless the user wants it otherwise.
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
@@ -38,7 +41,7 @@ def main(domain_id: int | None, time_scale: float, names_file: Path | None) -> N
     if _stdin_is_pipe():
         threading.Thread(target=_await_end_of_stdin, args=(stop,), daemon=True).start()
     with RosRuntime(domain_id) as ros:
-        Simulation(ros, names, time_scale)
+        Simulation(ros, names, time_scale, Realism(seed) if realistic else None)
         ros.start()
         click.echo("ready")
         stop.wait()

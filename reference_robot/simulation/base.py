@@ -10,9 +10,10 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from reference_robot.names import RosNames
-from reference_robot.simulation.kinematics import Motion, advance
+from reference_robot.simulation.kinematics import Accelerations, Motion, advance
 from reference_robot.simulation.messages import quaternion_of
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE
+from reference_robot.simulation.realism import Delayed, Realism
 
 HOLD_S: Final = 1.0  # a setpoint is good for this long, by the wall clock whatever the time scale
 _PERIOD_S: Final = 0.02  # 50 Hz of simulated time
@@ -30,19 +31,25 @@ for _axis, _variance in ((0, 1e-4), (7, 1e-4), (35, 1e-3)):
 class Base:
     """A differential-drive base on the ROS graph; ``time_scale`` makes it up to 25 times faster than real time.
 
+    With ``realism`` its wheels slip, and its odometry is what a real robot would believe.
+
     Attributes:
         motion: The body's pose and velocity now.
     """
 
-    def __init__(self, node: Node, names: RosNames, time_scale: float = 1.0) -> None:
+    def __init__(self, node: Node, names: RosNames, time_scale: float = 1.0, realism: Realism | None = None) -> None:
         self.motion = Motion(*DEPOT, 0.0)
+        self._realism = realism
+        self._belief = self.motion
+        self._accelerations = realism.accelerations if realism else Accelerations()
         self._node = node
         self._clock = node.get_clock()
         self._time_scale = time_scale
         self._solid = OFFICE.grown(BODY_RADIUS)
+        self._commands = Delayed()
         self._setpoint = (0.0, 0.0)
         self._commanded_at = -math.inf
-        self._moved_at = time.monotonic()
+        self._moved_at = self._reported_at = time.monotonic()
         # One message for all: publishing copies it out.
         self._odometry = Odometry(child_frame_id=names.frames.base)
         self._odometry.header.frame_id = names.frames.odom
@@ -64,20 +71,33 @@ class Base:
         if not all(map(math.isfinite, setpoint)):
             self._node.get_logger().warning(f"refused a velocity command of {setpoint}", throttle_duration_sec=1.0)
             return
-        self._setpoint = setpoint
-        self._commanded_at = time.monotonic()
+        late = self._realism.lateness() / self._time_scale if self._realism else 0.0
+        self._commands.send(time.monotonic() + late, setpoint)
 
     def _step(self) -> None:
         now = time.monotonic()
         seconds = min((now - self._moved_at) * self._time_scale, _LONGEST_STEP_S)
         self._moved_at = now
+        command = self._commands.arrived(now)
+        if command is not None:
+            self._commanded_at, self._setpoint = command
         if now - self._commanded_at > HOLD_S:
             self._setpoint = (0.0, 0.0)
-        self.motion = advance(self.motion, self._setpoint, seconds, self._solid.is_free)
-        self._report()
+        before = self.motion
+        after = advance(before, self._setpoint, seconds, self._solid.is_free, self._accelerations)
+        if self._realism is None:
+            self.motion = after
+            self._report(after)
+            return
+        self.motion = self._realism.slipped(before, after)
+        self._belief = self._realism.believed(self._belief, before, after, self.motion, seconds)
+        period = 1 / (self._realism.character.odometry_hz * self._time_scale)
+        if now - self._reported_at >= period:
+            self._reported_at = max(self._reported_at + period, now - period)
+            self._report(self._realism.noisy(self._belief))
 
-    def _report(self) -> None:
-        motion, odometry = self.motion, self._odometry
+    def _report(self, motion: Motion) -> None:
+        odometry = self._odometry
         odometry.header.stamp = self._clock.now().to_msg()
         position = odometry.pose.pose.position
         position.x, position.y = motion.x, motion.y

@@ -15,8 +15,17 @@ _STRAIGHT: Final = 1e-6  # rad turned in a step; below it an arc's radius is num
 # the 0.6 s settle time that the robot declares.
 MAX_LINEAR: Final = 0.7  # m/s
 MAX_ANGULAR: Final = 2.5  # rad/s
-_LINEAR_ACCELERATION: Final = 4.0  # m/s²
-_ANGULAR_ACCELERATION: Final = 12.0  # rad/s²
+
+
+@dataclass(frozen=True)
+class Accelerations:
+    """How fast the velocity may change, m/s² and rad/s²."""
+
+    linear: float = 4.0
+    angular: float = 12.0
+
+
+_USUAL: Final = Accelerations()
 
 
 @dataclass(frozen=True)
@@ -41,15 +50,19 @@ def within(value: float, bound: float) -> float:
 
 
 def advance(
-    motion: Motion, setpoint: tuple[float, float], seconds: float, is_free: Callable[[float, float], bool]
+    motion: Motion,
+    setpoint: tuple[float, float],
+    seconds: float,
+    is_free: Callable[[float, float], bool],
+    accelerations: Accelerations = _USUAL,
 ) -> Motion:
     """Move on for some seconds towards a velocity setpoint (m/s, rad/s), which is clamped to the limits.
 
     Against a wall the body stays where it is while its wheels go on turning: the velocity is the one
     that wheel encoders would measure.
     """
-    linear = _approach(motion.linear, within(setpoint[0], MAX_LINEAR), _LINEAR_ACCELERATION * seconds)
-    angular = _approach(motion.angular, within(setpoint[1], MAX_ANGULAR), _ANGULAR_ACCELERATION * seconds)
+    linear = _approach(motion.linear, within(setpoint[0], MAX_LINEAR), accelerations.linear * seconds)
+    angular = _approach(motion.angular, within(setpoint[1], MAX_ANGULAR), accelerations.angular * seconds)
     turned = angular * seconds
     distance = linear * seconds
     # The chord of the arc: its direction is the mean heading, its length distance · sin(a/2) / (a/2).

@@ -23,7 +23,7 @@ from reference_robot.names import RosNames
 from reference_robot.simulation.localisation import Localisation
 from reference_robot.simulation.messages import LATCHED, RESULT_TIMEOUT_S, PoseError, plain, pose_of, stamped_pose
 from reference_robot.simulation.planner import PlanError, Planner, Pose
-from reference_robot.simulation.pursuit import CRUISE, Command, Pursuit
+from reference_robot.simulation.pursuit import CRUISE, EXACT, Command, Pursuit
 
 _FEEDBACK_PERIOD_S: Final = 0.2
 _PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time; then the goal is aborted
@@ -62,13 +62,20 @@ class Navigation:
     """Serves NavigateToPose; each update of the localisation is one step of control."""
 
     def __init__(
-        self, node: Node, names: RosNames, planner: Planner, localisation: Localisation, time_scale: float = 1.0
+        self,
+        node: Node,
+        names: RosNames,
+        planner: Planner,
+        localisation: Localisation,
+        time_scale: float = 1.0,
+        tolerances: tuple[float, float] = EXACT,
     ) -> None:
         self._node = node
         self._names = names
         self._planner = planner
         self._localisation = localisation
         self._time_scale = time_scale
+        self._tolerances = tolerances
         self._drive: _Drive | None = None
         self._path: Any = None  # of the goal that was accepted last and has not begun
         self._stamped = names.velocity.message == "TwistStamped"
@@ -103,7 +110,7 @@ class Navigation:
 
     def _begin(self, handle: Any) -> None:
         displaced, path = self._drive, self._path
-        self._drive = _Drive(handle, Pursuit(path), began=time.monotonic())
+        self._drive = _Drive(handle, Pursuit(path, self._tolerances), began=time.monotonic())
         self._drive.progressed = self._drive.began
         if displaced is not None:
             displaced.handle.abort()

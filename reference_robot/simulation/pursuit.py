@@ -12,8 +12,7 @@ from reference_robot.simulation.office import Floats
 CRUISE: Final = 0.6  # m/s, below the base's limit
 _TURN: Final = 1.8  # rad/s
 _LOOKAHEAD: Final = 0.4  # m
-_POSITION_TOLERANCE: Final = 0.03  # m
-_YAW_TOLERANCE: Final = 0.02  # rad
+EXACT: Final = (0.03, 0.02)  # m, rad
 _DRIFT: Final = 0.1  # m off the goal at which a robot that turns on the spot goes back to driving
 _TURN_ON_SPOT: Final = 0.6  # rad off the course beyond which it stops to turn
 _SEARCH_AHEAD: Final = 8  # path poses in which the nearest one is sought
@@ -30,10 +29,11 @@ class Command:
 
 
 class Pursuit:
-    """Follows one path: (k, 3) poses as the planner returns them."""
+    """Follows one path: (k, 3) poses as the planner returns them, to its end within tolerances in m and rad."""
 
-    def __init__(self, path: Floats) -> None:
+    def __init__(self, path: Floats, tolerances: tuple[float, float] = EXACT) -> None:
         self._path = path
+        self._near, self._straight = tolerances
         pieces = np.hypot(*np.diff(path[:, :2], axis=0).T)
         self._left = np.append(np.cumsum(pieces[::-1])[::-1], 0.0)
         self._nearest = 0
@@ -43,13 +43,13 @@ class Pursuit:
         """Return what to do at a pose of the robot."""
         goal_x, goal_y, goal_yaw = self._path[-1]
         off = math.dist((x, y), (goal_x, goal_y))
-        if off < _POSITION_TOLERANCE:
+        if off < self._near:
             self._turning = True
         elif off > _DRIFT:
             self._turning = False
         if self._turning:
             error = wrap(goal_yaw - yaw)
-            arrived = abs(error) < _YAW_TOLERANCE
+            arrived = abs(error) < self._straight
             return Command(0.0, 0.0 if arrived else within(2.5 * error, _TURN), off, arrived)
         target_x, target_y, remaining = self._target(x, y)
         course = wrap(math.atan2(target_y - y, target_x - x) - yaw)

@@ -9,25 +9,32 @@ from reference_robot.simulation.navigation import Navigation
 from reference_robot.simulation.office import OFFICE
 from reference_robot.simulation.planner import Planner
 from reference_robot.simulation.planning import Planning
+from reference_robot.simulation.pursuit import EXACT
+from reference_robot.simulation.realism import NEAR_ENOUGH, Realism
 from reference_robot.simulation.sensors import Sensors
 
 
 class Simulation:
     """The robot's nodes ``base``, ``navigation`` and ``delivery`` on a runtime; ROS time stays wall time.
 
+    With ``realism`` the robot is like a real one.
+
     Raises:
         ValueError: The time scale is not positive.
     """
 
-    def __init__(self, ros: RosRuntime, names: RosNames, time_scale: float = 1.0) -> None:
+    def __init__(
+        self, ros: RosRuntime, names: RosNames, time_scale: float = 1.0, realism: Realism | None = None
+    ) -> None:
         if not time_scale > 0:
             raise ValueError(f"the time scale must be positive, not {time_scale}")
         base_node = ros.create_node("base")
-        self.base = Base(base_node, names, time_scale)
+        self.base = Base(base_node, names, time_scale, realism)
         self.sensors = Sensors(base_node, names, lambda: self.base.motion)
         navigation_node = ros.create_node("navigation")
         planner = Planner(OFFICE)
         localisation = Localisation(navigation_node, names)
         self.planning = Planning(navigation_node, names, planner, localisation)
-        self.navigation = Navigation(navigation_node, names, planner, localisation, time_scale)
+        tolerances = NEAR_ENOUGH if realism else EXACT
+        self.navigation = Navigation(navigation_node, names, planner, localisation, time_scale, tolerances)
         self.delivery = Delivery(ros.create_node("delivery"), names)
