@@ -1,5 +1,6 @@
 """False alarms: good robots, over many seeds and in many circumstances, none of which may be blamed."""
 
+import contextlib
 import tempfile
 import threading
 from collections.abc import Callable
@@ -8,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from conformance.selftest.certifying import Job, Outcome, run_job
+from conformance.selftest.link import linked
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import Robot, running, statement_of
 from conformance.selftest.variants import CertificateError, Variant, certificate
@@ -65,9 +67,15 @@ class Case:
 
 
 def run_controls(
-    cases: list[Case], *, effort: str, parallel: int, domain_id: int, tell: Callable[[ControlResult], None]
+    cases: list[Case],
+    *,
+    effort: str,
+    parallel: int,
+    domain_id: int,
+    tell: Callable[[ControlResult], None],
+    requirements: tuple[str, ...] = (),
 ) -> list[ControlResult]:
-    """Judge good robots, each case on a robot of its own; ``tell`` is called as each is done."""
+    """Judge good robots, each case on a robot of its own, by all requirements or these; tell each when it is done."""
     lock = threading.Lock()
     domains = list(range(domain_id, domain_id + parallel))
 
@@ -75,7 +83,7 @@ def run_controls(
         with lock:
             domain = domains.pop()
         try:
-            found = _try(case, effort, domain)
+            found = _try(case, effort, domain, requirements)
         finally:
             with lock:
                 domains.append(domain)
@@ -87,13 +95,14 @@ def run_controls(
         return list(executor.map(one, cases))
 
 
-def _try(case: Case, effort: str, domain: int) -> ControlResult:
+def _try(case: Case, effort: str, domain: int, requirements: tuple[str, ...]) -> ControlResult:
     with running(case.robot, domain) as robot, tempfile.TemporaryDirectory() as folder:
         job = Job(
             statement_of(case.robot),
             robot.rest,
             robot.soap,
             robot.soap.replace("publisher", "subscriber"),
+            requirements=requirements,
             effort=effort,
             seed=case.seed,
             timeout_s=_TIMEOUT_S,
@@ -119,7 +128,13 @@ def _vary(case: Case, variant: Variant, robot: Robot, job: Job, folder: Path) ->
         return ControlResult(
             case.robot, variant.name, case.seed, None, f"{variant.host} cannot be listened on: {error}"
         )
-    try:
+    with contextlib.ExitStack() as stack:
+        stack.callback(proxy.close)
+        if variant.link is not None:
+            addresses = stack.enter_context(linked(variant.link, case.seed, *proxy.listens.values()))
+            proxy.seen_at(
+                **{side: f"http://{host}:{port}" for side, (host, port) in zip(proxy.listens, addresses, strict=True)}
+            )
         proxy.change = variant.make()
         varied = replace(
             job,
@@ -130,5 +145,3 @@ def _vary(case: Case, variant: Variant, robot: Robot, job: Job, folder: Path) ->
             endpoints=endpoints,
         )
         return ControlResult(case.robot, variant.name, case.seed, run_job(varied))
-    finally:
-        proxy.close()

@@ -5,6 +5,7 @@ import socket
 import ssl
 import threading
 import traceback
+from dataclasses import replace
 from urllib.parse import urlsplit
 
 from conformance.selftest.addresses import Addresses
@@ -64,6 +65,15 @@ class Proxy:
     def wsdl(self, service: str) -> str:
         """A WSDL's URL at the proxy: ``publisher`` or ``subscriber``."""
         return f"{self._addresses.public('soap')}/turtlesim_{service}_ws?wsdl"
+
+    @property
+    def listens(self) -> dict[str, tuple[str, int]]:
+        """Host and port of each side."""
+        return {side: sock.getsockname()[:2] for side, sock in self._listeners.items()}
+
+    def seen_at(self, **origins: str) -> None:
+        """Say of each side where clients reach it, when that is not where the proxy listens."""
+        self._addresses = replace(self._addresses, proxy=origins)
 
     def close(self) -> None:
         """Stop listening, and end every connection."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from conformance.selftest.link import LINKS, Link
 from conformance.selftest.messages import Change, Forward, Request, Response, unchanged
 from conformance.selftest.mutants.changes import parsed, problem
 
@@ -31,6 +32,7 @@ class Variant:
         host: where the proxy listens; prefix: its path; tls: whether it speaks TLS.
         token: bearer token to send.
         endpoints: what the statement says of it.
+        link: what the clients are away by, or None where they are beside the robot.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Variant:
     token: str = ""
     endpoints: dict[str, Any] = field(default_factory=dict)
     robot: str = "baroque"
+    link: Link | None = None
 
 
 class CertificateError(Exception):
@@ -117,6 +120,7 @@ class _Ceiling:
 
 
 VARIANTS = (
+    *(Variant(link.name, link.says, link=link) for link in LINKS),
     # Whose velocities hold long enough to be read at such a pace.
     Variant("slow", "every answer takes 300 ms more", lambda: _slow, robot="plain"),
     Variant("prefix", f"everything is under {_PREFIX}", lambda: _prefixed, prefix=_PREFIX),
