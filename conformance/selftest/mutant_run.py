@@ -81,7 +81,8 @@ class RobotPool:
 
     def give(self, robot: Robot, proxy: Proxy) -> None:
         """Give them back, as they were."""
-        proxy.change, proxy.incomplete_request, proxy.serial = unchanged, None, False
+        proxy.change, proxy.incomplete_request = unchanged, None
+        proxy.serial = proxy.backwards = False
         proxy.broken = []
         self._free.put((robot, proxy))
 
@@ -164,7 +165,7 @@ def _try(mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, alr
     for chosen, requirements in attempts:
         proxy.change = mutant.make()
         proxy.incomplete_request = mutant.incomplete_request() if mutant.incomplete_request else None
-        proxy.serial = mutant.serial
+        proxy.serial, proxy.backwards = mutant.serial, mutant.backwards
         outcome = run_job(
             job_for(
                 robot,

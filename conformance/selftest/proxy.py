@@ -29,6 +29,7 @@ class Proxy:
         change: what is done to every exchange; may be exchanged at any time.
         incomplete_request: what is done with requests that are never completed.
         serial: whether a request is read only when the one before it has come to its end.
+        backwards: whether of two requests that were sent at once the second is answered first.
         requests: how many have come.
         broken: what a change raised that it should not have: then the mutant is wrong, not the robot.
     """
@@ -39,6 +40,7 @@ class Proxy:
         self.change: Change = unchanged
         self.incomplete_request: IncompleteRequest | None = None
         self.serial = False
+        self.backwards = False
         self.requests = 0
         self.broken: list[str] = []
         self._tls = tls
@@ -111,10 +113,15 @@ class Proxy:
             self._open.add(sock)
             client = ClientConnection(sock, side)
             while (request := self._next(side, client, forward)) is not None:
-                self.requests += 1
-                response = self._changed(request, forward)
-                last = request.is_last or response.is_last
-                client.respond(response, last=last)
+                together = [request]
+                if self.backwards and client.has_more and (second := self._next(side, client, forward)) is not None:
+                    together.insert(0, second)
+                last = False
+                for item in together:
+                    self.requests += 1
+                    response = self._changed(item, forward)
+                    last = last or item.is_last or response.is_last
+                    client.respond(response, last=last and item is together[-1])
                 if last:
                     break
         except (OSError, IncompleteMessageError, HangUpError):

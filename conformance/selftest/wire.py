@@ -31,6 +31,11 @@ class ClientConnection:
         self._sock, self._side = sock, side
         self._waiting = b""
 
+    @property
+    def has_more(self) -> bool:
+        """Whether something of the next request has come with the last one."""
+        return bool(self._waiting)
+
     def wait(self) -> bool:
         """Wait until something of the next request has come. Returns False when the connection has ended."""
         self._waiting = self._waiting or _received(self._sock)

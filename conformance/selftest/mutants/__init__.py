@@ -2,6 +2,7 @@
 
 from conformance.selftest.mutants import (
     attacks,
+    concurrency,
     delivery,
     describe,
     equivalence,
@@ -37,6 +38,7 @@ _SUBJECTS = (
     formats,
     http_methods,
     http_messages,
+    concurrency,
     soap_services,
     soap_reading,
     soap_profile,

@@ -22,6 +22,7 @@ class Mutant:
         observer: whether only a ROS probe or the robot's list of deliveries can see it.
         token: bearer token that the robot wants, or empty.
         serial: whether the robot takes the next request only when the one before is complete.
+        backwards: whether of two requests that were sent at once on one connection the second is answered first.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Mutant:
     observer: bool = False
     token: str = ""
     serial: bool = False
+    backwards: bool = False
 
 
 def of_class(class_: str, interface: str, **common: Any) -> Callable[..., Mutant]:

@@ -1,0 +1,116 @@
+"""Several clients at once: requests that leave at one moment, each client on a connection of its own."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from http import HTTPStatus
+from typing import Final
+
+from conformance.transport.client import Headers, HttpClient
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError
+
+# More than this at once is a load test, and more than a small robot has sockets for.
+MOST_CLIENTS: Final = 8
+# Whoever has too much to do may say so (RFC 9110 15.6.4, RFC 6585 4): a refusal, whatever was asked.
+_BUSY: Final = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
+
+
+@dataclass(frozen=True)
+class Outgoing:
+    """A request that is to be sent.
+
+    Attributes:
+        client: the interface that it is for.
+        method, path, headers, body: as HttpClient.send() takes them.
+    """
+
+    client: HttpClient
+    method: str
+    path: str
+    headers: Headers = ()
+    body: bytes = b""
+
+
+def is_busy(attempt: Attempt) -> bool:
+    """Whether a robot had no time for a request: it said so, or took no further connection."""
+    return not isinstance(attempt, Exchange) or attempt.response.status in _BUSY
+
+
+def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
+    """Send the requests of each round at one moment, the next round when all of one are answered.
+
+    The first request of every round is the first client's, and so on; a client keeps its connection. Listeners are told
+    afterwards, in order; of a robot that had too much to do they are not told.
+
+    Args:
+        rounds: at most MOST_CLIENTS requests each.
+
+    Returns:
+        What became of each; a connection that was refused or closed is no answer.
+
+    Raises:
+        NoAnswerError: a robot did not answer within the deadline.
+    """
+    clients = [_Client() for _ in range(max(map(len, rounds), default=0))]
+    attempts: list[list[Attempt]] = []
+    try:
+        with ThreadPoolExecutor(max(1, len(clients))) as pool:
+            for requests in rounds:
+                for request in requests:
+                    request.client.connection.take_slot()
+                start = threading.Barrier(len(requests))
+                jobs = [
+                    pool.submit(client.send, request, start.wait)
+                    for client, request in zip(clients, requests, strict=False)
+                ]
+                attempts.append([job.result() for job in jobs])
+                _tell(requests, attempts[-1])
+    finally:
+        for client in clients:
+            client.close()
+    return attempts
+
+
+class _Client:
+    """One of several clients: its connections are its own, and nobody listens while others are being served."""
+
+    def __init__(self) -> None:
+        self._clients: dict[str, HttpClient] = {}
+
+    def send(self, request: Outgoing, wait: Callable[[], object]) -> Attempt:
+        """Wait for the others, then send."""
+        shared = request.client
+        # The ceiling on the rate has been kept to before.
+        own = self._clients.setdefault(
+            shared.base_url, HttpClient(shared.base_url, replace(shared.connection, listeners=[], request_rate=None))
+        )
+        wait()
+        try:
+            return own.send(request.method, request.path, headers=request.headers, body=request.body)
+        except NoAnswerError as none:
+            return none.unanswered
+
+    def close(self) -> None:
+        """Close the connections."""
+        for client in self._clients.values():
+            client.close()
+
+
+def _tell(requests: Sequence[Outgoing], attempts: Sequence[Attempt]) -> None:
+    """Have what came judged by those who listen.
+
+    Raises:
+        NoAnswerError: something did not come.
+    """
+    for request, attempt in zip(requests, attempts, strict=True):
+        for listener in request.client.connection.listeners:
+            if isinstance(attempt, Exchange) and not is_busy(attempt):
+                listener.answered(attempt)
+            elif not isinstance(attempt, Exchange) and attempt.kind not in {NoAnswer.CLOSED, NoAnswer.REFUSED}:
+                listener.unanswered(attempt)
+    for attempt in attempts:
+        if not isinstance(attempt, Exchange) and attempt.kind not in {NoAnswer.CLOSED, NoAnswer.REFUSED}:
+            raise NoAnswerError(attempt)

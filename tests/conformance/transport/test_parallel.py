@@ -1,0 +1,84 @@
+"""Requests of several clients leave at one moment, and each has its own answer."""
+
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Exchange, Listener, NoAnswerError
+from conformance.transport.parallel import Outgoing, is_busy, send_together
+
+CLIENTS = 4
+
+
+class Server(ThreadingHTTPServer):
+    """Answers when CLIENTS requests are there, or never: who sends one after the other waits in vain."""
+
+    daemon_threads = True
+
+    def __init__(self):
+        super().__init__(("127.0.0.1", 0), Handler)
+        self.all_here = threading.Barrier(CLIENTS, timeout=5.0)
+
+
+class Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+
+    def do_GET(self):
+        self.server.all_here.wait()
+        status = int(self.path.partition("?")[2] or 200)
+        if status == 0:
+            self.close_connection = True
+            return
+        self.send_response(status)
+        self.send_header("Content-Length", str(len(self.path)))
+        self.end_headers()
+        self.wfile.write(self.path.encode())
+
+    def log_message(self, *_):
+        pass
+
+
+class Heard(Listener):
+    def __init__(self):
+        self.exchanges = []
+
+    def answered(self, exchange):
+        self.exchanges.append(exchange)
+
+
+@pytest.fixture
+def client():
+    server = Server()
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    client = HttpClient(f"http://127.0.0.1:{server.server_port}", Connection(timeout_s=5.0, listeners=[Heard()]))
+    yield client
+    client.close()
+    server.shutdown()
+    server.server_close()
+
+
+def test_each_request_has_its_answer_and_all_are_there_at_once(client):
+    rounds = [[Outgoing(client, "GET", f"/{turn}/{number}") for number in range(CLIENTS)] for turn in range(3)]
+    attempts = send_together(rounds)
+    assert [[item.response.body.decode() for item in turn] for turn in attempts] == [
+        [item.path for item in turn] for turn in rounds
+    ]
+    assert len(client.connection.listeners[0].exchanges) == client.connection.sent == 3 * CLIENTS
+
+
+def test_who_is_busy_is_not_told_of(client):
+    busy, closed, *fine = send_together([[Outgoing(client, "GET", path) for path in ("/?503", "/?0", "/one", "/two")]])[
+        0
+    ]
+    assert is_busy(busy)
+    assert is_busy(closed)
+    assert not isinstance(closed, Exchange)
+    assert client.connection.listeners[0].exchanges == fine
+
+
+def test_a_robot_that_does_not_answer_is_an_error(client):
+    client.connection.timeout_s = 0.2
+    with pytest.raises(NoAnswerError):
+        send_together([[Outgoing(client, "GET", "/alone")]])
