@@ -45,7 +45,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt $(INTERFACE_FILES) | prerequi
 demo: install
 	$(BIN)/python demo.py --out $(OUT)
 
-test: install browser lint
+test: install browser servers lint
 	$(BIN)/python -m pytest
 
 lint: install
@@ -59,6 +59,14 @@ browser:
 	@command -v chromium chromium-browser google-chrome >/dev/null || \
 		{ test "$$(id -u)" = 0 && command -v apt-get >/dev/null && apt-get update -qq && apt-get install -y -qq chromium >/dev/null; } || \
 		{ echo "missing: chromium, in which the report tests look at the pages (Debian, Ubuntu: apt install chromium)" >&2; exit 2; }
+
+# Of the servers that the self-test knows, the two whose tests are quick; roaas selftest says which others are missing.
+.PHONY: servers
+servers:
+	@PATH="$$PATH:/usr/sbin"; for server in nginx node; do command -v $$server >/dev/null || missing="$$missing $$server"; done; \
+	missing="$${missing/node/nodejs}"; test -z "$$missing" || \
+		{ test "$$(id -u)" = 0 && command -v apt-get >/dev/null && apt-get update -qq && apt-get install -y -qq --no-install-recommends $$missing >/dev/null; } || \
+		{ echo "missing:$$missing, web servers of the self-test (Debian, Ubuntu: apt install$$missing)" >&2; exit 2; }
 
 selftest: install
 	$(BIN)/roaas selftest --out $(OUT)/selftest

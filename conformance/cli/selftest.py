@@ -63,7 +63,9 @@ _SHORT = (
     "--compare/--no-compare", default=True, help="Run the plain Schemathesis command line against the REST faults too."
 )
 @click.option(
-    "--variants/--no-variants", default=True, help="Try good robots behind TLS, a prefix, a token and the like."
+    "--variants/--no-variants",
+    default=True,
+    help="Try good robots behind TLS, a prefix, a token and the like, and behind nginx and other web servers.",
 )
 @click.option("--parallel", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at once.")
 @click.option(
@@ -152,6 +154,7 @@ def _compare(report: Report, pool: Any, chosen: list[Mutant], progress: _Progres
 def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) -> None:
     from conformance.selftest import robots  # noqa: PLC0415 - see selftest()
     from conformance.selftest.controls import Case, run_controls  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.servers.fronts import FRONTS  # noqa: PLC0415 - see selftest()
     from conformance.selftest.variants import VARIANTS  # noqa: PLC0415 - see selftest()
 
     kinds = [*robots.INDEPENDENT_ROBOTS, robots.REFERENCE]
@@ -164,6 +167,7 @@ def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) 
     if options["variants"]:
         # The slow one first, so that it does not keep all others waiting in the end.
         cases += [Case(variant.robot, variant, 0) for variant in VARIANTS]
+        cases += [Case(front.robot, front, 0) for front in FRONTS if front.robot in kinds]
     cases += [Case(kind, None, seed) for seed in range(options["seeds"]) for kind in kinds]
     progress.total = len(cases)
     report.control_results = run_controls(

@@ -12,6 +12,8 @@ from conformance.selftest.certifying import Job, Outcome, run_job
 from conformance.selftest.link import linked
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import Robot, running, statement_of
+from conformance.selftest.servers.fronts import Front, behind
+from conformance.selftest.servers.programs import NotInstalledError
 from conformance.selftest.variants import CertificateError, Variant, certificate
 
 # A robot that takes 300 ms for everything needs its time.
@@ -59,10 +61,10 @@ class ControlResult:
 
 @dataclass(frozen=True)
 class Case:
-    """One robot to try: in which circumstances, with which seed."""
+    """One robot to try: in which circumstances or behind which server, with which seed."""
 
     robot: str
-    variant: Variant | None
+    variant: Variant | Front | None
     seed: int
 
 
@@ -96,21 +98,29 @@ def run_controls(
 
 
 def _try(case: Case, effort: str, domain: int, requirements: tuple[str, ...]) -> ControlResult:
-    with running(case.robot, domain) as robot, tempfile.TemporaryDirectory() as folder:
-        job = Job(
-            statement_of(case.robot),
-            robot.rest,
-            robot.soap,
-            robot.soap.replace("publisher", "subscriber"),
-            requirements=requirements,
-            effort=effort,
-            seed=case.seed,
-            timeout_s=_TIMEOUT_S,
-            domain_id=robot.domain_id,
-        )
-        if case.variant is None:
-            return ControlResult(case.robot, "", case.seed, run_job(job))
-        return _vary(case, case.variant, robot, job, Path(folder))
+    """Judge one robot; what its circumstances need and this machine lacks is said."""
+    name = case.variant.name if case.variant else ""
+    try:
+        with contextlib.ExitStack() as stack:
+            robot = stack.enter_context(running(case.robot, domain))
+            if isinstance(case.variant, Front):
+                robot = stack.enter_context(behind(case.variant, robot))
+            job = Job(
+                statement_of(case.robot),
+                robot.rest,
+                robot.soap,
+                robot.soap.replace("publisher", "subscriber"),
+                requirements=requirements,
+                effort=effort,
+                seed=case.seed,
+                timeout_s=_TIMEOUT_S,
+                domain_id=robot.domain_id,
+            )
+            if isinstance(case.variant, Variant):
+                return _vary(case, case.variant, robot, job, Path(stack.enter_context(tempfile.TemporaryDirectory())))
+            return ControlResult(case.robot, name, case.seed, run_job(job))
+    except NotInstalledError as error:
+        return ControlResult(case.robot, name, case.seed, None, str(error))
 
 
 def _vary(case: Case, variant: Variant, robot: Robot, job: Job, folder: Path) -> ControlResult:

@@ -152,6 +152,9 @@ class Report:
             lines.append(
                 f"{len(good) - len(self.blamed)} of {len(good)} certifications of good robots found them conformant"
             )
+        lines += [
+            f"not tried: {one.robot} ({one.variant}): {one.not_tried}" for one in self.control_results if one.not_tried
+        ]
         for one in self.blamed:
             where = f" ({one.variant})" if one.variant else ""
             said = "; ".join(f"{id_}: {why[:200]}" for id_, why in {**one.blamed, **one.unjudged}.items())

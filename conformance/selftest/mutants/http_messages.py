@@ -77,12 +77,14 @@ def _count(request: Request, name: str) -> int | None:
     return len(re.findall(rb"(?i)\r\n%s:" % name.encode(), request.raw))
 
 
-def _hosts(count: int) -> Callable[[Request, Forward], Response]:
-    """Requests with this many Host fields are taken like others."""
+def _hosts(taken: Callable[[list[bytes]], bool]) -> Callable[[Request, Forward], Response]:
+    """Requests of REST that are no HTTP, with Host fields such as these, are taken like others."""
 
     def change(request: Request, forward: Forward) -> Response:
-        taken = _count(request, "Host") == count
-        return forward(_with_field(request, "Host", "robot") if taken else request)
+        if request.side != "rest" or request.raw is None:
+            return forward(request)
+        hosts = re.findall(rb"(?i)\r\nHost:[ \t]*([^\r\n]*)", request.raw)
+        return forward(_with_field(request, "Host", "robot") if taken(hosts) else request)
 
     return change
 
@@ -199,8 +201,24 @@ MUTANTS = (
         "framing",
         altered(_POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1))),
     ),
-    _mutant("http-host-optional", "A request without Host is served.", "host-missing", lambda: _hosts(0)),
-    _mutant("http-host-twice", "A request with two Host fields is served.", "host-twice", lambda: _hosts(2)),
+    _mutant(
+        "http-host-optional",
+        "A request without Host is served.",
+        "host-missing",
+        lambda: _hosts(lambda hosts: not hosts),
+    ),
+    _mutant(
+        "http-host-twice",
+        "A request with two Host fields is served.",
+        "host-twice",
+        lambda: _hosts(lambda hosts: len(hosts) > 1),
+    ),
+    _mutant(
+        "http-host-repeated",
+        "A request with the same Host field twice is served.",
+        "host-repeated",
+        lambda: _hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1),
+    ),
     _mutant(
         "http-first-length",
         "Of two Content-Length fields the first one counts.",

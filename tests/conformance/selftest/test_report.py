@@ -31,3 +31,13 @@ def test_nothing_tried_is_no_proof():
     assert not Report("reference").holds
     assert Report("reference", control_results=[ControlResult("plain", "", 0, outcome(0, http_date="pass"))]).holds
     assert not Report("reference", control_results=[ControlResult("plain", "", 0, outcome(4, http_date="skip"))]).holds
+
+
+def test_what_is_not_installed_is_said():
+    found = [
+        ControlResult("reference", "nginx", 0, None, "not installed: apt install nginx"),
+        ControlResult("plain", "", 0, outcome(0, http_date="pass")),
+    ]
+    report = Report("reference", control_results=found)
+    assert report.holds
+    assert "not tried: reference (nginx): not installed: apt install nginx" in report.summary()

@@ -1,0 +1,52 @@
+"""Programs that are not Python's: found, or named with what installs them; Go's are built first."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+import zlib
+from pathlib import Path
+
+# Go compiles its standard library once, on a slow machine in more than a minute.
+_BUILD_S = 300.0
+
+
+class NotInstalledError(Exception):
+    """Something is not there; the message says what installs it."""
+
+
+def program(name: str, package: str) -> str:
+    """Path of a program. Servers are in /usr/sbin, which is on no user's PATH on Debian.
+
+    Raises:
+        NotInstalledError: it is not there.
+    """
+    found = shutil.which(name, path=os.pathsep.join([os.environ.get("PATH", os.defpath), "/usr/sbin", "/sbin"]))
+    if found is None:
+        raise NotInstalledError(f"not installed: apt install {package}")
+    return found
+
+
+def built(source: Path) -> Path:
+    """A Go program, built from one file and the standard library; kept until its source changes.
+
+    Raises:
+        NotInstalledError: there is no Go, or it fails.
+    """
+    go = program("go", "golang-go")
+    checksum = zlib.crc32(source.read_bytes())
+    binary = Path(tempfile.gettempdir(), f"roaas-go-{os.getuid()}", f"{source.stem}-{checksum:08x}")
+    if binary.exists():
+        return binary
+    binary.parent.mkdir(mode=0o700, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=binary.parent) as folder:
+        environment = {**os.environ, "GOFLAGS": "-mod=mod", "GOPROXY": "off"}
+        command = [go, "build", "-o", f"{folder}/built", str(source)]
+        done = subprocess.run(  # noqa: S603 - the program found above, on a file of ours
+            command, capture_output=True, check=False, env=environment, timeout=_BUILD_S
+        )
+        if done.returncode:
+            raise NotInstalledError(f"go build fails: {done.stderr.decode(errors='replace')[-200:]}")
+        # Another run may have been faster: either result will do.
+        Path(folder, "built").replace(binary)
+    return binary
