@@ -15,6 +15,7 @@ this machine only.
 
 import os
 import threading
+import time
 import traceback
 from types import TracebackType
 from typing import Final, Self
@@ -37,7 +38,7 @@ except ImportError:  # a Jazzy from before its backport
 # message, 6 %.
 
 _IDLE_WAKE_S: Final = 0.5
-_JOIN_S: Final = 10.0
+_CLOSING_S: Final = 8.0  # for the executor and its thread together
 _HIGHEST_DOMAIN_ID: Final = 101  # higher ones put DDS's ports into Linux's ephemeral range
 
 
@@ -83,9 +84,10 @@ class RosRuntime:
             return
         self._closing.set()
         # In this order, or the process may end in "terminate called without an active exception".
-        self._executor.shutdown(timeout_sec=_JOIN_S)
+        give_up = time.monotonic() + _CLOSING_S
+        self._executor.shutdown(timeout_sec=_CLOSING_S)
         if self._thread is not None:
-            self._thread.join(_JOIN_S)
+            self._thread.join(max(0.0, give_up - time.monotonic()))
         for node in reversed(self._nodes):
             # destroy_node leaves actions alone, and one that is left keeps its node on the graph.
             for entity in list(node.waitables):

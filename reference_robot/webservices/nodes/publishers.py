@@ -7,6 +7,8 @@ from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
+from rclpy.duration import Duration
+from rclpy.impl.implementation_singleton import rclpy_implementation as rclpy_c
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.task import Future
 from unique_identifier_msgs.msg import UUID
@@ -16,6 +18,10 @@ from reference_robot.ros import RosRuntime
 
 # Each accepted request is exactly one message (contract, ROS side): nothing gives way before it is acknowledged.
 _DELIVERY_QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+# Messages sent since all were last seen acknowledged; beyond, a request is refused. A KEEP_ALL writer of Fast DDS holds
+# 5,000: at the next, publish would hold the event loop for 0.1 s and then fail.
+_UNACKNOWLEDGED: Final = 4000
+_AT_ONCE: Final = Duration()
 _VELOCITY_QOS: Final = QoSProfile(depth=100)
 _VELOCITY_TYPES: Final[dict[str, Any]] = {
     "geometry_msgs/msg/Twist": Twist,
@@ -30,6 +36,7 @@ class RobotPublishersNode:
         self.node = ros.create_node("robot_publishers")
         self._names = names
         self._delivery = self.node.create_publisher(DeliveryRequestMsg, names.topics.delivery, _DELIVERY_QOS)
+        self._unacknowledged = 0
         self._velocity: dict[str, Any] = {}
         self._navigation = ActionClient(self.node, NavigateToPose, names.actions.navigate_to_pose)
         self._cancel = self.node.create_client(CancelGoal, f"{names.actions.navigate_to_pose}/_action/cancel_goal")
@@ -42,9 +49,14 @@ class RobotPublishersNode:
         """Tell whether anybody on the graph takes delivery requests."""
         return bool(self._delivery.get_subscription_count())
 
-    def publish_delivery(self, request: DeliveryRequestMsg) -> None:
-        """Publish one delivery request."""
-        self._delivery.publish(request)
+    def publish_delivery(self, request: DeliveryRequestMsg) -> bool:
+        """Publish one delivery request; return False, with nothing published, while readers cannot keep up."""
+        if self._unacknowledged >= _UNACKNOWLEDGED:
+            if not self._delivery.wait_for_all_acked(_AT_ONCE):
+                return False
+            self._unacknowledged = 0
+        self._unacknowledged += 1
+        return _published(self._delivery, request)
 
     # Velocity
 
@@ -62,18 +74,20 @@ class RobotPublishersNode:
                     self._velocity_publisher(endpoint.topic_type)
         return any(publisher.get_subscription_count() for publisher in self._velocity.values())
 
-    def publish_velocity(self, twist: Twist) -> None:
-        """Publish one velocity command, in each type that a subscriber takes."""
+    def publish_velocity(self, twist: Twist) -> bool:
+        """Publish one velocity command, in each type that a subscriber takes; return whether all went out."""
+        sent = True
         for kind, publisher in self._velocity.items():
             if not publisher.get_subscription_count():
                 continue
             if _VELOCITY_TYPES[kind] is Twist:
-                publisher.publish(twist)
+                sent &= _published(publisher, twist)
             else:
                 stamped = TwistStamped(twist=twist)
                 stamped.header.stamp = self.node.get_clock().now().to_msg()
                 stamped.header.frame_id = self._names.frames.base
-                publisher.publish(stamped)
+                sent &= _published(publisher, stamped)
+        return sent
 
     def _velocity_publisher(self, kind: str) -> None:
         if kind not in self._velocity:
@@ -96,3 +110,12 @@ class RobotPublishersNode:
         request = CancelGoal.Request()
         request.goal_info.goal_id.uuid = list(identity)
         return self._cancel.call_async(request)
+
+
+def _published(publisher: Any, message: Any) -> bool:
+    """Publish; return False where the middleware could not take the message within its own deadline."""
+    try:
+        publisher.publish(message)
+    except rclpy_c.RCLError:
+        return False
+    return True

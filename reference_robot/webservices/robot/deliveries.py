@@ -54,7 +54,8 @@ class Deliveries:
 
         Raises:
             UnusableFieldError: The code is no delivery's, or a coordinate is not finite.
-            Problem: 503, when no delivery application listens: the message would be lost.
+            Problem: 503, when no delivery application listens, for the message would be lost, and while those that
+                listen are behind by thousands.
         """
         _require_usable(request)
         if not self._publishers.delivery_is_served():
@@ -69,8 +70,10 @@ class Deliveries:
             message.source_x,
             message.source_y,
         ) = request
-        self._accepted.append(_Accepted(request, time.time_ns(), interface))
-        self._publishers.publish_delivery(self._message)
+        at = time.time_ns()  # before a mission can begin
+        if not self._publishers.publish_delivery(message):
+            raise not_yet("the delivery application cannot keep up with the requests")
+        self._accepted.append(_Accepted(request, at, interface))
 
     def listed(self) -> list[dict[str, Any]]:
         """Return the requests accepted last, newest first, with the state that the application reports."""

@@ -56,7 +56,8 @@ class Velocity:
             raise Problem(409, "the robot follows a goal; cancel it before setting a velocity")
         await self._robot_found()
         self._commanded, self._commanded_at = twist, time.monotonic()
-        self._publishers.publish_velocity(message_from(shape_of(Twist), twist))
+        if not self._publishers.publish_velocity(message_from(shape_of(Twist), twist)):
+            raise not_yet("the robot does not take velocity commands fast enough")
 
     async def command_linear(self, linear: dict[str, float]) -> None:
         """Publish a velocity with a new linear part and the angular part that is in force.

@@ -1,6 +1,7 @@
 """The simulation as a process: its one line, its ends, and a flood of requests."""
 
 import signal
+import statistics
 import subprocess
 import sys
 import time
@@ -12,6 +13,9 @@ from observer import Observer, pose, until
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 
+PATIENCE = 60.0  # seconds in which even a busy machine ends a process
+FLOOD = 2.0  # seconds
+BLOCKED = 0.1  # seconds that Fast DDS holds a publisher whose reader is slower
 COMMAND = [sys.executable, "-m", "reference_robot.simulation"]
 
 
@@ -41,7 +45,7 @@ def test_it_ends_cleanly(domain_id, end):
             process.stdin = None  # or communicate() would flush it
         else:
             process.send_signal(end)
-        assert process.wait(15) == 0
+        assert process.wait(PATIENCE) == 0
         assert process.stdout.read() == ""
         complaints = process.stderr.read()
         assert "Traceback" not in complaints
@@ -64,17 +68,20 @@ def test_a_flood_of_requests_neither_blocks_the_sender_nor_stops_the_odometry(do
         robot = Observer(ros, RosNames())
         ros.start()
         until(robot.is_connected)
-        sent, slowest, begin = 0, 0.0, time.monotonic()
-        while (now := time.monotonic()) - begin < 2.0:
-            while sent < (now - begin) * 20_000:
+        begin, times = time.monotonic(), []
+        until(lambda: time.monotonic() - begin > FLOOD)
+        begin_of_flood = now = time.monotonic()
+        while now - begin_of_flood < FLOOD:
+            while len(times) < (now - begin_of_flood) * 20_000:
                 robot.request((70.0, 38.7), (71.0, 38.7), (69.0, 38.7))
-                sent += 1
-                slowest = max(slowest, time.monotonic() - now)
-                now = time.monotonic()
+                times.append(time.monotonic() - now)
+                now += times[-1]
             time.sleep(0.001)
-        during = [at for at, _ in robot.odometry if begin < at < begin + 2.0]
-        assert len(during) > 40  # of 100 on an idle machine
-        assert slowest < 1.0
+            now = time.monotonic()
+        before = [at for at, _ in robot.odometry if begin < at < begin + FLOOD]
+        during = [at for at, _ in robot.odometry if begin_of_flood < at < begin_of_flood + FLOOD]
+        assert len(during) > len(before) / 4
+        assert statistics.quantiles(times, n=100)[-1] < BLOCKED
         until(lambda: "dropped" in robot.states)
         assert robot.states.count("queued") <= 20
         assert robot.plan(pose(70.0, 38.7)).poses  # it still answers
