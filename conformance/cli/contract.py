@@ -26,7 +26,7 @@ def contract() -> None:
 @click.option("--level", type=click.Choice([str(level) for level in Level]), help="Only those of one level.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, for other programs.")
 def list_(class_: str | None, level: str | None, *, as_json: bool) -> None:
-    """List the requirements: id, level, text and source."""
+    """List the requirements: id, level, text, source and origin."""
     found = [
         item
         for item in load_ledger(CONTRACT_DIR / "requirements.toml").values()
@@ -36,7 +36,7 @@ def list_(class_: str | None, level: str | None, *, as_json: bool) -> None:
         click.echo(json.dumps([{**asdict(item), "class": item.class_} for item in found], indent=2))
         return
     for item in found:
-        click.echo(f"{item.id}\n    {item.level}: {item.text} [{item.source}]")
+        click.echo(f"{item.id}\n    {item.level}: {item.text} [{item.origin}: {item.source}]")
     click.echo(f"{len(found)} requirements of contract {CONTRACT_VERSION}", err=True)
 
 

@@ -1,4 +1,4 @@
-"""What a requirement can be: conformance classes with the interfaces that they need, profiles, levels."""
+"""What a requirement can be: conformance classes with the interfaces that they need, profiles, levels, origins."""
 
 from enum import StrEnum
 from typing import Final
@@ -10,6 +10,14 @@ class Level(StrEnum):
     MUST = "MUST"
     SHOULD = "SHOULD"
     MAY = "MAY"
+
+
+class Origin(StrEnum):
+    """Where a requirement comes from, and so whom it binds."""
+
+    NORM = "norm"  # a clause of an RFC, SOAP 1.1, WSDL 1.1, WS-I or XML Schema: every HTTP or SOAP service there is
+    DESCRIPTION = "description"  # the OpenAPI or WSDL file at hand: whoever is described by it
+    CONTRACT = "contract"  # contract.md: robots that claim it
 
 
 class Prerequisite(StrEnum):

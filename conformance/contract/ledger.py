@@ -1,4 +1,4 @@
-"""The requirement ledger: each requirement once, with its class, level, text and source."""
+"""The requirement ledger: each requirement once, with its class, level, text, source and origin."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from conformance.contract.classes import CLASSES, ConformanceClass, Level, Prerequisite
+from conformance.contract.classes import CLASSES, ConformanceClass, Level, Origin, Prerequisite
 from conformance.contract.toml_file import Text, TomlFileError, fit, read_tables
 
 if TYPE_CHECKING:
@@ -28,7 +28,8 @@ class Requirement:
         level: how binding it is.
         text: one sentence.
         source: section of contract.md (``contract.md#goals``), file of the contract, paper section, RFC clause or
-            WS-I id; several are separated by "; ".
+            WS-I id; several are separated by "; ", and the first one is what binds.
+        origin: what kind of text that is.
         needs: what a run must have to judge it beside the interface.
         own: whether it speaks of RoAAS's own resources.
         untestable: why no check can judge it, or None.
@@ -39,6 +40,7 @@ class Requirement:
     level: Level
     text: str
     source: str
+    origin: Origin
     needs: tuple[Prerequisite, ...] = ()
     own: bool = False
     untestable: str | None = None
@@ -50,6 +52,7 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     level: Level
     text: Text
     source: Text
+    origin: Origin
     needs: tuple[Prerequisite, ...] = ()
     own: bool = False
     untestable: Text | None = None

@@ -24,6 +24,7 @@ class Parameter:
         required: whether a request needs it.
         schema: of its value.
         examples: values that the contract gives for it; may be empty.
+        also: what else it is called, in ROS for instance (x-roaas-also).
     """
 
     name: str
@@ -31,6 +32,7 @@ class Parameter:
     required: bool
     schema: Schema
     examples: tuple[Any, ...] = ()
+    also: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -186,6 +188,7 @@ def _parameter(given: dict[str, Any]) -> Parameter:
         bool(given.get("required", given["in"] == "path")),
         modern(given.get("schema", content.get("schema", {}))),
         _examples(given),
+        tuple(given.get("x-roaas-also", ())),
     )
 
 
@@ -253,3 +256,10 @@ def matching(contract: Contract, method: str, path: str) -> Operation | None:
 def known_path(contract: Contract, path: str) -> bool:
     """Whether any resource of the contract has this path."""
     return resource_at(contract, path) is not None
+
+
+def inside_prefix(contract: Contract, path: str) -> bool:
+    """Whether a path begins with the first segment of one of the contract's; elsewhere anybody may answer."""
+    return path.lstrip("/").split("/", 1)[0] in {
+        item.template.lstrip("/").split("/", 1)[0] for item in resources_of(contract)
+    }

@@ -114,6 +114,7 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
         "class": requirement.class_,
         "level": requirement.level,
         "source": requirement.source,
+        "origin": requirement.origin,
         "text": requirement.text,
         "verdict": verdict.value,
         "cases": verdict.evidence.cases,

@@ -116,8 +116,10 @@ def _judge_negotiation(api: RestInterface, exchange: Exchange, answer: Response,
         return
     media_type = answer.media_type
     if media_type and context.usual:
+        # To send what q=0 rules out breaks a weaker rule than to send what was never named.
+        ruled_out = "q=0" in (context.accept or "").lower().replace(" ", "")
         api.run.judge.check(
-            "http/not-acceptable",
+            "http/q-zero" if ruled_out else "http/not-acceptable",
             quality(media_type, context.accept) > 0,
             exchange,
             f"an acceptable format, or 406 (Accept: {context.accept})",

@@ -13,10 +13,8 @@ from conformance.documents.traceback import inside_shown
 from conformance.rest import declared, problem
 from conformance.rest.interface import RestInterface
 from conformance.rest.request_context import RequestContext
+from conformance.rest.validity import INVALID, VALID, validity
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, Request, Response, Unanswered
-
-# Methods of which a server may say that it knows none (RFC 9110 15.6.2); the others it has to know.
-KNOWN_METHODS = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS"})
 
 
 class Observer(Listener):
@@ -51,8 +49,9 @@ class Observer(Listener):
                 cause="traceback",
             )
             problem.judge(api, exchange, answer, context)
-        self._judge_server_error(exchange, answer, context)
         if context.operation is not None:
+            if answer.status >= HTTPStatus.BAD_REQUEST and context.usual:
+                self._judge_input(exchange, answer, context)
             declared.judge(api, exchange, answer, context)
 
     def unanswered(self, request: Unanswered) -> None:
@@ -109,23 +108,31 @@ class Observer(Listener):
             found=f"the name {text.twice!r} twice in one object",
         )
 
-    def _judge_server_error(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+    def _judge_input(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+        """Invalid input is no server's error; a valid request is answered as the contract declares."""
+        api, request = self._api, context.request
+        media_type = next((value for name, value in request.headers if name.lower() == "content-type"), "")
+        media_type = media_type.split(";", 1)[0].strip().lower()
+        said = validity(api.run.contract, request.method, context.target, media_type, request.body)
         status = answer.status
-        fine = (
-            status < HTTPStatus.INTERNAL_SERVER_ERROR
-            or (status == HTTPStatus.NOT_IMPLEMENTED and context.request.method not in KNOWN_METHODS)
-            or (status == HTTPStatus.SERVICE_UNAVAILABLE and answer.header("retry-after") is not None)
-            or (status == HTTPStatus.HTTP_VERSION_NOT_SUPPORTED and context.request.raw is not None)
-        )
+        crashed = status >= HTTPStatus.INTERNAL_SERVER_ERROR
+        if status == HTTPStatus.SERVICE_UNAVAILABLE:
+            crashed = answer.header("retry-after") is None
         retry = " without Retry-After" if status == HTTPStatus.SERVICE_UNAVAILABLE else ""
-        self._api.run.judge.check(
-            "http/no-server-error",
-            fine,
-            exchange,
-            "no 5xx",
-            found=f"status {status}{retry} for {context.request.method}",
-            cause=f"{status} {context.operation.id if context.operation else context.request.method}",
-        )
+        operation = said.operation.id if said.operation else request.method
+        for verdict, id_, expected in (
+            (INVALID, "http/no-server-error", f"no 5xx for invalid input ({said.why})"),
+            (VALID, "http/declared-status", f"a status that the contract declares for {operation}"),
+        ):
+            if said.verdict == verdict and (crashed or verdict == INVALID):
+                api.run.judge.check(
+                    id_,
+                    not crashed,
+                    exchange,
+                    expected,
+                    found=f"status {status}{retry} for {request.method}",
+                    cause=f"{status} {operation}",
+                )
 
 
 def _is_date(value: str | None) -> bool:

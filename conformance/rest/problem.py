@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 from conformance.documents.json_text import read_json
+from conformance.documents.openapi import inside_prefix
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
 from conformance.rest.interface import RestInterface
 from conformance.rest.request_context import RequestContext
@@ -11,6 +12,8 @@ from conformance.transport.exchange import Exchange, Response
 
 JSON = "application/problem+json"
 XML = "application/problem+xml"
+#: Those that every server knows; what comes with another one may never reach a resource.
+STANDARD_METHODS = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS", "PATCH"})
 _NAMESPACE = "urn:ietf:rfc:7807"
 # What servers, proxies and gateways answer before any resource is asked; and 401, which tells by its own field.
 _TRANSPORT = frozenset({401, 407, 408, 411, 413, 414, 417, 421, 426, 429, 431})
@@ -29,6 +32,16 @@ def judge(api: RestInterface, exchange: Exchange, answer: Response, context: Req
     if context.is_head and not answer.media_type:
         return
     media_type = answer.media_type
+    if _by_server(api, context, answer):
+        api.run.judge.check(
+            "http/problem-type-server",
+            media_type in {JSON, XML},
+            exchange,
+            f"an error as {JSON}, from the server too",
+            found=f"status {status} as {media_type or 'no media type'}",
+            cause=f"{status} {media_type}",
+        )
+        return
     allowed = [JSON, *([XML] if context.names_xml or status == _NOT_ACCEPTABLE else [])]
     api.run.judge.check(
         "http/problem-type",
@@ -50,6 +63,17 @@ def judge(api: RestInterface, exchange: Exchange, answer: Response, context: Req
         )
     if not context.is_head and media_type in {JSON, XML}:
         _judge_status(api, exchange, answer)
+
+
+def _by_server(api: RestInterface, context: RequestContext, answer: Response) -> bool:
+    """Whether a server may have answered before any resource saw the request (contract, errors)."""
+    path = context.target.split("?", 1)[0]
+    return (
+        context.request.method not in STANDARD_METHODS
+        or "//" in path
+        or not inside_prefix(api.run.contract, path)
+        or (answer.status == _NOT_ACCEPTABLE and not answer.body)
+    )
 
 
 def _xml_fault(answer: Response) -> str:
@@ -103,11 +127,6 @@ def detail_of(answer: Response) -> str:
     return detail if isinstance(detail, str) else ""
 
 
-def names(detail: str, word: str) -> bool:
-    """Whether a detail names a field: as a word of its own, not as a part of another one.
-
-    Of a name in several parts, longer forms count as well: ``destination_x`` for ``dest_x``, as in the ROS message.
-    """
-    first, *parts = word.split("_")
-    pattern = "".join([re.escape(first), *(rf"[A-Za-z0-9]*_{re.escape(part)}" for part in parts)])
-    return re.search(rf"(?<![A-Za-z0-9_]){pattern}(?![A-Za-z0-9_])", detail) is not None
+def names(detail: str, *words: str) -> bool:
+    """Whether a detail names a field by one of its names: as a word of its own, not as a part of another one."""
+    return any(re.search(rf"(?<![A-Za-z0-9_]){re.escape(word)}(?![A-Za-z0-9_])", detail) for word in words)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from conformance.documents.openapi import operations_of
 from conformance.rest import problem
 from conformance.rest.interface import RestInterface
 from conformance.rest.statuses import is_refusal, judge_status
@@ -73,8 +74,10 @@ def judge_refusal(
 
 def _judge_detail(api: RestInterface, exchange: Exchange, what: str, field: str, shown: str) -> None:
     detail = problem.detail_of(exchange.response)
+    parameters = (item for operation in operations_of(api.run.contract) for item in operation.parameters)
+    called = {field, *(name for item in parameters if item.name == field for name in item.also)}
     for requirement, wanted, named in (
-        ("http/problem-detail", f"the field {field!r}", problem.names(detail, field) if field else True),
+        ("http/problem-detail", f"the field {field!r}", problem.names(detail, *called) if field else True),
         ("http/problem-value", f"the value {shown!r}", shown in detail),
     ):
         if field if requirement.endswith("detail") else shown:

@@ -132,8 +132,8 @@ def page() -> str:
             "",
             f"## {class_}",
             "",
-            "| requirement | level | text | source | checks | faulty robots |",
-            "|---|---|---|---|---|---|",
+            "| requirement | level | origin | text | source | checks | faulty robots |",
+            "|---|---|---|---|---|---|---|",
         ]
         for binding in found:
             item = binding.requirement
@@ -141,6 +141,7 @@ def page() -> str:
                 cells = (
                     f"`{item.id.split('/')[1]}`",
                     item.level,
+                    item.origin,
                     item.text,
                     item.source,
                     _listed(binding.checks) or (f"untestable: {item.untestable}" if item.untestable else ""),

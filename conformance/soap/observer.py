@@ -21,6 +21,8 @@ _ENCODING_STYLE: Final = clark(ENVELOPE, "encodingStyle")
 _MUST_UNDERSTAND: Final = clark(ENVELOPE, "mustUnderstand")
 _FAULT_CHILDREN: Final = frozenset({"faultcode", "faultstring", "faultactor", "detail"})
 _FAULT_CODES: Final = frozenset({"VersionMismatch", "MustUnderstand", "Client", "Server"})
+#: The namespace of SOAP 1.2, as its envelopes have it.
+_SOAP_12: Final = b"http://www.w3.org/2003/05/soap-envelope"
 _CHARSET: Final = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
 _DECLARED: Final = re.compile(rb"""\A(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 PASSIVE: Final = tuple(
@@ -65,7 +67,8 @@ class SoapObserver(Listener):
     def answered(self, exchange: Exchange) -> None:
         """Take an exchange, whatever it is."""
         request, response = exchange.request, exchange.response
-        if request.method != "POST" or request.url not in self._endpoints:
+        if request.method != "POST" or request.url not in self._endpoints or _SOAP_12 in request.body:
+            # A node that has SOAP 1.2 as well answers a request of that version in it.
             return
         self._that("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, exchange, "HTTP/1.1 or HTTP/1.0")
         inside = inside_shown(response.body)

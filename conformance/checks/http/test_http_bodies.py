@@ -73,7 +73,7 @@ def test_charset_parameter(api: RestInterface, judge: Judge) -> None:
             )
 
 
-@pytest.mark.requirement("http/content-too-large", "http/no-server-error")
+@pytest.mark.requirement("http/content-too-large")
 def test_sizes(api: RestInterface, judge: Judge) -> None:
     """64 KiB are taken; more than 10 MiB are answered 413, or the connection is closed."""
     judge.at_risk = ("http/content-too-large",)

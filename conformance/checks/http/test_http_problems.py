@@ -15,7 +15,14 @@ from conformance.robot.stopping import stop_robot
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
-_IDS = ("http/problem-detail", "http/problem-value", "http/problem-type", "http/problem-status", "http/no-traceback")
+_IDS = (
+    "http/problem-detail",
+    "http/problem-value",
+    "http/problem-type",
+    "http/problem-status",
+    "http/no-traceback",
+    "http/no-server-error",
+)
 _TEXT = "roaas-no-number"
 
 

@@ -20,7 +20,6 @@ _IN_ALL = 56
     "http/content-type",
     "http/date",
     "http/framing",
-    "http/no-server-error",
     "http/json-finite",
     "http/json-encoding",
     "http/json-unique-names",

@@ -120,17 +120,16 @@ def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item:
 
 
 @pytest.mark.phase("input")
-@pytest.mark.requirement("http/no-server-error")
+@pytest.mark.requirement("http/declared-status")
 def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
     """A few short walks from operation to operation, as the contract's links lead."""
-    judge.check("http/no-server-error", True, None, "no 5xx on the way")
     if api.run.effort.name == "quick":
         return
     from conformance.rest.generated import as_request, as_thesis, state_machine  # noqa: PLC0415 - as above
 
     machine: Any = state_machine(api.run.contract.openapi)
     if machine is None:
-        judge.note("http/no-server-error", "the contract has no links to walk along")
+        judge.note("http/declared-status", "the contract has no links to walk along")
         return
     guard = MotionGuard(api)
 

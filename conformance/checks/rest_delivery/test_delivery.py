@@ -44,9 +44,7 @@ def test_deliveries(rest: HttpClient, judge: Judge, explore: Explorer) -> None:
         judge.check("rest-delivery/put", 200 <= status < 300, first, "2xx for a delivery")
         if 200 <= status < 300:
             judge.check("rest-delivery/put-no-content", status == 204, first, "204 for a delivery")
-        judge.check(
-            "rest-delivery/put-repeated", status == repeated, again, f"the answer that it had the first time, {status}"
-        )
+            judge.check("rest-delivery/put-repeated", 200 <= repeated < 300, again, "2xx for a delivery sent again")
 
     for code in (3, 4):
         try_delivery(_PAPER._replace(message_code=code))
@@ -69,7 +67,7 @@ def test_numbers_in_any_form(rest: HttpClient, judge: Judge, explore: Explorer) 
         )
 
     explore(lexical_deliveries(), try_forms, cases=60)
-    for text in ("-0.0", "5e-324", "1.7976931348623157e308", "-1.7976931348623157e+308", ".5", "+1", "0", "1e-400"):
+    for text in ("-0.0", "5e-324", "1.7976931348623157e308", "-1.7976931348623157e+308", ".5", "+1", "0"):
         _judge_taken(rest, judge, path_of("3", *[text] * 6), f"2xx for coordinates written {text}")
     for code in ("+3", "04", "+4"):
         _judge_taken(rest, judge, path_of(code, *_VALID[1:]), f"2xx for the code written {code}")
@@ -97,9 +95,11 @@ def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, 
         values[place] = text
         exchange = rest.send("PUT", path_of(*values))
         status = exchange.response.status
+        # Without a number there is an empty segment, which a server may shorten by a redirect.
+        shortened = not text and status in {301, 302, 307, 308}
         judge.check(
             f"rest-delivery/{name}",
-            400 <= status < 500,
+            400 <= status < 500 or shortened,
             exchange,
             f"4xx for {text!r} in the place of {'the code' if place == 0 else 'a coordinate'}",
             cause=f"{text} {exchange.came}",

@@ -120,12 +120,3 @@ def as_delivery(request: Request, forward: Forward) -> Response:
     response = forward(request.copy(body=re.sub(rb"(message_code[^>]*>\s*)[+-]?\d+", rb"\g<1>3", body)))
     response.body = response.body.replace(b"ExecuteDeliveryRequest", b"ExecuteCoffeeRequest")
     return response
-
-
-def narrow_twist(twist: Any) -> None:
-    """A velocity through 32-bit floats."""
-    try:
-        for part, axis in (("linear", "x"), ("angular", "z")):
-            twist[part][axis] = float(float32(repr(float(twist[part][axis]))))
-    except (TypeError, KeyError, ValueError):
-        return

@@ -9,6 +9,7 @@ from conformance.selftest.mutants.changes import (
     VELOCITY,
     altered,
     deliveries,
+    guarded,
     inputs,
     instead,
     plain,
@@ -25,7 +26,6 @@ from conformance.selftest.mutants.distortion import (
     doubled,
     narrow,
     narrow_soap,
-    narrow_twist,
     rounded_soap,
     swapped_soap,
 )
@@ -52,6 +52,11 @@ def _straighter(root: Any) -> None:
         pose.getparent().remove(pose)
     for axis in named(poses[-1], "y")[:1] if poses else []:
         axis.text = repr(float(axis.text) + 0.05)
+
+
+def _halve(twist: Any) -> None:
+    for part, axis in (("linear", "x"), ("angular", "z")):
+        twist[part][axis] = twist[part][axis] / 2
 
 
 def _one_more(items: Any) -> Any:
@@ -107,10 +112,10 @@ MUTANTS = (
     ),
     _rest_delivery("same-order", "A REST delivery is overtaken by the one after it.", "delivery-order", OutOfOrder),
     _rest_state(
-        "same-velocity-narrow",
-        "Velocities go through 32-bit floats.",
+        "same-velocity-halved",
+        "Half of a velocity reaches ROS.",
         "velocity-message",
-        rewritten(rest("PUT", VELOCITY), inputs(narrow_twist)),
+        rewritten(rest("PUT", VELOCITY), inputs(guarded(_halve))),
     ),
     _rest_state(
         "same-sensor-ghost",

@@ -164,8 +164,8 @@ MUTANTS = (
     ),
     _mutant(
         "http-long-target-fine",
-        "A long target is cut, and answered 200.",
-        "uri-too-long",
+        "A long target is answered 200, with something else.",
+        "declared-body",
         instead(_long_target, plain(200, b"{}", JSON)),
     ),
     _mutant(
@@ -232,7 +232,12 @@ MUTANTS = (
         "problem-type",
         altered(_ANY, header("Content-Type", JSON), _errors),
     ),
-    _mutant("http-problem-as-page", "Errors come as a page.", "problem-type", altered(_ANY, _page, _errors)),
+    _mutant(
+        "http-problem-as-page",
+        "Errors come as a page.",
+        ("problem-type", "problem-type-server"),
+        altered(_ANY, _page, _errors),
+    ),
     _mutant(
         "http-problem-other-status",
         "A problem's status is always 400.",

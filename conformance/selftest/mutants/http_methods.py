@@ -66,6 +66,10 @@ def _allow(edit: Callable[[list[str]], list[str]]) -> Callable[[Response], None]
     return apply
 
 
+def _strange(request: Request) -> bool:
+    return _ANY(request) and request.method in {"FOO", "PROPFIND"}
+
+
 def _missing_slash(request: Request) -> bool:
     return request.side == "rest" and not request.path.endswith("/") and f"{request.path}/" in RESOURCES
 
@@ -144,7 +148,7 @@ MUTANTS = (
     _mutant(
         "http-crash-sometimes",
         "One answer in 50 is 502.",
-        "no-server-error",
+        "declared-status",
         altered(_GET, becomes(502), anything, nth=50),
     ),
     _mutant(
@@ -164,11 +168,26 @@ MUTANTS = (
         altered(_ANY, becomes(404), status(405)),
     ),
     _mutant(
+        "http-unknown-method-404",
+        "A method that nobody knows is 404.",
+        "unknown-method",
+        altered(_strange, becomes(404), anything),
+    ),
+    _mutant(
+        "http-unknown-method-reads",
+        "A method that nobody knows is taken for GET.",
+        "unknown-method-refused",
+        lambda: lambda request, forward: forward(request.copy(method="GET") if _strange(request) else request),
+    ),
+    _mutant(
         "http-405-without-allow", "405 comes without Allow.", "allow", altered(_ANY, header("Allow", None), status(405))
     ),
     _mutant("http-no-head", "HEAD is 405.", "head", instead(_HEAD, plain(405, b"", "", ("Allow", "GET, OPTIONS")))),
     _mutant(
-        "http-head-other-type", "HEAD says text/html.", "head", altered(_HEAD, header("Content-Type", "text/html"))
+        "http-head-other-type",
+        "HEAD says text/html.",
+        "head-content-type",
+        altered(_HEAD, header("Content-Type", "text/html")),
     ),
     _mutant("http-head-with-body", "HEAD is answered with a body.", "head-no-body", lambda: _with_body),
     _mutant(

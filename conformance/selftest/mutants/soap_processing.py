@@ -151,16 +151,16 @@ MUTANTS = (
     _mutant(
         "bp-acts-all-the-same",
         "A request that is answered MustUnderstand is carried out.",
-        "R1028",
+        ("R1025", "R1028"),
         lambda: _acts_all_the_same,
         observer=True,
     ),
     _mutant(
-        "bp-empty-action-only",
-        "A SOAPAction that is not empty is a fault.",
+        "bp-no-empty-action",
+        "An empty SOAPAction is a fault.",
         "R1109",
         instead(
-            lambda request: posted(request) and len(request.field("SOAPAction") or "") > 2,
+            lambda request: posted(request) and len(request.field("SOAPAction") or "") == 2,
             fault("Client", "The given SOAPAction does not match an operation."),
         ),
     ),

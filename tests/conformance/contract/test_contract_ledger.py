@@ -39,10 +39,12 @@ def test_rules_of_the_basic_profile_for_descriptions(name):
     "text",
     [
         "[http.x]\nlevel = 'MUST'\ntext = 'A.'\n",
-        "[http.x]\nlevel = 'WILL'\ntext = 'A.'\nsource = 's'\n",
-        "[dance.x]\nlevel = 'MUST'\ntext = 'A.'\nsource = 's'\n",
-        "[http.x]\nlevel = 'MUST'\ntext = 'A.'\nsource = 's'\nneeds = ['luck']\n",
-        "[http.x]\nlevel = 'MUST'\ntext = 'A.'\nsource = 's'\nweight = 1\n",
+        "[http.x]\nlevel = 'WILL'\ntext = 'A.'\nsource = 's'\norigin = 'norm'\n",
+        "[dance.x]\nlevel = 'MUST'\ntext = 'A.'\nsource = 's'\norigin = 'norm'\n",
+        "[http.x]\nlevel = 'MUST'\ntext = 'A.'\nsource = 's'\norigin = 'norm'\nneeds = ['luck']\n",
+        "[http.x]\nlevel = 'MUST'\ntext = 'A.'\nsource = 's'\norigin = 'norm'\nweight = 1\n",
+        "[http.x]\nlevel = 'MUST'\ntext = 'A.'\nsource = 's'\n",
+        "[http.x]\nlevel = 'MUST'\ntext = 'A.'\nsource = 's'\norigin = 'hearsay'\n",
         "[http",
     ],
 )

@@ -46,6 +46,28 @@ def test_good_answers_raise_no_alarm():
     assert seen("PUT", "/robot/velocity/", None, problem="connection closed without an answer") == set()
 
 
+@pytest.mark.parametrize(
+    ("method", "path", "status", "body"),
+    [
+        ("FOO", "/robot/pose/", 400, b""),
+        ("GET", "/robot//pose/", 404, b"<html>"),
+        ("GET", "/elsewhere", 404, b"<html>"),
+        ("GET", "/robot/pose/", 406, b""),
+    ],
+)
+def test_what_a_server_answers_by_itself_need_not_be_a_problem(method, path, status, body):
+    headers = [DATE, ("Content-Type", "text/html")] if body else [DATE]
+    assert seen(method, path, status, headers, body, sent=(("Accept", "image/png"),)) == {"http/problem-type-server"}
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"), [(b"{", {"http/no-server-error"}), (json.dumps(TWIST).encode(), {"http/declared-status"})]
+)
+def test_a_crash_is_judged_by_what_was_sent(content, expected):
+    sent = (("Accept", "*/*"), ("Content-Type", "application/json; charset=utf-8"))
+    assert seen("PUT", "/robot/velocity/", 500, [PROBLEM], b"{}", sent=sent, content=content) == expected
+
+
 def test_what_went_elsewhere_is_nobody_s_affair():
     api = RestInterface(Run(), HttpClient(BASE, Connection()))
     Observer(api).answered(Exchange(Request("GET", "http://robot:7003/r2d2/x"), Response(500, (), b"", 1.0)))
@@ -71,8 +93,8 @@ def test_what_went_elsewhere_is_nobody_s_affair():
         ),
         (202, [DATE, VARY, JSON], json.dumps(TWIST), {"http/declared-status"}),
         (404, [DATE, PROBLEM], '{"status": 404, "detail": "x"}', {"http/declared-status"}),
-        (500, [DATE, PROBLEM], '{"status": 500}', {"http/no-server-error"}),
-        (503, [DATE, PROBLEM], '{"status": 503, "detail": "x"}', {"http/no-server-error"}),
+        (500, [DATE, PROBLEM], '{"status": 500}', {"http/declared-status"}),
+        (503, [DATE, PROBLEM], '{"status": 503, "detail": "x"}', {"http/declared-status"}),
     ],
 )
 def test_bad_answers_to_get(status, headers, body, expected):

@@ -4,7 +4,7 @@ import datetime as dt
 
 import pytest
 
-from conformance.contract.classes import Level
+from conformance.contract.classes import Level, Origin
 from conformance.contract.ledger import Requirement
 from conformance.verdict.baseline import BaselineError, Expectation, apply_baseline, load_baseline
 from conformance.verdict.evidence import Evidence
@@ -14,7 +14,7 @@ _TODAY = dt.date(2026, 11, 20)
 
 
 def _applied(value, expires):
-    requirement = Requirement("http/date", "http", Level.MUST, "A text.", "RFC")
+    requirement = Requirement("http/date", "http", Level.MUST, "A text.", "RFC", Origin.NORM)
     entry = Expectation("http/date", "ticket 7", dt.date.fromisoformat(expires))
     return apply_baseline([Verdict(requirement, Value(value), "why", Evidence())], [entry], _TODAY)[0]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.contract.classes import Level
+from conformance.contract.classes import Level, Origin
 from conformance.contract.ledger import Requirement
 from conformance.verdict.evidence import MAX_FINDINGS, Evidence, Judge
 from conformance.verdict.verdicts import class_verdicts, overall, verdict_of
@@ -11,7 +11,7 @@ _CLAIMS = ("http",)
 
 
 def _requirement(level="MUST", name="x", **fields) -> Requirement:
-    return Requirement(f"http/{name}", "http", Level(level), "A text.", "RFC", **fields)
+    return Requirement(f"http/{name}", "http", Level(level), "A text.", "RFC", Origin.NORM, **fields)
 
 
 def _evidence(*, cases=0, failing=False, skips=(), errors=()) -> Evidence:
