@@ -80,6 +80,8 @@ def certify(
     if interrupted:
         run.aborted = "the run was interrupted"
         remarks.append("The run was interrupted; what follows is what was judged until then.")
+    if run.effort.speed.remark:
+        remarks.append(run.effort.speed.remark)
     verdicts = draw_verdicts(run, baseline)
     classes = class_verdicts(verdicts, run.claims)
     document = result_document(

@@ -71,6 +71,11 @@ def result_document(
         },
         "seed": run.seed,
         "effort": run.effort.name,
+        "speed": {
+            "class": run.effort.speed.name,
+            "usual_ms": round(run.effort.usual_ms, 3),
+            "share_of_cases": run.effort.speed.share,
+        },
         "command": command,
         "started": _rfc3339(started),
         "finished": _rfc3339(finished),

@@ -11,7 +11,6 @@ from conformance.contract.interfaces import Interface
 from conformance.rest.interface import RestInterface, plain_path
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
-from conformance.verdict.effort import Effort
 
 if TYPE_CHECKING:
     from conformance.robot.interfaces import Interfaces
@@ -20,8 +19,12 @@ if TYPE_CHECKING:
 
 # How long a robot that stopped answering is given to come back before the rest of the run is called off, s.
 _GRACE_S = 3.0
-# How many answers tell how fast a robot usually is.
-_LOOKS = 3
+# A robot that answers slowly gets longer, as many answers.
+_GRACE_ANSWERS = 10
+# How many answers tell how fast a robot usually is, and how many do where all of them would take longer than this, s.
+_LOOKS = 11
+_FEWEST_LOOKS = 5
+_LOOKING_S = 1.0
 
 
 @dataclass
@@ -94,24 +97,22 @@ class RobotUnderTest:
 
     def _look(self, name: Interface, client: HttpClient, path: str) -> None:
         """Put an interface down as unreachable unless it answers something, and see how fast it answers."""
-        run, times = self.run, []
+        run = self.run
+        times: list[float] = []
         # Should the resource hang, another one may not: that is one broken resource, not a robot that is not there.
-        for method, target in (("GET", path), ("GET", path), ("GET", path), ("OPTIONS", path), ("GET", "/")):
+        for method, target in (("GET", path), ("GET", path), ("OPTIONS", path), ("GET", "/")):
             try:
-                answer = client.send(method, target).response
+                while len(times) < _FEWEST_LOOKS or (len(times) < _LOOKS and sum(times) < 1000 * _LOOKING_S):
+                    times.append(client.send(method, target).response.elapsed_ms)
+                break
             except NoAnswerError as none:
                 run.unreachable[name] = str(none)
                 if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS}:
                     return
-                continue
-            run.unreachable.pop(name, None)
-            times.append(answer.elapsed_ms)
-            if len(times) == _LOOKS:
-                break
         if times:
             run.unreachable.pop(name, None)
-            usual = max(run.effort.usual_ms, statistics.median(times))
-            run.effort = Effort(run.effort.name, usual, run.effort.minutes)
+            run.effort = run.effort.seen(statistics.median(times))
+            self.connection.pace.usual_s = run.effort.usual_ms / 1000
 
     def has(self, name: Interface) -> bool:
         """Whether an interface has an address."""
@@ -124,14 +125,15 @@ class RobotUnderTest:
 
     def alive(self) -> bool:
         """Whether the robot answers HTTP at all, on any interface that it answered at the start."""
-        until = time.monotonic() + _GRACE_S
+        grace_s = _GRACE_S + _GRACE_ANSWERS * self.connection.pace.usual_s
+        until = time.monotonic() + grace_s
         clients = self._answering()
         while True:
             for client, path in clients:
                 # Several targets, so that an endpoint known to hang is no reason to call the robot dead.
                 for method, target in (("GET", path), ("OPTIONS", path), ("GET", "/")):
                     try:
-                        client.send(method, target, fresh=True, timeout_s=min(_GRACE_S, self.connection.timeout_s))
+                        client.send(method, target, fresh=True, timeout_s=min(grace_s, self.connection.timeout_s))
                     except NoAnswerError as none:
                         if none.kind is NoAnswer.REFUSED:
                             break

@@ -3,7 +3,7 @@
 import re
 import ssl
 import time
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,10 +13,13 @@ import httpcore
 
 from conformance.transport.deadlines import MAX_ANSWER, DeadlineBackend, set_deadline, tls_context
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, NoAnswerError, Request, Response, Unanswered
+from conformance.transport.pace import Pace, time_for
 
 Headers = tuple[tuple[str, str], ...]
-# An endpoint that has let this many deadlines pass is not asked again: a hang costs its deadline twice at most.
+# An endpoint that has let this many deadlines pass within this time, s, is not asked until that is over: a hang costs
+# its deadline twice in that time at most, and a link that was gone twice in a long run is none.
 _HANGS = 2
+_HANGS_WITHIN_S = 60.0
 # A server may close an idle connection at any time (RFC 9112 9.3.1): a request that met the end of one is sent again.
 # From a server that has kept connections open this often, so many closed ones are dropped requests, and told as such.
 _KEPT = 10
@@ -34,6 +37,7 @@ class Connection:
         request_rate: ceiling in requests per second, or None.
         listeners: told what became of every request.
         sent: how many requests have been sent.
+        pace: how fast the robot answers.
     """
 
     timeout_s: float = 10.0
@@ -42,6 +46,7 @@ class Connection:
     request_rate: float | None = None
     listeners: list[Listener] = field(default_factory=list)
     sent: int = 0
+    pace: Pace = field(default_factory=Pace)
     _next_slot: float = 0.0
 
     def tls(self) -> ssl.SSLContext:
@@ -76,7 +81,7 @@ class HttpClient:
         self.port = parts.port or (443 if parts.scheme == "https" else 80)
         self.prefix = parts.path
         self.authority = parts.netloc.rsplit("@", 1)[-1]
-        self._hangs: Counter[str] = Counter()
+        self._hangs: defaultdict[str, list[float]] = defaultdict(list)
         self._kept = 0
         self._dropped = 0
         self._pool = self._new_pool()
@@ -113,7 +118,7 @@ class HttpClient:
             body: octets; Content-Length is added for it, and for every PUT, POST and PATCH.
             fresh: use a connection of its own, closed afterwards: nothing is ever sent twice.
             authorized: whether to send the token, where there is one.
-            timeout_s: another deadline than the run's.
+            timeout_s: another deadline than the run's; more for what is sent and received is always given.
 
         Raises:
             NoAnswerError: no HTTP response came.
@@ -126,19 +131,21 @@ class HttpClient:
             shown += (("Authorization", "Bearer $ROAAS_TOKEN"),)
         request = Request(method, f"{self.scheme}://{self.authority}{self.prefix}{path}", shown, body)
         endpoint = f"{method} {_shape(path)}"
-        if self._hangs[endpoint] >= _HANGS:
+        if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
             problem = f"not asked: {endpoint} has not answered {_HANGS} times"
             raise NoAnswerError(Unanswered(request, problem, NoAnswer.CIRCUIT_OPEN))
-        deadline = timeout_s or self.connection.timeout_s
+        deadline = (timeout_s or self.connection.timeout_s) + time_for(len(body))
         try:
             response = self._exchange(method, path, sent, body, deadline, fresh=fresh)
         except _SilenceError as none:
             if none.kind is NoAnswer.TIMEOUT:
-                self._hangs[endpoint] += 1
+                self._hangs[endpoint].append(time.monotonic())
+                self.connection.pace.took(deadline, len(body))
             unanswered = Unanswered(request, str(none), none.kind)
             for listener in self.connection.listeners:
                 listener.unanswered(unanswered)
             raise NoAnswerError(unanswered) from none
+        self.connection.pace.took(response.elapsed_ms / 1000, len(body) + len(response.body))
         exchange = Exchange(request, response)
         for listener in self.connection.listeners:
             listener.answered(exchange)
@@ -239,7 +246,7 @@ def _no_answer(error: Exception, deadline: float) -> _SilenceError:
     """Sort what went wrong on the wire; anything that is no network error is the suite's own and is raised again."""
     text = str(error) or type(error).__name__
     if isinstance(error, httpcore.TimeoutException):
-        return _SilenceError(f"no answer within {deadline:g} s", NoAnswer.TIMEOUT)
+        return _SilenceError(f"no answer within {deadline:.3g} s", NoAnswer.TIMEOUT)
     if isinstance(error, httpcore.RemoteProtocolError):
         if "disconnected" in text:
             return _SilenceError("connection closed without an answer", NoAnswer.CLOSED)

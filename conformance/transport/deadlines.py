@@ -13,13 +13,15 @@ from typing import Any
 
 import httpcore
 
+from conformance.transport.pace import time_for
+
 # An answer longer than this is no answer to any request of the contract.
 MAX_ANSWER = 32 * 1024 * 1024
 _clock = threading.local()
 
 
 def set_deadline(seconds: float) -> None:
-    """Give the exchange that this thread starts now ``seconds`` until its last octet."""
+    """Give the exchange that this thread starts now ``seconds`` until its last octet, and more for each that comes."""
     _clock.at = time.monotonic() + seconds
 
 
@@ -37,7 +39,9 @@ class _DeadlineStream(httpcore.NetworkStream):
         self._stream = stream
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        return self._stream.read(max_bytes, _left(timeout, httpcore.ReadTimeout))
+        octets = self._stream.read(max_bytes, _left(timeout, httpcore.ReadTimeout))
+        _clock.at = float(getattr(_clock, "at", float("inf"))) + time_for(len(octets))
+        return octets
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         self._stream.write(buffer, _left(timeout, httpcore.WriteTimeout))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
+from conformance.transport.pace import time_for
 
 _STATUS_LINE = re.compile(rb"HTTP/1\.([01]) (\d{3})(?: [^\r\n]*)?")
 _FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*([^\r\n]*?)[ \t]*")
@@ -63,13 +64,13 @@ def talk(client: HttpClient, octets: bytes, *, timeout_s: float | None = None, a
     Args:
         client: which robot.
         octets: what to send.
-        timeout_s: deadline for all of it; by default the run's.
+        timeout_s: deadline for all of it, and more for each octet; by default the run's.
         answers: stop when so many whole answers to GET have come; 0: only at the end.
 
     Raises:
         NoAnswerError: there is no connection.
     """
-    deadline = time.monotonic() + (timeout_s or client.connection.timeout_s)
+    deadline = time.monotonic() + (timeout_s or client.connection.timeout_s) + time_for(len(octets))
     client.connection.take_slot()
     started = time.perf_counter()
     request = shown(client, octets)
@@ -100,6 +101,7 @@ def talk(client: HttpClient, octets: bytes, *, timeout_s: float | None = None, a
                 closed = True
                 break
             received += piece
+            deadline += time_for(len(piece))
             if answers and _whole(bytes(received), answers):
                 break
     return RawAnswer(bytes(received), closed, sent_all, (time.perf_counter() - started) * 1000)

@@ -20,7 +20,6 @@ from conformance.rest.snapshot import changed, changes_by_itself, flatten, stead
 from conformance.rest.statuses import is_refusal
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
 
@@ -91,7 +90,7 @@ def test_what_changes_is_told_from_what_is_steady(api, library):
 
 def test_a_slow_robot_is_asked_less(api):
     assert api.run.effort.subsample(range(10), 3) == list(range(10))
-    api.run.effort = Effort("standard", usual_ms=300)
+    api.run.effort = api.run.effort.seen(usual_ms=300)
     assert api.run.effort.subsample(range(10), 3) == [0, 3, 6]
     assert len(api.run.effort.draw(range(100), 50, "0/name")) == 3
     assert api.run.effort.draw(range(100), 50, "0/name") == api.run.effort.draw(range(100), 50, "0/name")

@@ -48,6 +48,15 @@ def test_a_hanging_endpoint_costs_its_deadline_twice_at_most(listening):
     assert time.monotonic() - started < _DEADLINE
 
 
+def test_an_endpoint_that_hung_a_while_ago_is_asked_again(listening, monkeypatch):
+    client = _client(listening(lambda connection: (_head(connection), time.sleep(5))))
+    monkeypatch.setattr("conformance.transport.client._HANGS_WITHIN_S", 0.0)
+    for _ in range(3):
+        with pytest.raises(NoAnswerError, match="within") as error:
+            client.send("GET", "/slow/17")
+        assert error.value.kind == "timeout"
+
+
 @pytest.mark.parametrize(
     ("answer", "kind", "told"),
     [

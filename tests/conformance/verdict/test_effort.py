@@ -1,0 +1,39 @@
+"""How much is tried depends on how fast a robot answers, by classes and not by chance."""
+
+import pytest
+
+from conformance.verdict.effort import SPEEDS, Effort
+
+
+@pytest.mark.parametrize(
+    ("usual_ms", "speed"),
+    [
+        (0.4, "local"),
+        (31, "local"),
+        (32, "near"),
+        (60, "near"),
+        (140, "near"),
+        (200, "far"),
+        (600, "far"),
+        (2e3, "slow"),
+    ],
+)
+def test_robots_are_classed_by_how_fast_they_answer(usual_ms, speed):
+    assert Effort().seen(usual_ms).speed.name == speed
+
+
+def test_a_class_is_left_only_when_its_bound_is_clearly_passed_and_never_for_a_faster_one():
+    effort = Effort().seen(60)
+    assert [effort.seen(one).speed.name for one in (1, 129, 161, 164)] == ["near", "near", "near", "far"]
+
+
+def test_robots_of_one_class_get_the_same_cases():
+    assert {Effort().seen(usual_ms).cases(200) for usual_ms in (35, 60, 90, 160)} == {40}
+    assert Effort("quick").seen(300).cases(100) == 3
+
+
+def test_what_was_left_out_is_told_with_the_class_and_no_figure_of_this_run():
+    assert Effort().seen(3).speed.remark == ""
+    assert Effort().seen(50).speed.remark == Effort().seen(70).speed.remark
+    assert "one in 5" in Effort().seen(50).speed.remark
+    assert "more than about 800 ms" in SPEEDS[-1].remark
