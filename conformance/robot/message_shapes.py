@@ -14,10 +14,12 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
 from conformance.transport.exchange import Response
 
+_ANSWERS: Final = {operation.id: operation.shape for operation in operations_of(Contract.load())}
+
 
 def _answer_of(operation_id: str) -> Schema:
     """The schema of what an operation of the contract answers where it succeeds."""
-    schema = next(item.shape for item in operations_of(Contract.load()) if item.id == operation_id)
+    schema = _ANSWERS[operation_id]
     if schema is None:
         raise ValueError(f"{operation_id} answers nothing")
     return schema

@@ -120,13 +120,15 @@ def _problem(path: _Path, before: Pose, after: Pose, target: Pose, frame: str) -
 
 
 @pytest.mark.requirement("soap-subscribers/plan-none")
-def test_no_plan(subscribers: SoapService, judge: Judge) -> None:
+def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> None:
     """Where there can be no plan, the answer is a fault: far outside any map, and in a frame that nobody knows."""
     expected = soap_services.declared_return(subscribers, "GetPlan")
+    # Where the robot is, so that nothing but the frame can be the reason.
+    here = _here(soap, subscribers) or Pose(0.0, 0.0, 0.0)
     for message, what in (
         (delivery_messages.request("GetPlan", x=1e7, y=-1e7), "a position 10,000 km away"),
         (
-            delivery_messages.request("GetPlan", x=0.0, y=0.0, frame_id="no_such_frame"),
+            delivery_messages.request("GetPlan", x=here.x, y=here.y, frame_id="no_such_frame"),
             "a frame that the robot does not know",
         ),
     ):
