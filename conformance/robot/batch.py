@@ -1,17 +1,20 @@
 """Deliveries sent one after another over both interfaces, and what arrived of each."""
 
+import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Final
 
 from conformance.contract.delivery import COFFEE
 from conformance.robot.deliveries_seen import DeliveryObserver, Seen
 from conformance.robot.delivery import Delivery, path_of
-from conformance.robot.soap_services import send_delivery
+from conformance.robot.soap_services import delivery_outgoing, send_delivery
 from conformance.soap.service import SoapService
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
+from conformance.transport.parallel import Outgoing, send_together
 from conformance.verdict.evidence import Judge
 
 REQUIREMENT: Final = {
@@ -19,7 +22,14 @@ REQUIREMENT: Final = {
     "soap": "equivalence/delivery-soap",
     "coffee": "equivalence/coffee-soap",
     "same": "equivalence/delivery-same",
+    "twice": "equivalence/delivery-repeated",
 }
+_TOGETHER: Final = "equivalence/delivery-concurrent"
+_ONLY: Final = "equivalence/delivery-only"
+# Orders of which each makes two messages.
+_TWO: Final = {"same": ["rest", "soap"], "twice": ["rest", "rest"]}
+# Of what nobody asked for in so many batches, nobody but the robot can be the author.
+_OFTEN: Final = 2
 
 
 @dataclass(frozen=True)
@@ -27,7 +37,7 @@ class Order:
     """One delivery to be sent.
 
     Attributes:
-        how: rest, soap, coffee, or same: over REST and then over SOAP.
+        how: rest, soap, coffee, same (over REST and then over SOAP), or twice (the same request over REST again).
         delivery: its values.
         written: the same for a path.
     """
@@ -46,7 +56,7 @@ class _Sent:
 
 
 class Batch:
-    """Sends orders and judges what became of them.
+    """Sends orders and judges what became of them, batch by batch.
 
     Args:
         rest, publishers: the interfaces.
@@ -57,21 +67,45 @@ class Batch:
     def __init__(self, rest: HttpClient, publishers: SoapService, observer: DeliveryObserver, judge: Judge) -> None:
         self._rest, self._publishers = rest, publishers
         self._observer, self._judge = observer, judge
+        # What was sent in earlier batches, by its key; how many batches had messages that nobody asked for.
+        self._earlier: dict[bytes, Exchange] = {}
+        self._strange = 0
+        observer.mark()
 
     def run(self, orders: Sequence[Order]) -> bool:
         """Send the orders, then judge each; whether all was well.
 
-        Orders must differ in their values: by them they are known again.
+        Orders must differ in their values, also from those of earlier batches: by them they are known again.
         """
-        self._observer.mark()
         sent = [one for order in orders for one in self._send(order)]
         accepted = [one for one in sent if one.exchange.response.ok]
         seen = self._observer.collect(len(accepted))
-        return self._judge_each(accepted, seen) & self._judge_order(accepted, seen)
+        well = self._judge_each(accepted, seen) & self._judge_order(accepted, seen)
+        return self._judge_only(accepted, seen, maybe=frozenset()) and well
+
+    def run_together(self, rounds: Sequence[Sequence[tuple[str, Delivery]]]) -> bool:
+        """Send deliveries by (how, values), those of a round at one moment, then judge each; whether all was well."""
+        outgoing = [[self._outgoing(how, delivery) for how, delivery in turn] for turn in rounds]
+        attempts = send_together(outgoing)
+        sent, maybe = [], set()
+        for (how, delivery), attempt in zip(chain(*rounds), chain(*attempts), strict=True):
+            if not isinstance(attempt, Exchange):
+                # Nobody knows what became of it: a robot that closes a connection may have read the request.
+                maybe.add(self._key(delivery))
+            elif attempt.response.ok:
+                sent.append(_Sent(how, "rest" if how == "rest" else "soap", delivery, attempt))
+        seen = self._observer.collect(len(sent))
+        well = self._judge_each(sent, seen, _TOGETHER)
+        return self._judge_only(sent, seen, maybe=frozenset(maybe)) and well
+
+    def finish(self, watched_s: float) -> None:
+        """Judge what arrives later than it should, for so long, s."""
+        time.sleep(watched_s)
+        self._judge_only([], self._observer.collect(0), maybe=frozenset())
 
     def _send(self, order: Order) -> list[_Sent]:
         delivery, sent = order.delivery, []
-        if order.how in {"rest", "same"}:
+        for _ in range({"rest": 1, "same": 1, "twice": 2}.get(order.how, 0)):
             # On a connection of its own, so that nothing is sent again.
             exchange = self._rest.send("PUT", path_of(*order.written), fresh=True)
             sent.append(_Sent(order.how, "rest", delivery, exchange))
@@ -82,13 +116,18 @@ class Batch:
             sent.append(_Sent("coffee", "soap", delivery, send_delivery(self._publishers, delivery, coffee=True)))
         return sent
 
+    def _outgoing(self, how: str, delivery: Delivery) -> Outgoing:
+        if how == "rest":
+            return Outgoing(self._rest, "PUT", delivery.rest_path)
+        return delivery_outgoing(self._publishers, delivery, coffee=how == "coffee")
+
     def _key(self, delivery: Delivery) -> bytes:
         """What a delivery is known by: all its bits, or its values where the observer does not see the sign of zero."""
         if not self._observer.exact:
             delivery = type(delivery)(delivery.message_code, *(value + 0.0 for value in delivery[1:]))
         return delivery.bits
 
-    def _judge_each(self, sent: list[_Sent], seen: list[Seen]) -> bool:
+    def _judge_each(self, sent: list[_Sent], seen: list[Seen], requirement: str = "") -> bool:
         arrived = Counter(self._key(one.delivery) for one in seen)
         asked = Counter(self._key(one.delivery) for one in sent)
         strangers = [one.delivery for one in seen if self._key(one.delivery) not in asked]
@@ -100,12 +139,10 @@ class Batch:
             problem = ""
             if count != wanted:
                 problem = f"{count} instead of {wanted}" if count or not strangers else f"not it, but {strangers[0]}"
-            elif any(interfaces) and one.how != "same" and interfaces != [one.interface]:
-                problem = f"one by {', '.join(interfaces)}"
-            elif any(interfaces) and one.how == "same" and interfaces != ["rest", "soap"]:
-                problem = f"two by {' and '.join(interfaces)}"
+            elif any(interfaces) and interfaces != _TWO.get(one.how, [one.interface])[: len(interfaces)]:
+                problem = f"{count} by {' and '.join(interfaces)}"
             well &= self._judge.check(
-                REQUIREMENT[one.how],
+                requirement or REQUIREMENT[one.how],
                 not problem,
                 one.exchange,
                 f"exactly one message for each accepted request, {one.delivery}",
@@ -114,11 +151,32 @@ class Batch:
             )
         return well
 
+    def _judge_only(self, sent: list[_Sent], seen: list[Seen], maybe: frozenset[bytes]) -> bool:
+        """Judge what arrived beside that which was just sent: an earlier delivery again, or one of nobody's.
+
+        A robot may have other clients: what nobody here asked for is held against it only when it comes repeatedly.
+        """
+        known = {self._key(one.delivery): one.exchange for one in sent}
+        others = [one.delivery for one in seen if self._key(one.delivery) not in known.keys() | maybe]
+        again = [delivery for delivery in others if self._key(delivery) in self._earlier]
+        self._strange += len(again) < len(others)
+        self._earlier |= known
+        blamed = again or (others if self._strange >= _OFTEN else [])
+        exchange = self._earlier.get(self._key(blamed[0])) if blamed else next(iter(known.values()), None)
+        return self._judge.check(
+            _ONLY,
+            not blamed,
+            exchange,
+            "no message beside the one for each accepted request",
+            found=f"{'once more, and later' if again else 'from nobody'}: {blamed[0]}" if blamed else "",
+            cause="later" if again else "from nobody",
+        )
+
     def _judge_order(self, sent: list[_Sent], seen: list[Seen]) -> bool:
         """What was sent over one interface arrives in that order; two interfaces may have a publisher each."""
         well = True
         for interface in ("rest", "soap"):
-            wanted = [self._key(one.delivery) for one in sent if one.interface == interface and one.how != "same"]
+            wanted = [self._key(one.delivery) for one in sent if one.interface == interface and one.how not in _TWO]
             found = [key for key in (self._key(one.delivery) for one in seen) if key in wanted]
             there = [key for key in wanted if key in found]
             last = next((one for one in sent if one.interface == interface), None)

@@ -44,7 +44,10 @@ class DeliveryObserver(Protocol):
         """Forget what was seen so far."""
 
     def collect(self, count: int) -> list[Seen]:
-        """What was seen since the mark, oldest first, after waiting for ``count`` and a little longer."""
+        """What was seen since the mark, or since this was asked last; oldest first.
+
+        Waits for ``count`` of them, and a little longer.
+        """
 
 
 class NoObserverError(Exception):
@@ -73,14 +76,16 @@ class ListObserver:
     def collect(self, count: int) -> list[Seen]:
         """See DeliveryObserver."""
         until = time.monotonic() + _ARRIVES_S + 4 * self._slow_s
-        while len(self._new()) < count and time.monotonic() < until:
+        while len(self._new(self._listed())) < count and time.monotonic() < until:
             time.sleep(_STEP_S)
         time.sleep(_QUIET_S)
-        return [Seen(Delivery.of(entry["request"]), entry["interface"]) for entry in reversed(self._new())]
-
-    def _new(self) -> list[Any]:
-        """The entries that the list had not at the mark, newest first: those before the first old one."""
         listed = self._listed()
+        new = self._new(listed)
+        self._before = listed
+        return [Seen(Delivery.of(entry["request"]), entry["interface"]) for entry in reversed(new)]
+
+    def _new(self, listed: list[Any]) -> list[Any]:
+        """The entries that the list had not before, newest first: those before the first old one."""
         now, old = [_identity(entry) for entry in listed], [_identity(entry) for entry in self._before]
         for count in range(len(now)):
             rest = now[count:]

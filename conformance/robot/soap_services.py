@@ -17,8 +17,10 @@ from conformance.robot.delivery import Delivery
 from conformance.robot.delivery_messages import NAMESPACE, delivery, request
 from conformance.soap.calls import call, read_exchange
 from conformance.soap.content import number_at
-from conformance.soap.service import SoapService
+from conformance.soap.envelope import envelope
+from conformance.soap.service import MEDIA_TYPE, SoapService
 from conformance.transport.exchange import Exchange
+from conformance.transport.parallel import Outgoing
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -38,6 +40,19 @@ def send_delivery(publishers: SoapService, values: Delivery, *, coffee: bool = F
     operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
     given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
     return call(publishers, request(operation, **given), fresh=True).exchange
+
+
+def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Outgoing:
+    """The same as a request that is to be sent beside others."""
+    operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
+    given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
+    return outgoing(publishers, request(operation, **given))
+
+
+def outgoing(service: SoapService, payload: Node) -> Outgoing:
+    """A call that is to be sent beside others."""
+    headers = (("Content-Type", MEDIA_TYPE), ("SOAPAction", '""'))
+    return Outgoing(service.client, "POST", service.path, headers, envelope((payload,)).written())
 
 
 def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> Exchange:

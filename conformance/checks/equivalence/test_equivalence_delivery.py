@@ -3,10 +3,11 @@
 import pytest
 from hypothesis import strategies as st
 
+from conformance.contract.delivery import COFFEE, COURIER
 from conformance.rest.interface import RestInterface
 from conformance.robot.batch import Batch, Order
 from conformance.robot.deliveries_seen import NoObserverError, observer_of
-from conformance.robot.delivery import lexical_deliveries
+from conformance.robot.delivery import Delivery, lexical_deliveries
 from conformance.robot.probe.client import ProbeError, RosProbe
 from conformance.soap.service import SoapService
 from conformance.verdict.evidence import Judge
@@ -17,6 +18,18 @@ pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest", "publishe
 _ORDERS = 12
 _ENOUGH = 3
 _KINDS = ("same", "rest", "soap", "coffee")
+# Where a double or an integer ends; by their places the values stay different from each other.
+_CORNERS = (
+    ("twice", (3, 0.5, -0.0, 1.0, 5e-324, -5e-324, 2.2250738585072009e-308)),
+    ("rest", (3, -0.0, -5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, -1.7976931348623157e308, 0.1)),
+    ("soap", (4, 5e-324, -0.0, -2.2250738585072009e-308, 1e23, 9007199254740993.0, -0.1)),
+    ("same", (4, 0.30000000000000004, 123456789.123456789, -0.0, 1e-300, 1e300, 5e-324)),
+)
+_CLIENTS = 8
+# So many rounds of clients at once make no more messages than a robot's list holds for certain.
+_ROUNDS = 3
+# How long what comes too late is waited for, s: at any effort, and at quick.
+_LATER_S = (2.0, 0.6)
 
 
 @pytest.mark.requirement(
@@ -25,11 +38,14 @@ _KINDS = ("same", "rest", "soap", "coffee")
     "equivalence/coffee-soap",
     "equivalence/delivery-same",
     "equivalence/delivery-order",
+    "equivalence/delivery-repeated",
+    "equivalence/delivery-concurrent",
+    "equivalence/delivery-only",
 )
 def test_deliveries_arrive(
     api: RestInterface, publishers: SoapService, probe: RosProbe, judge: Judge, explore: Explorer
 ) -> None:
-    """Batches of deliveries over REST and SOAP, of any values, arrive one by one, unchanged and in order."""
+    """Deliveries over REST and SOAP, of any values, arrive once, unchanged and in order; also those of many clients."""
     try:
         batch = Batch(api.client, publishers, observer_of(api, probe), judge)
         failed: list[list[Order]] = []
@@ -39,9 +55,39 @@ def test_deliveries_arrive(
             if len(failed) < _ENOUGH and not batch.run(orders):
                 failed.append(orders)
 
+        batch.run([_order(how, Delivery(*values)) for how, values in _CORNERS])
         explore(_batches(), try_batch, cases=12)
+        for turn in range(api.run.effort.cases(8)):
+            if len(failed) < _ENOUGH and not batch.run_together(_crowd(turn)):
+                failed.append([])
+        batch.finish(_LATER_S[api.run.effort.name == "quick"])
     except (NoObserverError, ProbeError) as nobody:
         pytest.skip(str(nobody))
+
+
+def _order(how: str, delivery: Delivery) -> Order:
+    return Order(how, delivery, (str(delivery.message_code), *map(repr, delivery[1:])))
+
+
+def _crowd(turn: int) -> list[list[tuple[str, Delivery]]]:
+    """Rounds of deliveries that clients send at one moment; each number in each of them is that client's alone."""
+    return [
+        [
+            (
+                ("rest", "soap", "rest", "coffee")[client % 4],
+                Delivery(
+                    COFFEE if client % 4 == 3 else COURIER,
+                    *(_number(turn, round_, client, place) for place in range(6)),
+                ),
+            )
+            for client in range(_CLIENTS)
+        ]
+        for round_ in range(_ROUNDS)
+    ]
+
+
+def _number(turn: int, round_: int, client: int, place: int) -> float:
+    return 1e6 * turn + 1e4 * round_ + 100 * client + place + 0.5
 
 
 def _batches() -> st.SearchStrategy[list[Order]]:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable, Iterator
 from typing import Final
 
 from conformance.selftest.messages import Change, Forward, Request, Response
-from conformance.selftest.mutants.changes import Make, Where, rest
+from conformance.selftest.mutants.changes import TNS, Make, Where, deliveries, plain, rest, soap
 from conformance.selftest.mutants.mutant import of_class
+from conformance.selftest.mutants.soap_responses import enveloped
 
 # How long an answer waits for another one to be mixed up with, s.
 _MEETS_S: Final = 0.05
+_COMPANY_S: Final = 0.003
 
 
 class Crowd:
@@ -89,6 +92,32 @@ def _mixed(mix: Callable[[Response, Response], tuple[Response, Response]], nth: 
     return make
 
 
+def when_crowded(where: Where, act: Callable[[Request, Forward], Response], nth: int = 1) -> Make:
+    """Treat requests otherwise that come while another one of them is being answered, each nth of those.
+
+    Each waits a moment for company, as it would in a robot that takes its time.
+    """
+
+    def make() -> Change:
+        crowd, lock = Crowd(), threading.Lock()
+        seen = 0
+
+        def change(request: Request, forward: Forward) -> Response:
+            nonlocal seen
+            if not where(request):
+                return forward(request)
+            with crowd.joined() as others:
+                time.sleep(_COMPANY_S)
+                with lock:
+                    seen += others()
+                    chosen = others() and seen % nth == 0
+                return act(request, forward) if chosen else forward(request)
+
+        return change
+
+    return make
+
+
 def _exchanged(one: Response, two: Response) -> tuple[Response, Response]:
     return two, one
 
@@ -106,7 +135,22 @@ def _repeated(one: Response, two: Response) -> tuple[Response, Response]:
     return one, two
 
 
+def _twice(request: Request, forward: Forward) -> Response:
+    forward(request)
+    return forward(request)
+
+
+def _with_another_source(request: Request, forward: Forward) -> Response:
+    """A coordinate is another client's, as from a field that all share."""
+    head, _, _ = request.target.rpartition("/")
+    return forward(request.copy(target=f"{head}/1.5"))
+
+
 _mutant = of_class("http", "rest")
+_message = of_class("equivalence", "both", observer=True)
+_EMPTY = plain(204)
+_SOAP_DELIVERY = soap("ExecuteDeliveryRequest")
+_ACCEPTED = enveloped(f'<t:ExecuteDeliveryRequestResponse xmlns:t="{TNS}"/>')
 
 MUTANTS = (
     _mutant(
@@ -139,5 +183,35 @@ MUTANTS = (
         "pipelining",
         lambda: lambda request, forward: forward(request),
         backwards=True,
+    ),
+    _message(
+        "clients-delivery-lost",
+        "A REST delivery that comes while another one is being answered is accepted and forgotten.",
+        "delivery-concurrent",
+        when_crowded(deliveries, lambda request, _: _EMPTY(request)),
+    ),
+    _message(
+        "clients-delivery-lost-seldom",
+        "Of the REST deliveries that come while another one is being answered, each 50th is forgotten.",
+        "delivery-concurrent",
+        when_crowded(deliveries, lambda request, _: _EMPTY(request), 50),
+    ),
+    _message(
+        "clients-delivery-doubled",
+        "A REST delivery that comes while another one is being answered is published twice.",
+        "delivery-concurrent",
+        when_crowded(deliveries, _twice),
+    ),
+    _message(
+        "clients-delivery-shared-field",
+        "Deliveries that come at one moment have one source_y.",
+        "delivery-concurrent",
+        when_crowded(deliveries, _with_another_source),
+    ),
+    _message(
+        "clients-soap-delivery-lost",
+        "A SOAP delivery that comes while another one is being answered is accepted and forgotten.",
+        "delivery-concurrent",
+        when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)),
     ),
 )

@@ -1,9 +1,14 @@
 """Robots whose interfaces tell different stories, of what was asked for and of what is."""
 
+import re
+import sys
 from collections.abc import Callable
 from typing import Any
 
+from conformance.contract.delivery import COFFEE, COORDINATES, PATH_NAMES
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import (
+    DELIVERIES,
     SENSORS,
     TNS,
     VELOCITY,
@@ -16,6 +21,7 @@ from conformance.selftest.mutants.changes import (
     rest,
     rewritten,
     soap,
+    success,
     values,
 )
 from conformance.selftest.mutants.delivery import segments
@@ -29,10 +35,14 @@ from conformance.selftest.mutants.distortion import (
     rounded_soap,
     swapped_soap,
 )
+from conformance.selftest.mutants.in_background import later
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped
 from conformance.selftest.mutants.xml_trees import each, gone, named, tree
 
+_LATER_S, _SOON_S = 0.4, 0.05
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_COORDINATES = re.compile(rb"<(?:\w+:)?(\w+_[xy])>\s*([^<\s]+)\s*<")
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 
@@ -63,6 +73,53 @@ def _one_more(items: Any) -> Any:
     return [*items, {"name": "ghost", "topic": "/ghost", "type": "sensor_msgs/msg/Range"}]
 
 
+def _again_later(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if deliveries(request) and success(response):
+        later(_LATER_S, forward, request.copy())
+    return response
+
+
+def _another_later(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if deliveries(request) and success(response):
+        later(_SOON_S, forward, request.copy(target=f"{request.target.rpartition('/')[0]}/99.5"))
+    return response
+
+
+def _again_by_rest(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if _COFFEE(request) and success(response):
+        values = {name.decode(): text.decode() for name, text in _COORDINATES.findall(request.body)}
+        pairs = "".join(f"/{name}/{values[field]}" for name, field in zip(PATH_NAMES, COORDINATES, strict=True))
+        target = f"{DELIVERIES}{COFFEE}{pairs}"
+        later(_LATER_S, forward, Request("rest", "PUT", target, fields=[("Host", "robot"), ("Content-Length", "0")]))
+    return response
+
+
+class _Deduplicating:
+    """The same delivery within a minute is taken for one that was sent again by mistake."""
+
+    def __init__(self) -> None:
+        self._seen: set[str] = set()
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if deliveries(request):
+            if request.target in self._seen:
+                return plain(204)(request)
+            self._seen.add(request.target)
+        return forward(request)
+
+
+def _normal(_place: int, text: str) -> str:
+    return "0" if _NUMBER.fullmatch(text) and 0 < abs(float(text)) < sys.float_info.min else text
+
+
+def _unsigned_zero(_place: int, text: str) -> str:
+    return text.lstrip("-") if _NUMBER.fullmatch(text) and float(text) == 0 else text
+
+
 _rest_delivery = of_class("equivalence", "rest", observer=True)
 _soap_delivery = of_class("equivalence", "soap", observer=True)
 _rest_state = of_class("equivalence", "rest", probe=True)
@@ -72,6 +129,43 @@ _NO_GOAL = enveloped(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
 
 MUTANTS = (
     _rest_delivery("same-rest-doubled", "A REST delivery is published twice.", "delivery-rest", doubled(deliveries)),
+    _rest_delivery(
+        "same-rest-again-later",
+        "A REST delivery is published again 0.4 s later.",
+        "delivery-only",
+        lambda: _again_later,
+    ),
+    _rest_delivery(
+        "same-rest-another-later",
+        "Some time after a REST delivery comes another one, to somewhere else.",
+        "delivery-only",
+        lambda: _another_later,
+    ),
+    _soap_delivery(
+        "same-coffee-again-by-rest",
+        "A coffee that was ordered over SOAP is ordered again over REST, 0.4 s later.",
+        "delivery-only",
+        lambda: _again_by_rest,
+    ),
+    _rest_delivery(
+        "same-rest-deduplicated",
+        "The same REST delivery sent again is accepted and forgotten.",
+        "delivery-repeated",
+        _Deduplicating,
+    ),
+    _rest_delivery(
+        "same-rest-no-subnormals",
+        "Numbers nearer to zero than 2.2e-308 are zero.",
+        "delivery-rest",
+        rewritten(deliveries, segments(_normal)),
+    ),
+    _rest_delivery(
+        "same-rest-no-negative-zero",
+        "The sign of a zero is lost.",
+        "delivery-rest",
+        rewritten(deliveries, segments(_unsigned_zero)),
+        probe=True,
+    ),
     _rest_delivery(
         "same-rest-lost",
         "Each third REST delivery is never published.",
