@@ -13,6 +13,8 @@ import click
 from conformance.contract.exit_codes import ExitCode
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from conformance.selftest.comparison import SchemathesisResult
     from conformance.selftest.controls import Case, ControlResult
     from conformance.selftest.mutant_run import MutantResult
@@ -71,6 +73,13 @@ _SHORT = (
 @click.option(
     "--domain-id", type=click.IntRange(0, 100), default=80, show_default=True, help="First ROS domain to use."
 )
+@click.option(
+    "--generated",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Judge N faults made by rule, in place of those that people thought of; the target is then baroque.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the sample of faults by rule.")
 @click.option("--list", "listed", is_flag=True, help="List the faults, and run nothing.")
 @click.option(
     "--out",
@@ -79,15 +88,18 @@ _SHORT = (
     show_default=True,
     help="Folder for selftest.json and the matrix.",
 )
-def selftest(**options: Any) -> None:
+@click.pass_context
+def selftest(context: click.Context, /, **options: Any) -> None:
     """Show that the suite catches faulty robots and blames no good one.
 
     Each faulty robot is a good one behind a proxy with one named change. Exit code: 0 all caught and nobody blamed;
     1 otherwise; 2 usage; 3 a robot does not start; 130 interrupted.
     """
     from conformance.selftest.mutants import MUTANTS  # noqa: PLC0415 - lxml and the like cost what --help need not pay
-    from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see above
 
+    if options["generated"]:
+        _generated(context, options)
+        return
     if options["short"]:
         options.update(seeds=min(options["seeds"], 1), compare=False, variants=False)
     patterns = options["patterns"] or (_SHORT if options["short"] else ("*",))
@@ -101,8 +113,31 @@ def selftest(**options: Any) -> None:
         for mutant in chosen:
             click.echo(f"{mutant.name:34} {mutant.says} [{', '.join(mutant.catches)}]")
         return
+    _finish(lambda: _run(chosen, options), options)
+
+
+def _generated(context: click.Context, options: dict[str, Any]) -> None:
+    """Faults by rule: a robot that starts in a moment, and Schemathesis only where it is asked for."""
+    from conformance.cli.selftest_generated import chosen_mutants, run_generated  # noqa: PLC0415 - see selftest()
+
+    chosen = chosen_mutants(options)
+    if options["listed"]:
+        for mutant in chosen:
+            click.echo(f"{mutant.name} {mutant.says}")
+        return
+    given = {name for name in options if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE}
+    if "target" not in given:
+        options["target"] = "baroque"
+    compared = options["compare"] and "compare" in given
+    _finish(lambda: run_generated(chosen, options, compared=compared), options)
+
+
+def _finish(run: Callable[[], Report], options: dict[str, Any]) -> None:
+    """Run, write the results, and end with the exit code."""
+    from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see selftest()
+
     try:
-        report = _run(chosen, options)
+        report = run()
     except RobotError as error:
         click.echo(str(error), err=True)
         sys.exit(ExitCode.UNREACHABLE)

@@ -12,6 +12,7 @@ import conformance.checks
 from conformance.contract.classes import CLASSES, Level
 from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import Requirement, load_ledger
+from conformance.selftest.generated.report import page_part
 from conformance.selftest.mutants import MUTANTS
 
 _TITLE = "# Coverage: requirement, source, check, faulty robots"
@@ -148,7 +149,7 @@ def page() -> str:
                     _listed(binding.mutants),
                 )
                 lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *page_part()]) + "\n"
 
 
 def _listed(names: tuple[str, ...]) -> str:

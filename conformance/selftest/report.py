@@ -7,6 +7,8 @@ from typing import Any
 
 from conformance.selftest.comparison import SchemathesisResult
 from conformance.selftest.controls import ControlResult
+from conformance.selftest.generated import report as by_rule
+from conformance.selftest.generated.judging import CAUGHT, NOT_REACHED, GeneratedResult
 from conformance.selftest.mutant_run import MutantResult
 
 
@@ -20,6 +22,7 @@ class Report:
         control_results: by good robot.
         compared: what Schemathesis caught; good: what it reports of the good robot.
         notes: remarks.
+        generated_results: of mutants by rule; seed: of their sample.
     """
 
     target: str
@@ -29,6 +32,8 @@ class Report:
     good: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
     seconds: float = 0.0
+    generated_results: list[GeneratedResult] = field(default_factory=list)
+    seed: int = 0
 
     @property
     def tried(self) -> list[MutantResult]:
@@ -48,7 +53,9 @@ class Report:
     @property
     def holds(self) -> bool:
         """Whether all is caught and nobody is blamed, and something was tried."""
-        return bool(self.tried or self.control_results) and not self.missed and not self.blamed
+        tried = bool(self.tried or self.control_results or self.generated_results)
+        escaped = any(result.outcome not in {CAUGHT, NOT_REACHED} for result in self.generated_results)
+        return tried and not self.missed and not self.blamed and not escaped
 
     def document(self) -> dict[str, Any]:
         """selftest.json."""
@@ -96,6 +103,7 @@ class Report:
                     for seen in self.compared
                 ],
             },
+            **({"generated": by_rule.document(self.generated_results, self.seed)} if self.generated_results else {}),
         }
 
     def write(self, out: Path) -> Path:
@@ -160,11 +168,13 @@ class Report:
             said = "; ".join(f"{id_}: {why[:200]}" for id_, why in {**one.blamed, **one.unjudged}.items())
             code = one.outcome.exit_code if one.outcome else "none"
             lines.append(f"BLAMED {one.robot}{where}, seed {one.seed}, exit code {code}: {said}")
+        if self.generated_results:
+            lines.append(by_rule.summary(self.generated_results))
         if self.compared:
             theirs = {seen.mutant for seen in self.compared if seen.caught}
-            ours = {result.mutant.name for result in self.tried if not result.missed} & {
-                seen.mutant for seen in self.compared
-            }
+            ours = {result.mutant.name for result in self.tried if not result.missed}
+            ours |= {result.mutant.name for result in self.generated_results if result.outcome == CAUGHT}
+            ours &= {seen.mutant for seen in self.compared}
             lines.append(
                 f"Of {len(self.compared)} faults of REST, the plain Schemathesis command line caught {len(theirs)}, "
                 f"this suite {len(ours)}; of the good robot it reports {len(self.good)} findings"

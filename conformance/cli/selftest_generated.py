@@ -1,0 +1,63 @@
+"""``roaas selftest --generated``: a sample of the mutants by rule, in place of those that people thought of."""
+
+from __future__ import annotations
+
+import fnmatch
+import time
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from conformance.selftest.generated.judging import GeneratedResult
+    from conformance.selftest.generated.mutant import GeneratedMutant
+    from conformance.selftest.report import Report
+
+
+def chosen_mutants(options: dict[str, Any]) -> list[GeneratedMutant]:
+    """The sample that the options ask for.
+
+    Raises:
+        click.UsageError: no mutant has such a name.
+    """
+    from conformance.selftest.generated.catalogue import generated_mutants  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest()
+
+    patterns = options["patterns"] or ("*",)
+    fitting = [one for one in generated_mutants() if any(fnmatch.fnmatch(one.name, pattern) for pattern in patterns)]
+    if not fitting:
+        raise click.UsageError(f"no fault by rule has a name like {', '.join(patterns)}; --list shows them")
+    return sample(fitting, options["generated"], options["seed"])
+
+
+def run_generated(mutants: list[GeneratedMutant], options: dict[str, Any], *, compared: bool) -> Report:
+    """Judge them, and with ``compared`` let plain Schemathesis try those of REST.
+
+    Raises:
+        RobotError: the robot does not start.
+    """
+    from conformance.selftest import comparison  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.generated.judging import judge  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.mutant_run import RobotPool  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.report import Report  # noqa: PLC0415 - see selftest()
+
+    started = time.monotonic()
+    report = Report(options["target"], seed=options["seed"])
+    done = 0
+
+    def tell(result: GeneratedResult) -> None:
+        nonlocal done
+        done += 1
+        by = f" by {result.by[0]}" if result.by else ""
+        name = result.mutant.name
+        click.echo(f"[{done}/{len(mutants)}] {name}: {result.outcome}{by} ({result.seconds:.1f} s)", err=True)
+
+    efforts = ("quick", "standard") if options["effort"] == "quick" else ("standard",)
+    with RobotPool(options["target"], options["parallel"], options["domain_id"]) as pool:
+        report.generated_results = judge(pool, mutants, efforts=efforts, tell=tell)
+        if compared and comparison.command() is not None:
+            rest = [mutant.as_mutant() for mutant in mutants if mutant.interface == "rest"]
+            good, report.compared = comparison.compare(pool, rest, tell=lambda _: None)
+            report.good = tuple(sorted(f"{operation} {code}" for operation, code in good))
+    report.seconds = time.monotonic() - started
+    return report

@@ -1,0 +1,1 @@
+"""Mutants by rule: every operator at every field, status, header and operation that the contract's files name."""

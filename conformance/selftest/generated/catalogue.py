@@ -1,0 +1,89 @@
+"""All mutants by rule, in an order that stays the same as long as the contract's files do."""
+
+from collections.abc import Iterator
+from functools import cache
+
+from conformance.selftest.generated import bodies, heads, lenience
+from conformance.selftest.generated.mutant import MODES, GeneratedMutant, classes_of_answers, of_answer, of_request
+from conformance.selftest.generated.open_places import reason_for
+from conformance.selftest.generated.operators import OPERATORS, Operator
+from conformance.selftest.generated.places import Exchange, Place, exchanges, places
+
+_NULL = next(operator for operator in OPERATORS if operator.name == "null")
+# What happens to whole answers now and then.
+_WHOLE = {"crossed": bodies.crossed, "failing": bodies.failing, "cut": bodies.cut}
+
+
+@cache
+def every_change() -> tuple[GeneratedMutant, ...]:
+    """All changes that the rules make, those that break no clause included."""
+    found = [*_of_fields(), *_of_exchanges()]
+    return tuple({mutant.name: mutant for mutant in found}.values())
+
+
+@cache
+def generated_mutants() -> tuple[GeneratedMutant, ...]:
+    """The mutants by rule: changes that break a clause."""
+    return tuple(mutant for mutant in every_change() if not reason_for(mutant.name))
+
+
+def _of_fields() -> Iterator[GeneratedMutant]:
+    for place in places():
+        for operator in OPERATORS:
+            if operator.fits(place):
+                yield _at(operator, place)
+        if place.part == "answer" and place.medium in {"json", "soap"} and place.kind not in {"object", "array"}:
+            for mode in MODES:
+                yield _at(_NULL, place, mode)
+        if place.part == "request" and place.medium == "json":
+            yield from lenience.of_lenience(place)
+
+
+def _at(operator: Operator, place: Place, mode: str = "") -> GeneratedMutant:
+    name = f"{operator.name}@{mode}" if mode else operator.name
+    when = f", {MODES[mode]}" if mode else ""
+    return GeneratedMutant(
+        f"{name}:{place.exchange.name}:{place.label}:{place.medium}",
+        f"{place.label} of {place.exchange.name} ({place.medium}) {operator.says}{when}.",
+        name,
+        place.exchange,
+        _classes(place),
+        of_answer(operator, place, mode) if place.part == "answer" else of_request(operator, place),
+    )
+
+
+def _classes(place: Place) -> tuple[str, ...]:
+    """Classes that can see a field, the likeliest first."""
+    exchange = place.exchange
+    moves = ("safety",) if "elocity" in exchange.name or "Goal" in exchange.name else ()
+    if place.medium == "xml":
+        return ("rest-formats", "strict-input") if place.part == "request" else ("rest-formats", "http")
+    if place.part == "request":
+        return (exchange.class_, "strict-input", "equivalence", *moves)
+    if place.medium == "soap":
+        return (exchange.class_, "equivalence", "soap-basic-profile")
+    return (exchange.class_, "rest-formats", "equivalence", *moves, "http")
+
+
+def _of_exchanges() -> Iterator[GeneratedMutant]:
+    for exchange in exchanges():
+        yield from heads.of_statuses(exchange)
+        yield from heads.of_headers(exchange)
+        yield from bodies.of_bodies(exchange)
+        for what, make in _WHOLE.items():
+            if what == "cut" and not exchange.formats:
+                continue
+            for mode, when in {"": "every time", **MODES}.items():
+                yield _whole(exchange, what, mode, when, make)
+
+
+def _whole(exchange: Exchange, what: str, mode: str, when: str, make: bodies.Whole) -> GeneratedMutant:
+    name = f"{what}@{mode}" if mode else what
+    return GeneratedMutant(
+        f"{name}:{exchange.name}:answer",
+        f"{exchange.name}'s answer is {what}, {when}.",
+        name,
+        exchange,
+        classes_of_answers(exchange),
+        make(exchange, mode),
+    )

@@ -1,0 +1,138 @@
+"""What is done to the head of an answer: each status becomes its neighbours, fields are dropped, doubled, changed."""
+
+import re
+from collections.abc import Callable, Iterator
+from http import HTTPStatus
+from typing import Any
+
+from conformance.selftest.generated.mutant import GeneratedMutant, answers, classes_of_answers, in_mode
+from conformance.selftest.generated.places import Exchange
+from conformance.selftest.messages import Request, Response
+from conformance.selftest.mutants.changes import becomes
+from conformance.selftest.mutants.changes import status as status_is
+
+_KNOWN = frozenset(status.value for status in HTTPStatus)
+_SUCCESS = range(200, 300)
+
+# Statuses.
+
+
+def neighbours(exchange: Exchange, status: int) -> tuple[int, ...]:
+    """The statuses that a status could be mistaken for: the next ones, the operation's others, and the other kind."""
+    soap_statuses = (200, 202, 204, 400, 404, 405, 415, 500)
+    others = {status - 1, status + 1, *(exchange.statuses if exchange.side == "rest" else soap_statuses)}
+    others |= {500, 404} if status in _SUCCESS else {200, 500}
+    return tuple(sorted(others & _KNOWN - {status} - set(range(100, 200))))
+
+
+def of_statuses(exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Each declared status becomes each of its neighbours."""
+    declared = (*exchange.statuses, 204) if exchange.class_ == "rest-delivery" else exchange.statuses
+    for status in dict.fromkeys((*declared, *((500,) if exchange.side == "soap" else (405, 415)))):
+        for other in neighbours(exchange, status):
+            yield GeneratedMutant(
+                f"status:{exchange.name}:{status}-{other}",
+                f"{exchange.name} answers {other} in place of {status}.",
+                "status",
+                exchange,
+                classes_of_answers(exchange),
+                in_mode("", answers(exchange, status_is(status), becomes(other))),
+            )
+
+
+# Header fields.
+
+
+def _set(name: str, value: Callable[[str], str]) -> Callable[[Response], None]:
+    def edit(response: Response) -> None:
+        now = response.field(name)
+        if now is not None:
+            response.put(name, value(now))
+
+    return edit
+
+
+def _twice(name: str, other: str) -> Callable[[Response], None]:
+    def edit(response: Response) -> None:
+        if response.field(name) is not None:
+            response.fields.append((name, other))
+
+    return edit
+
+
+def _headers(exchange: Exchange) -> Iterator[tuple[str, str, Callable[[Response], bool], dict[str, Any]]]:
+    """Field, of what, when, and edits by operator."""
+    fine, bad = (lambda answer: answer.status in _SUCCESS), (lambda answer: answer.status not in range(400))
+    for said, when in (("", fine), ("-of-errors", bad)):
+        if said or exchange.formats:
+            yield (
+                "Content-Type",
+                said,
+                when,
+                {
+                    "header-drop": lambda answer: answer.drop("Content-Type"),
+                    "header-double": _twice("Content-Type", "application/octet-stream"),
+                    "header-change": _set("Content-Type", lambda _: "application/octet-stream"),
+                    "header-truncate": _set("Content-Type", lambda value: value.partition("/")[0]),
+                    "header-charset": _set("Content-Type", lambda value: f"{value.partition(';')[0]}; charset=utf-16"),
+                },
+            )
+    if exchange.side == "rest" and exchange.formats:
+        yield (
+            "Vary",
+            "",
+            fine,
+            {
+                "header-drop": lambda answer: answer.drop("Vary"),
+                "header-change": _set("Vary", lambda _: "Accept-Language"),
+            },
+        )
+
+
+def of_headers(exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Each header field that the contract names is dropped, doubled, changed."""
+    for field, of, when, edits in _headers(exchange):
+        for operator, edit in edits.items():
+            yield GeneratedMutant(
+                f"{operator}:{exchange.name}:{field}{of}",
+                f"{exchange.name}: {field}{of.replace('-', ' ')} is not as it should be ({operator}).",
+                operator,
+                exchange,
+                classes_of_answers(exchange),
+                in_mode("", answers(exchange, when, edit)),
+            )
+    if exchange.side == "rest":
+        yield from _of_allow(exchange)
+
+
+def _of_allow(exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Allow of the operation's resource, without it or with what it does not have."""
+
+    def resource(request: Request) -> bool:
+        return request.side == "rest" and re.fullmatch(exchange.path, request.path) is not None
+
+    def less(value: str) -> str:
+        return ", ".join(word for word in re.split(r"\s*,\s*", value) if word != exchange.method)
+
+    edits: dict[str, Callable[[Response], object]] = {
+        "header-drop": lambda answer: answer.drop("Allow"),
+        "header-less": _set("Allow", less),
+        "header-more": _set("Allow", lambda value: f"{value}, PATCH"),
+    }
+    for operator, edit in edits.items():
+
+        def alter(request: Request, response: Response, edit: Callable[[Response], object] = edit) -> Response | None:
+            if not resource(request) or response.field("Allow") is None:
+                return None
+            altered = response.copy()
+            edit(altered)
+            return None if altered.fields == response.fields else altered
+
+        yield GeneratedMutant(
+            f"{operator}:{exchange.name}:Allow",
+            f"Allow of {exchange.name}'s resource is not as it should be ({operator}).",
+            operator,
+            exchange,
+            ("http",),
+            in_mode("", alter),
+        )

@@ -1,0 +1,156 @@
+"""Mutants by rule are judged by the product's verdict, with the classes that can see them, the likeliest first."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Final
+
+from conformance.contract.files import CONTRACT_DIR
+from conformance.contract.ledger import load_ledger
+from conformance.contract.statement import load_statement
+from conformance.selftest.certifying import Outcome, run_job
+from conformance.selftest.generated.mutant import GeneratedMutant, Tally
+from conformance.selftest.messages import unchanged
+from conformance.selftest.mutant_run import RobotPool, job_for
+from conformance.selftest.proxy import Proxy
+from conformance.selftest.robots import Robot, statement_of
+
+CAUGHT: Final = "caught"
+SURVIVED: Final = "survived"
+NOT_REACHED: Final = "not reached"
+# What a mutant did was not what it says: its own mistake.
+BROKEN: Final = "broken"
+# Classes that are claimed, and requirements that are judged alone (all, where there are none).
+Attempt = tuple[tuple[str, ...], tuple[str, ...]]
+_WORD: Final = re.compile(r"[A-Z]?[a-z]+")
+
+
+@dataclass
+class GeneratedResult:
+    """What came of one mutant by rule.
+
+    Attributes:
+        mutant: which.
+        outcome: caught, survived, not reached (nothing was altered in any run), broken.
+        by: requirements that said fail (MUST) or warn (SHOULD) and do not of the good robot.
+        fails: whether one of them said fail, so that the robot is not conformant.
+        effort: the effort at which it was caught, else the last one tried.
+        altered: how often it altered something.
+        runs: how many runs; seconds: how long they took.
+        reason: the first requirement's, or what was broken.
+    """
+
+    mutant: GeneratedMutant
+    outcome: str = SURVIVED
+    by: tuple[str, ...] = ()
+    fails: bool = False
+    effort: str = ""
+    altered: int = 0
+    runs: int = 0
+    seconds: float = 0.0
+    reason: str = ""
+
+
+def judge(
+    pool: RobotPool,
+    mutants: Iterable[GeneratedMutant],
+    *,
+    efforts: tuple[str, ...] = ("quick", "standard"),
+    seed: int = 0,
+    tell: Callable[[GeneratedResult], None],
+) -> list[GeneratedResult]:
+    """Judge mutants, several at once.
+
+    Args:
+        pool: good robots with a proxy before each.
+        mutants: which.
+        efforts: those to try, until it is caught.
+        seed: of everything random.
+        tell: called as each is done.
+    """
+    lock = threading.Lock()
+    claimed = tuple(load_statement(statement_of(pool.kind)).claimed())
+    blamed = _Blamed(claimed, seed)
+
+    def one(mutant: GeneratedMutant) -> GeneratedResult:
+        robot, proxy = pool.take()
+        try:
+            result = _judge(mutant, robot, proxy, efforts, seed, blamed)
+        finally:
+            pool.give(robot, proxy)
+        with lock:
+            tell(result)
+        return result
+
+    with ThreadPoolExecutor(pool.size) as executor:
+        return list(executor.map(one, mutants))
+
+
+class _Blamed:
+    """What is said of the good robot itself by the same checks: nothing can be shown by that."""
+
+    def __init__(self, claimed: tuple[str, ...], seed: int) -> None:
+        self.claimed = claimed
+        self._seed = seed
+        self._known: dict[tuple[Attempt, str], frozenset[str]] = {}
+        self._lock = threading.Lock()
+
+    def by(self, attempt: Attempt, robot: Robot, proxy: Proxy, effort: str) -> frozenset[str]:
+        """Requirements that blame the good robot; it is tried when an attempt first blames a mutant."""
+        with self._lock:
+            if (attempt, effort) not in self._known:
+                proxy.change = unchanged
+                classes, requirements = attempt
+                job = job_for(robot, proxy, effort, self._seed, classes=classes, requirements=requirements)
+                self._known[attempt, effort] = frozenset(run_job(job).caught())
+            return self._known[attempt, effort]
+
+
+def _judge(
+    mutant: GeneratedMutant, robot: Robot, proxy: Proxy, efforts: tuple[str, ...], seed: int, blamed: _Blamed
+) -> GeneratedResult:
+    result = GeneratedResult(mutant)
+    tally = Tally()
+    for effort in efforts:
+        for attempt in _attempts(mutant, blamed.claimed):
+            classes, requirements = attempt
+            proxy.change = mutant.make(tally)
+            outcome = run_job(job_for(robot, proxy, effort, seed, classes=classes, requirements=requirements))
+            result.runs += 1
+            result.seconds += outcome.seconds
+            result.effort, result.altered = effort, tally.altered
+            if proxy.broken:
+                result.outcome, result.reason = BROKEN, proxy.broken[0]
+                return result
+            if caught := outcome.caught():
+                _note(result, outcome, [id_ for id_ in caught if id_ not in blamed.by(attempt, robot, proxy, effort)])
+            if result.outcome == CAUGHT:
+                return result
+    result.outcome = SURVIVED if tally.altered else NOT_REACHED
+    return result
+
+
+def _note(result: GeneratedResult, outcome: Outcome, by: list[str]) -> None:
+    if by:
+        result.outcome, result.by = CAUGHT, tuple(by)
+        result.fails = any(outcome.verdicts[id_] == "fail" for id_ in by)
+        result.reason = outcome.reasons.get(by[0], "")
+
+
+def _attempts(mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Attempt]:
+    """Classes and requirements to judge, one after the other: those about the operation, then whole classes."""
+    classes = tuple(class_ for class_ in mutant.classes if class_ in claimed)
+    words = {word.lower() for word in _WORD.findall(mutant.exchange.name)}
+    ids = load_ledger(CONTRACT_DIR / "requirements.toml")
+    first = tuple(id_ for id_ in ids if id_.split("/")[0] == classes[0]) if classes else ()
+    near = tuple(id_ for id_ in first if id_.split("/")[1].split("-")[0] in words)
+    types = tuple(id_ for id_ in near if id_.endswith("-type"))
+    for requirements in dict.fromkeys((types, near)):
+        if requirements and len(requirements) < len(first):
+            yield classes[:1], requirements
+    for class_ in classes:
+        yield (class_,), ()

@@ -1,0 +1,184 @@
+"""A mutant by rule, when it strikes, and the changes that fields make."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from conformance.selftest.generated.operators import Operator
+from conformance.selftest.generated.places import Exchange, Place
+from conformance.selftest.generated.slots import edit_message
+from conformance.selftest.messages import Change, Forward, Request, Response
+from conformance.selftest.mutants.mutant import Mutant
+
+_RARE = 20
+_ERROR = 400
+Alter = Callable[[Request, Response], Response | None]
+
+
+class Tally:
+    """How often a mutant has altered something in a run."""
+
+    def __init__(self) -> None:
+        self.altered = 0
+
+    def __call__(self) -> None:
+        """Once more."""
+        self.altered += 1
+
+
+@dataclass(frozen=True)
+class GeneratedMutant:
+    """A mutant by rule.
+
+    Attributes:
+        name: ``operator:operation:place[:form]``, stable.
+        says: one sentence on what is wrong with it.
+        operator: what is done; with the mode behind an at-sign.
+        exchange: the operation.
+        classes: conformance classes that can see it, the likeliest first.
+        make: makes the change for one run, which counts what it alters.
+    """
+
+    name: str
+    says: str
+    operator: str
+    exchange: Exchange
+    classes: tuple[str, ...]
+    make: Callable[[Tally], Change]
+
+    @property
+    def interface(self) -> str:
+        """REST or SOAP."""
+        return self.exchange.side
+
+    def as_mutant(self) -> Mutant:
+        """The same, for what takes mutants that people thought of; nothing in particular has to catch it."""
+        return Mutant(self.name, self.says, (), self.interface, lambda: self.make(Tally()))
+
+
+class Mode:
+    """When a mutant strikes; one instance for one run."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._lock = threading.Lock()
+        self._under_way, self._seen = 0, 0
+        self._error = False
+
+    def begin(self) -> bool:
+        """A request has come. Returns whether another one is under way."""
+        with self._lock:
+            self._under_way += 1
+            return self._under_way > 1
+
+    def strikes(self, *, together: bool) -> bool:
+        """Whether an exchange that it concerns is altered; ``together``: another was under way when it came."""
+        with self._lock:
+            self._seen += 1
+            if self._name == "rarely":
+                return self._seen % _RARE == 0
+            if self._name == "together":
+                return together or self._under_way > 1
+            return self._error if self._name == "after-error" else True
+
+    def end(self, response: Response | None) -> None:
+        """An exchange has come to its end."""
+        with self._lock:
+            self._under_way -= 1
+            if response is not None:
+                self._error = response.status >= _ERROR
+
+
+# What follows a mode's name, of what is altered.
+MODES = {
+    "rarely": f"one time in {_RARE}",
+    "together": "while another request is under way",
+    "after-error": "after an answer with 4xx or 5xx",
+}
+
+
+def in_mode(mode_name: str, alter: Alter) -> Callable[[Tally], Change]:
+    """A change of answers; ``alter`` returns None for what it leaves alone."""
+
+    def make(tally: Tally) -> Change:
+        mode = Mode(mode_name)
+
+        def change(request: Request, forward: Forward) -> Response:
+            together = mode.begin()
+            response: Response | None = None
+            try:
+                response = forward(request)
+                altered = alter(request, response)
+                if altered is not None and mode.strikes(together=together):
+                    tally()
+                    return altered
+                return response
+            finally:
+                mode.end(response)
+
+        return change
+
+    return make
+
+
+def of_answer(operator: Operator, place: Place, mode: str = "") -> Callable[[Tally], Change]:
+    """The field is altered in successful answers."""
+
+    def make(tally: Tally) -> Change:
+        edit = operator.make(place)
+
+        def alter(request: Request, response: Response) -> Response | None:
+            if not place.exchange.concerns(request) or response.status not in range(200, 300):
+                return None
+            altered = response.copy()
+            return altered if edit_message(place, altered, edit) else None
+
+        return in_mode(mode, alter)(tally)
+
+    return make
+
+
+def of_request(operator: Operator, place: Place) -> Callable[[Tally], Change]:
+    """The field is altered on its way to the robot; it counts where the robot then takes the request."""
+
+    def make(tally: Tally) -> Change:
+        edit = operator.make(place)
+
+        def change(request: Request, forward: Forward) -> Response:
+            if not place.exchange.concerns(request):
+                return forward(request)
+            altered = request.copy()
+            if not edit_message(place, altered, edit):
+                return forward(request)
+            response = forward(altered)
+            if response.status in range(200, 300):
+                tally()
+            return response
+
+        return change
+
+    return make
+
+
+def answers(exchange: Exchange, when: Callable[[Response], bool], edit: Callable[[Response], object]) -> Alter:
+    """Alter the answers of an operation, where they become others."""
+
+    def alter(request: Request, response: Response) -> Response | None:
+        if not exchange.concerns(request) or not when(response):
+            return None
+        altered = response.copy()
+        edit(altered)
+        same = (altered.status, altered.fields, altered.body) == (response.status, response.fields, response.body)
+        return None if same else altered
+
+    return alter
+
+
+def classes_of_answers(exchange: Exchange) -> tuple[str, ...]:
+    """Classes that can see an operation's answers as messages."""
+    if exchange.side == "soap":
+        return (exchange.class_, "soap-basic-profile", "strict-input", "equivalence", "xml-security")
+    more = ("safety",) if "elocity" in exchange.name or "Goal" in exchange.name else ()
+    return (exchange.class_, "http", "rest-formats", "strict-input", "equivalence", *more)

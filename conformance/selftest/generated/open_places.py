@@ -1,0 +1,40 @@
+"""What the contract leaves open: changes that rules make and that break no clause, each with the reason.
+
+They are no mutants, and are not judged. A rule is narrow, and coverage.md shows how many changes it covers.
+"""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Changes that break no clause.
+
+    Attributes:
+        pattern: of their names, a regular expression that matches all of one.
+        reason: why, with the clause that leaves it open.
+    """
+
+    pattern: str
+    reason: str
+
+    @cached_property
+    def compiled(self) -> re.Pattern[str]:
+        """The pattern, compiled."""
+        return re.compile(self.pattern)
+
+
+RULES = (
+    Rule(r"status:putDelivery:2\d\d-2\d\d", "A delivery answers 2xx, and 204 is only preferred (contract.md#rest)."),
+    Rule(
+        r"status:\w+:(400|422)-4\d\d",
+        "Input that is no JSON is 400 and of the wrong shape 422, and other 4xx conform too (contract.md#input-json).",
+    ),
+)
+
+
+def reason_for(name: str) -> str:
+    """Why a change of this name breaks no clause; empty where it breaks one."""
+    return next((rule.reason for rule in RULES if rule.compiled.fullmatch(name)), "")

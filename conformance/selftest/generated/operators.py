@@ -1,0 +1,233 @@
+"""What is done to a field. An operator makes an edit for one run, which may remember what it has seen."""
+
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from conformance.selftest.generated.places import Place
+from conformance.selftest.generated.slots import Edit, Slot, same
+
+_SCALE, _CLAMP = 1.5, 0.05
+_NUMERIC = frozenset({"number", "integer"})
+_SCALAR = _NUMERIC | {"string"}
+_ALL = _SCALAR | {"object", "array"}
+
+
+@dataclass(frozen=True)
+class Operator:
+    """An operator.
+
+    Attributes:
+        name: as it begins the names of mutants.
+        says: what it does, of "the field".
+        kinds: kinds of fields that it is for.
+        parts: "answer", "request" or both.
+        media: forms in which it means something.
+        make: an edit for one run.
+        sibling: whether it needs one.
+    """
+
+    name: str
+    says: str
+    kinds: frozenset[str]
+    parts: frozenset[str]
+    media: frozenset[str]
+    make: Callable[[Place], Edit]
+    sibling: bool = False
+
+    def fits(self, place: Place) -> bool:
+        """Whether it makes a mutant there."""
+        return (
+            place.kind in self.kinds
+            and place.part in self.parts
+            and place.medium in self.media
+            and (bool(place.siblings) or not self.sibling)
+        )
+
+
+def _each(change: Callable[[Any], Any]) -> Callable[[Place], Edit]:
+    """Give every field another value; ``change`` raises TypeError or ValueError for one that it does not know."""
+
+    def edit(slots: list[Slot]) -> bool:
+        altered = False
+        for slot in slots:
+            before = slot.value()
+            try:
+                after = change(before)
+            except (TypeError, ValueError, OverflowError, struct.error):
+                continue
+            if not same(before, after):
+                slot.put(after)
+                altered = True
+        return altered
+
+    return lambda _place: edit
+
+
+def _always(do: Callable[[Slot], object]) -> Callable[[Place], Edit]:
+    def edit(slots: list[Slot]) -> bool:
+        for slot in slots:
+            do(slot)
+        return True
+
+    return lambda _place: edit
+
+
+def _number(change: Callable[[float], float]) -> Callable[[Place], Edit]:
+    """Give every number another value; integers stay integers."""
+
+    def apply(value: Any) -> Any:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise TypeError
+        return int(change(value)) if isinstance(value, int) else change(value)
+
+    return _each(apply)
+
+
+def _swap(place: Place) -> Edit:
+    def edit(slots: list[Slot]) -> bool:
+        altered = False
+        for slot in slots:
+            other = slot.beside(place.siblings[0])
+            if other is not None and not same(slot.value(), other.value()):
+                mine, its = slot.value(), other.value()
+                slot.put(its)
+                other.put(mine)
+                altered = True
+        return altered
+
+    return edit
+
+
+def _forward(place: Place) -> Edit:
+    def edit(slots: list[Slot]) -> bool:
+        altered = False
+        for slot in slots:
+            other = slot.beside(place.siblings[-1])
+            if other is not None and not same(slot.value(), other.value()):
+                other.put(slot.value())
+                altered = True
+        return altered
+
+    return edit
+
+
+def _remembering(*, for_ever: bool) -> Callable[[Place], Edit]:
+    """The values of the first message for ever, or those of the message before."""
+
+    def make(_place: Place) -> Edit:
+        kept: list[Any] = []
+
+        def edit(slots: list[Slot]) -> bool:
+            nonlocal kept
+            now = [slot.value() for slot in slots]
+            then, kept = kept, kept if kept and for_ever else now
+            altered = False
+            for slot, old, new in zip(slots, then, now, strict=False):
+                if not same(old, new):
+                    slot.put(old)
+                    altered = True
+            return altered
+
+        return edit
+
+    return make
+
+
+def single(value: float) -> float:
+    """A number as it comes out of a 32-bit float."""
+    return float(struct.unpack("f", struct.pack("f", value))[0])
+
+
+def _other_type(value: Any) -> Any:
+    if isinstance(value, int | float):
+        return f"about {value!r}"
+    return 0 if isinstance(value, str) else "none"
+
+
+def _comma(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, float):
+        raise TypeError
+    return repr(value).replace(".", ",")
+
+
+def _default(value: Any) -> Any:
+    return "" if isinstance(value, str) else type(value)(0)
+
+
+def _clamped(value: float) -> float:
+    return math.copysign(min(abs(value), _CLAMP), value)
+
+
+def _coerced(value: Any) -> Any:
+    """Zero for what is no finite number."""
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        raise TypeError
+    return 0
+
+
+def _half(value: Any) -> Any:
+    if not isinstance(value, str | list):
+        raise TypeError
+    return value[: len(value) // 2] if isinstance(value, str) else value[:-1]
+
+
+def _operator(
+    name: str, says: str, kinds: frozenset[str], parts: str, media: str, make: Callable[[Place], Edit], **more: Any
+) -> Operator:
+    return Operator(name, says, kinds, frozenset(parts.split()), frozenset(media.split()), make, **more)
+
+
+_BODIES, _EVERYWHERE = "json xml soap", "json xml soap path query"
+
+OPERATORS = (
+    _operator("drop", "is left out", _ALL, "answer", _BODIES, _always(lambda slot: slot.drop())),
+    _operator("null", "is null, in XML empty", _ALL, "answer", _BODIES, _each(lambda _: None)),
+    _operator("retype", "is of another type", _ALL, "answer", "json", _each(_other_type)),
+    _operator("retype", "is a text that is no number", _NUMERIC, "answer", "xml soap", _each(_other_type)),
+    _operator("rename", "has another name", _ALL, "answer", _BODIES, _always(lambda slot: slot.rename("renamed"))),
+    _operator(
+        "swap", "has its sibling's value, and that its", _ALL, "answer request", _EVERYWHERE, _swap, sibling=True
+    ),
+    _operator("freeze", "is for ever the first one", _ALL, "answer", _BODIES, _remembering(for_ever=True)),
+    _operator("delay", "is the one of the answer before", _ALL, "answer", _BODIES, _remembering(for_ever=False)),
+    _operator(
+        "scale", "is half as great again", _NUMERIC, "answer request", _EVERYWHERE, _number(lambda n: n * _SCALE)
+    ),
+    _operator("negate", "has the other sign", _NUMERIC, "answer request", _EVERYWHERE, _number(lambda n: -n)),
+    _operator(
+        "single", "goes through a 32-bit float", frozenset({"number"}), "answer request", _EVERYWHERE, _number(single)
+    ),
+    _operator(
+        "ulp",
+        "is the next greater number",
+        _NUMERIC,
+        "answer request",
+        _EVERYWHERE,
+        _number(lambda n: n + 1 if isinstance(n, int) else math.nextafter(n, math.inf)),
+    ),
+    _operator("comma", "has a decimal comma", frozenset({"number"}), "answer", _BODIES, _each(_comma)),
+    _operator("duplicate", "is written twice", _ALL, "answer", _BODIES, _always(lambda slot: slot.double())),
+    _operator(
+        "reorder", "is in reverse order", frozenset({"array"}), "answer", _BODIES, _each(lambda items: items[::-1])
+    ),
+    _operator("truncate", "is cut", frozenset({"string", "array"}), "answer request", _EVERYWHERE, _each(_half)),
+    _operator("default", "is taken for zero or empty", _SCALAR, "request", _EVERYWHERE, _each(_default)),
+    _operator("coerce", "is taken for zero where it is no number", _NUMERIC, "request", _EVERYWHERE, _each(_coerced)),
+    _operator("ignore", "is for ever what it was first", _SCALAR, "request", _EVERYWHERE, _remembering(for_ever=True)),
+    _operator(
+        "lag", "is what it was in the request before", _SCALAR, "request", _EVERYWHERE, _remembering(for_ever=False)
+    ),
+    _operator("clamp", f"is clamped to {_CLAMP}", _NUMERIC, "request", _EVERYWHERE, _number(_clamped)),
+    _operator("forward", "is written over its sibling", _SCALAR, "request", _EVERYWHERE, _forward, sibling=True),
+    _operator(
+        "round",
+        "is rounded to two digits",
+        frozenset({"number"}),
+        "answer request",
+        _EVERYWHERE,
+        _number(lambda n: round(n, 2)),
+    ),
+)

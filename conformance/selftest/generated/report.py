@@ -1,0 +1,92 @@
+"""What is said of mutants by rule: for selftest.json, for people, and on the page on coverage."""
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any
+
+from conformance.selftest.generated.catalogue import every_change, generated_mutants
+from conformance.selftest.generated.judging import BROKEN, SURVIVED, GeneratedResult
+from conformance.selftest.generated.open_places import RULES, reason_for
+from conformance.selftest.generated.sampling import Rate, rate_of, rates_by
+
+_KEYS = ("class", "operator", "effort")
+
+
+def _figures(rate: Rate) -> dict[str, Any]:
+    return {
+        "caught": rate.caught,
+        "survived": rate.survived,
+        "not_reached": rate.not_reached,
+        "rate": round(rate.share, 4),
+        "at_least": round(rate.bound, 4),
+    }
+
+
+def document(results: Iterable[GeneratedResult], seed: int) -> dict[str, Any]:
+    """The part of selftest.json on mutants by rule; ``at_least`` is the lower end of Wilson's 95 % interval."""
+    results = list(results)
+    return {
+        "exist": len(generated_mutants()),
+        "seed": seed,
+        "all": _figures(rate_of(results)),
+        **{f"by_{key}": {name: _figures(rate) for name, rate in rates_by(results, key).items()} for key in _KEYS},
+        "mutants": [
+            {
+                "name": result.mutant.name,
+                "says": result.mutant.says,
+                "outcome": result.outcome,
+                "by": list(result.by),
+                "not_conformant": result.fails,
+                "effort": result.effort,
+                "altered": result.altered,
+                "runs": result.runs,
+                "seconds": round(result.seconds, 2),
+                "reason": result.reason,
+            }
+            for result in results
+        ],
+    }
+
+
+def summary(results: Iterable[GeneratedResult]) -> str:
+    """What a person wants to know: the rates, then every survivor."""
+    results = list(results)
+    lines = [f"Faulty robots by rule: {rate_of(results).words()}; {len(generated_mutants())} exist"]
+    for key in _KEYS:
+        lines.append(f"by {key}:")
+        lines += [f"  {name:20} {rate.words()}" for name, rate in rates_by(results, key).items()]
+    for result in results:
+        if result.outcome == SURVIVED:
+            lines.append(f"SURVIVED {result.mutant.name} ({result.mutant.says}) altered {result.altered} times")
+        if result.outcome == BROKEN:
+            lines.append(f"BROKEN {result.mutant.name}: {result.reason}")
+    return "\n".join(lines)
+
+
+def page_part() -> list[str]:
+    """Lines of the page on coverage: how many there are, and what the rules make that breaks no clause."""
+    mutants = generated_mutants()
+    operators = Counter(mutant.operator.partition("@")[0] for mutant in mutants)
+    left = Counter(reason_for(change.name) for change in every_change())
+    listed = ", ".join(f"`{name}` {number}" for name, number in sorted(operators.items()))
+    about = (
+        f"{len(mutants)} changes by rule, at every field, status, header and operation of the contract's files; "
+        "`roaas selftest --generated N --seed S` judges a sample, with `--list` it shows them. "
+        f"By operator: {listed}."
+    )
+    return [
+        "",
+        "## Faulty robots by rule",
+        "",
+        about,
+        "",
+        "These changes the rules make as well; they break no clause, and are not judged:",
+        "",
+        "| changes (regular expression) | number | why they break no clause |",
+        "|---|---|---|",
+        *(f"| `{_cell(rule.pattern)}` | {left[rule.reason]} | {_cell(rule.reason)} |" for rule in RULES),
+    ]
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")

@@ -1,0 +1,148 @@
+"""Mutants by rule: the enumeration is whole and stable, edits do what they say, and such mutants are caught."""
+
+import json
+import math
+
+import pytest
+
+from conformance.contract.files import Contract
+from conformance.documents import wsdl
+from conformance.documents.openapi import operations_of
+from conformance.selftest.generated.catalogue import every_change, generated_mutants
+from conformance.selftest.generated.judging import CAUGHT, NOT_REACHED, GeneratedResult, judge
+from conformance.selftest.generated.mutant import Tally
+from conformance.selftest.generated.open_places import RULES
+from conformance.selftest.generated.operators import OPERATORS
+from conformance.selftest.generated.report import document, summary
+from conformance.selftest.generated.sampling import Rate, rate_of, rates_by, sample
+from conformance.selftest.messages import Request, Response
+from conformance.selftest.mutant_run import RobotPool
+
+JSON = [("Content-Type", "application/json")]
+
+
+def named(name):
+    return next(mutant for mutant in generated_mutants() if mutant.name == name)
+
+
+def answered(name, request, *bodies, media_type="application/json"):
+    """What a mutant makes of the robot's answers, and how often it altered one."""
+    tally = Tally()
+    change = named(name).make(tally)
+    seen = [
+        change(request, lambda _, body=body: Response(200, [("Content-Type", media_type)], body)).body
+        for body in bodies
+    ]
+    return seen, tally.altered
+
+
+def forwarded(name, request):
+    """What a mutant sends to the robot, which takes everything."""
+    sent = []
+    tally = Tally()
+
+    def forward(request):
+        sent.append(request)
+        return Response(204)
+
+    named(name).make(tally)(request, forward)
+    return sent[0], tally.altered
+
+
+def test_the_enumeration_is_whole_and_stable():
+    mutants = generated_mutants()
+    names = [mutant.name for mutant in mutants]
+    assert len(names) == len(set(names)) >= 1500
+    assert {mutant.operator for mutant in mutants} >= {operator.name for operator in OPERATORS}
+    contract = Contract.load()
+    operations = {operation.id for operation in operations_of(contract)}
+    for path in (contract.publishers_path, contract.subscribers_path):
+        operations |= {operation.name for operation in wsdl.read_file(path).operations}
+    assert {mutant.exchange.name for mutant in mutants} == operations
+    every_change.cache_clear()
+    generated_mutants.cache_clear()
+    assert [mutant.name for mutant in generated_mutants()] == names
+
+
+def test_every_rule_that_leaves_something_open_covers_something_and_not_much():
+    for rule in RULES:
+        covered = sum(bool(rule.compiled.fullmatch(change.name)) for change in every_change())
+        assert 0 < covered < len(every_change()) / 20, rule
+
+
+def test_a_sample_is_the_same_for_a_seed_and_has_every_stratum():
+    mutants = generated_mutants()
+    strata = {(mutant.operator, mutant.exchange.class_) for mutant in mutants}
+    chosen = sample(mutants, len(strata), 3)
+    assert {(mutant.operator, mutant.exchange.class_) for mutant in chosen} == strata
+    assert chosen == sample(mutants, len(strata), 3) != sample(mutants, len(strata), 4)
+    assert len(sample(mutants, 10**6, 0)) == len(mutants)
+
+
+def test_the_bound_is_wilsons():
+    assert Rate(97, 3, 5).bound == pytest.approx(0.9155, abs=1e-4)
+    assert (Rate(0, 0, 4).share, Rate(0, 0, 4).bound) == (1.0, 0.0)
+
+
+def test_answers_are_altered_in_json_and_xml():
+    request = Request("rest", "GET", "/robot/velocity/linear/")
+    assert answered("ulp:getLinearVelocity:answer.x:json", request, b'{"x":1.0,"y":0}') == (
+        [json.dumps({"x": math.nextafter(1, 2), "y": 0}).encode()],
+        1,
+    )
+    seen, altered = answered("delay:getLinearVelocity:answer.x:json", request, b'{"x":1}', b'{"x":1.0}', b'{"x":2}')
+    assert (seen, altered) == ([b'{"x":1}', b'{"x":1.0}', b'{"x": 1.0}'], 1)
+    seen, altered = answered("duplicate:getLinearVelocity:answer.x:json", request, b'{"x":1}')
+    assert (seen, altered) == ([b'{"x": 1, "x": 1}'], 1)
+    seen, altered = answered(
+        "swap:getLinearVelocity:answer.x:xml",
+        request,
+        b"<Vector3><x>1.0</x><y>2.0</y></Vector3>",
+        media_type="application/xml",
+    )
+    assert b"<x>2.0</x><y>1.0</y>" in seen[0]
+    assert answered("negate:getLinearVelocity:answer.x:json", request, b'{"x":0.0}') == ([b'{"x":0.0}'], 0)
+
+
+def test_requests_are_altered_in_json_path_and_query():
+    given = Request("rest", "PUT", "/robot/velocity/linear/", "HTTP/1.1", list(JSON), b'{"x":0.5,"y":0,"z":0}')
+    assert forwarded("clamp:putLinearVelocity:request.x:json", given)[0].body == b'{"x": 0.05, "y": 0, "z": 0}'
+    twice = given.copy(body=b'{"x":0.5,"x":0.5,"y":0,"z":0}')
+    assert forwarded("clamp:putLinearVelocity:request.x:json", twice) == (twice, 0)
+    filled = forwarded("fill:putLinearVelocity:request.y:json", given.copy(body=b'{"x":1}'))
+    assert (json.loads(filled[0].body), filled[1]) == ({"x": 1, "y": 0.0}, 1)
+    path = "/robot/app/delivery/4/depot_x/1/depot_y/2/dest_x/3/dest_y/4/source_x/5/source_y/6"
+    sent, _ = forwarded("swap:putDelivery:request.depot_x:path", Request("rest", "PUT", path))
+    assert sent.path.startswith("/robot/app/delivery/4/depot_x/2.0/depot_y/1.0/dest_x/3/")
+    sent, _ = forwarded(
+        "negate:getPlan:request.x:query", Request("rest", "GET", "/robot/navigation/service/plan?x=1&y=2")
+    )
+    assert sent.query == "x=-1.0&y=2"
+
+
+def test_a_mode_says_when():
+    request, body = Request("rest", "GET", "/robot/velocity/linear/"), b'{"x":1}'
+    seen, altered = answered("null@rarely:getLinearVelocity:answer.x:json", request, *[body] * 40)
+    assert (seen.count(b'{"x": null}'), altered) == (2, 2)
+    assert answered("null@together:getLinearVelocity:answer.x:json", request, body, body)[1] == 0
+    assert answered("null@after-error:getLinearVelocity:answer.x:json", request, body, body)[1] == 0
+
+
+def test_five_mutants_are_caught_and_one_that_alters_nothing_is_told_apart():
+    names = (
+        "retype:getSensors:answer[].name:json",
+        "default:GetPlan:request.x:soap",
+        "status:getSensors:200-500",
+        "header-change:getNavigationServices:Content-Type",
+        "rename:GetVelocity:answer.return.linear:soap",
+        "scale:getVelocity:answer.angular.x:json",
+    )
+    with RobotPool("plain", 2, 0) as pool:
+        results = judge(pool, map(named, names[:5]), efforts=("quick",), tell=lambda _: None)
+    assert {result.mutant.name: result.outcome for result in results} == dict.fromkeys(names[:5], CAUGHT)
+    assert all(result.by and result.altered for result in results)
+    results.append(GeneratedResult(named(names[5]), NOT_REACHED, effort="quick"))
+    assert rate_of(results) == Rate(5, 0, 1)
+    assert rates_by(results, "class")["rest-resources"] == Rate(3, 0, 1)
+    assert document(results, 0)["all"]["rate"] == 1.0
+    assert "5 of 5 (100.0%, at least 56.6%), 1 not reached" in summary(results)
