@@ -1,22 +1,26 @@
 """Driving a robot by its velocity: what talks to the robot, and keeps a trace for drive_rules to judge."""
 
+import math
 import time
 from http import HTTPStatus
 from typing import Final
 
 import pytest
 
-from conformance.robot import drive_rules
+from conformance.robot import drive_rules, windows
 from conformance.robot.drive_rules import Judgement
 from conformance.robot.drive_trace import Command, Trace, Turn
 from conformance.robot.path import judge_path
 from conformance.robot.robot import STILL, VELOCITY, Robot, Velocity
+from conformance.robot.windows import ALL, SEVERAL
 from conformance.transport.exchange import Exchange
 
 # A turn of readings is not begun more often than this, s: the robot's odometry has tens of hertz.
 _PACE_S: Final = 0.02
 # How long a velocity is counted on to hold where the statement does not say, s.
 _COUNTED_ON_S: Final = 0.5
+# A velocity of which too few samples are seen is looked at for so much longer, s.
+_LONGER_S: Final = 1.0
 
 
 class Drive:
@@ -118,14 +122,11 @@ class Drive:
         return self.reach(STILL, "safety/stop", within=within)
 
     def reach(
-        self,
-        wanted: Velocity,
-        *ids: str,
-        part: slice = slice(None),
-        within: float | None = None,
-        since: float | None = None,
+        self, wanted: Velocity, *ids: str, part: slice = ALL, within: float | None = None, since: float | None = None
     ) -> bool:
         """Look until the velocity is what was wanted; judge that it comes within the settle time.
+
+        What is judged has to be shown by the median of several samples; what is only waited for, by one.
 
         Args:
             wanted: velocity.
@@ -136,7 +137,10 @@ class Drive:
         """
         limits = self.robot.limits
         patience = min(self.robot.settle_s, within or self.robot.settle_s)
-        until = (self.trace.answered if since is None else since) + patience
+        begun = self.trace.answered if since is None else since
+        until = begun + patience
+        first = len(self.trace.turns)
+        count = SEVERAL if ids else 1
         # A velocity may end before it is reached, where it does not hold for as long as the robot takes to settle.
         every = _COUNTED_ON_S if limits.hold_s is None else 0.6 * limits.hold_s
         renews = limits.hold_s is None or limits.hold_s < patience
@@ -145,12 +149,36 @@ class Drive:
             if renews and asked > self.trace.sent + every:
                 self._renew()
             self.look()
-            there = drive_rules.is_reached(self.trace, wanted, limits, part)
-            if there or asked > until:
+            there = windows.shown(limits, self.trace.turns[first:], wanted, part=part, count=count)
+            if there or (asked > until and there is not None) or asked > until + _LONGER_S:
                 break
         for id_ in ids:
-            self._judge(drive_rules.arrival(id_, self.trace, wanted, limits, part))
-        return there
+            self._judge(drive_rules.arrival(id_, self.trace, wanted, limits, part, begun))
+        return bool(there)
+
+    def sees(
+        self, wanted: Velocity, factor: float = 1.0, *, part: slice = ALL, until: float = math.inf
+    ) -> tuple[bool | None, str]:
+        """Look whether the velocity is what was wanted: once where it is, else until several samples tell.
+
+        Args:
+            wanted: velocity.
+            factor: how much of the tolerance it may be off.
+            part: the components that count.
+            until: from then on what is seen says nothing any more, s of the monotonic clock.
+
+        Returns:
+            Whether it is (None: it was too late to say), and what was seen.
+        """
+        first = len(self.trace.turns)
+        last = time.monotonic() + _LONGER_S
+        while True:
+            self.look()
+            turns, now = self.trace.turns[first:], time.monotonic()
+            holds = None if now > until else windows.verdict(self.robot.limits, turns, wanted, factor, part)
+            if holds is not None or now > min(until, last):
+                seen = windows.velocities(windows.newest(turns))
+                return holds, str(windows.middle(seen)) if seen else ""
 
     def keep(self, seconds: float) -> None:
         """Look for a while."""
@@ -160,4 +188,4 @@ class Drive:
 
     def judge_motion(self) -> None:
         """Judge whether the pose moved by what the velocity said."""
-        judge_path(self.robot.judge, self.trace.odometry, self.trace.measured)
+        judge_path(self.robot.judge, self.trace.odometry, self.trace.measured, self.robot.limits.noise)

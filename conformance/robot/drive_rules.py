@@ -1,5 +1,6 @@
 """What a drive shows of a robot: every function judges a trace, or a part of one, and talks to nobody."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -9,13 +10,15 @@ from conformance.contract.limits import Limits
 from conformance.robot.drive_trace import Command, Trace
 from conformance.robot.message_shapes import TWIST, VECTOR3, read_as
 from conformance.robot.robot import Velocity, is_near
+from conformance.robot.windows import ALL, SEVERAL, middle, newest, shown, velocities
 from conformance.transport.exchange import Exchange
 
 # What was measured for so long alike is steady: readings of two resources may be compared, s.
 _STEADY_S: Final = 0.3
+# More turns than are in any window.
+_LOOKED_AT: Final = 200
 # Two writings of one double.
 _ECHO: Final = 1e-9
-_ALL: Final = slice(None)
 
 
 @dataclass(frozen=True)
@@ -55,78 +58,71 @@ def _other_number(command: Command, value: Any) -> str:
 
 
 def agreement(trace: Trace, limits: Limits) -> list[Judgement]:
-    """Whether the readings of the turn before the last agree with the odometry on both sides of them.
+    """Whether velocity and linear part agree with the odometry: their medians over a while in which it was steady.
 
-    Only where the odometry was steady, and no command was sent, from a while before them on.
+    Only where no command was sent from that while's beginning on.
     """
-    turn = next(iter(trace.turns[-2:-1]), None)
-    if turn is None or trace.turns[-1].odometry is None:
+    if not trace.turns:
         return []
-    since = turn.at - _STEADY_S
-    around = _from_the_last_before(trace.odometry, since)
-    last = trace.odometry[-1].velocity
-    if around is None or trace.sent > since or not all(is_near(limits, one, last, 0.5) for one in around):
+    since = trace.turns[-1].at - _STEADY_S
+    window = list(itertools.takewhile(lambda turn: turn.at >= since, reversed(trace.turns)))
+    odometry = [turn.odometry.velocity for turn in window if turn.odometry is not None]
+    count = len(newest(window[::-1], len(window)))
+    before = len(trace.turns) > len(window)
+    if trace.sent > since or not before or count < SEVERAL or len(odometry) < len(window):
+        return []
+    wanted = middle(odometry)
+    if not all(is_near(limits, one, wanted, 0.5) for one in odometry):
         return []
     found = []
-    if turn.velocity is not None:
-        wanted = f"the velocity that the odometry has, {rounded(last)}"
-        found.append(_same("velocity-odometry", turn.velocity, last, limits, turn.velocity_exchange, wanted))
-    if turn.linear is not None and turn.velocity is not None:
-        linear = Velocity(*turn.velocity[:3])
-        wanted = f"the linear part of the velocity, {rounded(linear)}"
-        found.append(_same("linear-agrees", turn.linear, linear, limits, turn.linear_exchange, wanted))
+    turn = window[0]
+    read = velocities(window)
+    if read:
+        expected = f"the velocity that the odometry has, {rounded(wanted)}"
+        found.append(_same("velocity-odometry", read, wanted, (limits, count), turn.velocity_exchange, expected))
+    linear = [one.linear for one in window if one.linear is not None]
+    if linear and read:
+        wanted = Velocity(*middle(read)[:3])
+        expected = f"the linear part of the velocity, {rounded(wanted)}"
+        found.append(_same("linear-agrees", linear, wanted, (limits, count), turn.linear_exchange, expected))
     return found
 
 
-def _from_the_last_before(odometry: Sequence[Any], since: float) -> list[Velocity] | None:
-    """The velocities from the last one before a time on; None where there is none before it."""
-    found = []
-    for one in reversed(odometry):
-        found.append(one.velocity)
-        if one.received <= since:
-            return found
-    return None
-
-
 def _same(
-    name: str, measured: Velocity, wanted: Velocity, limits: Limits, exchange: Exchange, expected: str
+    name: str, readings: Sequence[Velocity], wanted: Velocity, by: tuple[Limits, int], exchange: Exchange, expected: str
 ) -> Judgement:
-    holds = is_near(limits, measured, wanted)
+    limits, samples = by
+    measured = middle(readings)
+    holds = is_near(limits, measured, wanted, samples=samples)
     return Judgement(f"rest-resources/{name}", holds, exchange, expected, str(measured), "differs")
 
 
 def speed(trace: Trace) -> Judgement | None:
     """Without declared limits: the robot is not faster than it was asked to be, however it overshoots.
 
-    None where there was no command, or no velocity that could be read.
+    None where there was no command, or too few samples that could be read.
     """
-    turn = trace.turns[-1]
-    if turn.velocity is None or not trace.commands:
+    window = velocities(newest(trace.turns))
+    if len(window) < SEVERAL or not trace.commands:
         return None
+    turn, measured = trace.turns[-1], middle(window)
     fastest = Velocity(*(max(map(abs, each)) for each in zip(*(one.velocity for one in trace.commands), strict=True)))
-    holds = all(abs(one) <= 1.5 * asked + 0.2 for one, asked in zip(turn.velocity, fastest, strict=True))
+    holds = all(abs(one) <= 1.5 * asked + 0.2 for one, asked in zip(measured, fastest, strict=True))
     expected = f"a speed that was asked for, at most {rounded(fastest)}"
-    return Judgement("safety/limits-hold", holds, turn.velocity_exchange, expected, str(turn.velocity))
+    return Judgement("safety/limits-hold", holds, turn.velocity_exchange, expected, str(measured))
 
 
-def is_reached(trace: Trace, wanted: Velocity, limits: Limits, part: slice = _ALL) -> bool:
-    """Whether the velocity that was read last is what was wanted, in the components of ``part``."""
-    velocity = trace.turns[-1].velocity
-    return velocity is not None and is_near(limits, _part(velocity, part), _part(wanted, part))
-
-
-def arrival(requirement: str, trace: Trace, wanted: Velocity, limits: Limits, part: slice = _ALL) -> Judgement:
-    """Whether a velocity was reached by the last turn."""
+def arrival(
+    requirement: str, trace: Trace, wanted: Velocity, limits: Limits, part: slice = ALL, since: float = 0.0
+) -> Judgement:
+    """Whether a velocity was reached by the last turns, of which those before ``since`` do not count."""
+    turns = [turn for turn in trace.turns[-_LOOKED_AT:] if turn.at >= since]
+    window = velocities(newest(turns))
+    holds = shown(limits, turns, wanted, part=part, count=max(1, min(SEVERAL, len(window))))
     turn = trace.turns[-1]
-    holds = is_reached(trace, wanted, limits, part)
     expected = f"{rounded(wanted)} within {limits.settle_s:g} s of the command"
-    found = str(turn.velocity) if turn.velocity else turn.velocity_exchange.came
-    return Judgement(requirement, holds, turn.velocity_exchange, expected, found, "not reached")
-
-
-def _part(velocity: Velocity, part: slice) -> Velocity:
-    chosen = set(range(len(velocity))[part])
-    return Velocity(*(value if index in chosen else 0.0 for index, value in enumerate(velocity)))
+    found = str(middle(window)) if window else turn.velocity_exchange.came
+    return Judgement(requirement, bool(holds), turn.velocity_exchange, expected, found, "not reached")
 
 
 def rounded(velocity: Velocity) -> Velocity:

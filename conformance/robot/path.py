@@ -1,11 +1,19 @@
-"""Whether a pose moves by what its velocity says: the velocity is summed up and compared with the way that was made."""
+"""Whether a pose moves by what its velocity says: the velocity is summed up and compared with the way that was made.
+
+Not from the first reading to the last, each of which may be out: windows of a quarter of the way begin at each reading,
+and the median window counts, as far as it would lead on the whole way. A jump of the localisation is in fewer than half
+of them; another unit is in all.
+"""
 
 import itertools
 import math
+import operator
+from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from statistics import median
+from typing import Final, NamedTuple
 
+from conformance.contract.limits import Noise
 from conformance.robot.geometry import wrapped
 from conformance.robot.robot import Odometry, Velocity
 from conformance.verdict.evidence import Judge
@@ -19,11 +27,13 @@ _FEWEST: Final = 3
 _SHARE: Final = 0.1
 _OFF: Final = 0.03
 _OFF_TURN: Final = 0.06
+# A window's share of the way, and what the noise at its ends comes to on the whole way.
+_WINDOW: Final = 0.25
+_NOISES: Final = 8.0
 
 
-@dataclass(frozen=True)
-class _Sum:
-    """A velocity summed up by one clock.
+class _Sum(NamedTuple):
+    """A velocity summed up by one clock, up to one reading.
 
     Attributes:
         x, y: way in the odometry frame, m; turn: change of heading, rad.
@@ -32,37 +42,65 @@ class _Sum:
         turn_error: turn that was made less turn that was summed up, step by step, so that whole turns do not matter.
     """
 
-    x: float
-    y: float
-    turn: float
-    length: float
-    turned: float
-    off: float
-    off_turn: float
-    turn_error: float
+    x: float = 0.0
+    y: float = 0.0
+    turn: float = 0.0
+    length: float = 0.0
+    turned: float = 0.0
+    off: float = 0.0
+    off_turn: float = 0.0
+    turn_error: float = 0.0
 
 
-def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sum:
-    x = y = turn = length = turned = off = off_turn = turn_error = 0.0
+class _Sums(NamedTuple):
+    """The sums up to each reading, and where the robot said to be."""
+
+    trace: Sequence[Odometry]
+    each: Sequence[_Sum]
+
+    def misses(self, course: Sequence[float]) -> list[tuple[float, float]]:
+        """By how far each window misses the pose and the heading, as far as that would lead on the whole course.
+
+        Args:
+            course: the length, or the turn, that was summed up to each reading.
+        """
+        wanted = _WINDOW * course[-1]
+        found = []
+        for first, begun in enumerate(course):
+            last = bisect_left(course, begun + wanted)
+            if last == len(course):
+                break
+            times = course[-1] / (course[last] - begun)
+            one, two, here, there = self.each[first], self.each[last], self.trace[first].pose, self.trace[last].pose
+            way = math.hypot(there.x - here.x - (two.x - one.x), there.y - here.y - (two.y - one.y))
+            found.append((times * way, times * abs(two.turn_error - one.turn_error)))
+        return found
+
+
+def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sums:
+    steps = [_Sum()]
     for (one, first), (two, last) in itertools.pairwise(zip(trace, velocities, strict=True)):
         lapse = two.stamp - one.stamp if by_stamp else (two.sent + two.received - one.sent - one.received) / 2
-        rate = (first.angular_z + last.angular_z) / 2
-        step_turn = rate * lapse
-        heading = one.pose.yaw + step_turn / 2
+        turn = (first.angular_z + last.angular_z) / 2 * lapse
+        heading = one.pose.yaw + turn / 2
         ahead, aside = (first.linear_x + last.linear_x) / 2 * lapse, (first.linear_y + last.linear_y) / 2 * lapse
-        x += ahead * math.cos(heading) - aside * math.sin(heading)
-        y += ahead * math.sin(heading) + aside * math.cos(heading)
-        turn += step_turn
-        length += math.hypot(ahead, aside)
-        turned += abs(step_turn)
-        off += math.hypot(last.linear_x - first.linear_x, last.linear_y - first.linear_y) * abs(lapse) / 2
-        off_turn += abs(last.angular_z - first.angular_z) * abs(lapse) / 2
-        made = two.pose.yaw - one.pose.yaw - step_turn
-        turn_error += wrapped(made) if math.isfinite(made) else math.inf
-    return _Sum(x, y, turn, length, turned, off, off_turn, turn_error)
+        made = two.pose.yaw - one.pose.yaw - turn
+        steps.append(
+            _Sum(
+                x=ahead * math.cos(heading) - aside * math.sin(heading),
+                y=ahead * math.sin(heading) + aside * math.cos(heading),
+                turn=turn,
+                length=math.hypot(ahead, aside),
+                turned=abs(turn),
+                off=math.hypot(last.linear_x - first.linear_x, last.linear_y - first.linear_y) * abs(lapse) / 2,
+                off_turn=abs(last.angular_z - first.angular_z) * abs(lapse) / 2,
+                turn_error=wrapped(made) if math.isfinite(made) else math.inf,
+            )
+        )
+    return _Sums(trace, list(itertools.accumulate(steps, lambda total, step: _Sum(*map(operator.add, total, step)))))
 
 
-def judge_path(judge: Judge, trace: Sequence[Odometry], measured: Sequence[Velocity]) -> None:
+def judge_path(judge: Judge, trace: Sequence[Odometry], measured: Sequence[Velocity], noise: Noise) -> None:
     """Judge pose-motion and pose-rotation by the readings along a drive, where it went far enough.
 
     The robot's stamps or the time of the readings has to fit, as a simulation may run slower than the clock on the
@@ -73,39 +111,51 @@ def judge_path(judge: Judge, trace: Sequence[Odometry], measured: Sequence[Veloc
         judge: is told.
         trace: readings of the odometry, in their order.
         measured: a reading of GET /robot/velocity/ for each of them.
+        noise: of the robot's odometry.
     """
     if len(trace) < _FEWEST:
         return
     sources = ([one.velocity for one in trace], measured)
     sums = [_summed(trace, source, by_stamp=by_stamp) for source in sources for by_stamp in (True, False)]
-    _judge_way(judge, trace, [one for one in sums if one.length >= _SHORTEST])
-    _judge_turn(judge, trace, [one for one in sums if one.turned >= _LEAST_TURN])
+    _judge_way(judge, [one for one in sums if one.each[-1].length >= _SHORTEST], noise)
+    _judge_turn(judge, [one for one in sums if one.each[-1].turned >= _LEAST_TURN], noise)
 
 
-def _judge_way(judge: Judge, trace: Sequence[Odometry], sums: Sequence[_Sum]) -> None:
+def _judge_way(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
     if not sums:
         return
-    first, last = trace[0], trace[-1]
-    made_x, made_y = last.pose.x - first.pose.x, last.pose.y - first.pose.y
-    misses = [math.hypot(made_x - one.x, made_y - one.y) - (_SHARE * one.length + _OFF + one.off) for one in sums]
+    misses = []
+    for one in sums:
+        whole = one.each[-1]
+        windows = one.misses([each.length for each in one.each])
+        room = _SHARE * whole.length + _OFF + whole.off + _NOISES * noise.position_m
+        misses.append(median(way for way, _ in windows) - room if windows else 0.0)
+    (first, *_, last), whole = sums[0].trace, sums[0].each[-1]
     judge.check(
         "rest-resources/pose-motion",
         any(miss <= 0 for miss in misses),
         last.exchange,
-        f"a way of ({sums[0].x:.3f}, {sums[0].y:.3f}) m, which is what the velocity adds up to",
-        found=f"the pose moved by ({made_x:.3f}, {made_y:.3f}) m",
+        f"a way of ({whole.x:.3f}, {whole.y:.3f}) m, which is what the velocity adds up to",
+        found=f"the pose moved by ({last.pose.x - first.pose.x:.3f}, {last.pose.y - first.pose.y:.3f}) m",
         cause="another way",
     )
 
 
-def _judge_turn(judge: Judge, trace: Sequence[Odometry], sums: Sequence[_Sum]) -> None:
+def _judge_turn(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
     if not sums:
         return
+    misses = []
+    for one in sums:
+        whole = one.each[-1]
+        windows = one.misses([each.turned for each in one.each])
+        room = _SHARE * whole.turned + _OFF_TURN + whole.off_turn + _NOISES * noise.heading_rad
+        misses.append(median(turn for _, turn in windows) - room if windows else 0.0)
+    whole = sums[0].each[-1]
     judge.check(
         "rest-resources/pose-rotation",
-        any(abs(one.turn_error) <= _SHARE * one.turned + _OFF_TURN + one.off_turn for one in sums),
-        trace[-1].exchange,
-        f"a turn of {sums[0].turn:.3f} rad, which is what the angular velocity adds up to",
-        found=f"the heading turned by {sums[0].turn + sums[0].turn_error:.3f} rad",
+        any(miss <= 0 for miss in misses),
+        sums[0].trace[-1].exchange,
+        f"a turn of {whole.turn:.3f} rad, which is what the angular velocity adds up to",
+        found=f"the heading turned by {whole.turn + whole.turn_error:.3f} rad",
         cause="another turn",
     )

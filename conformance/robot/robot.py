@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +15,6 @@ from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import Pose, pose_of
 from conformance.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
 from conformance.transport.exchange import Exchange
-from conformance.transport.pace import Patience
 
 POSE: Final = "/robot/pose/"
 VELOCITY: Final = "/robot/velocity/"
@@ -61,11 +61,26 @@ class Velocity(NamedTuple):
 STILL: Final = Velocity()
 
 
-def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float = 1.0) -> bool:
-    """Whether each component is what was wanted, within ``factor`` times the declared tolerance."""
+# Of a sample's noise: one in fifteen thousand is farther off than this, if the noise is normal.
+FARTHEST: Final = 4.0
+
+
+def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float = 1.0, samples: int = 1) -> bool:
+    """Whether each component is what was wanted, within ``factor`` times the declared tolerance, and the noise.
+
+    Args:
+        limits: of the robot.
+        measured: one sample, or the median of several.
+        wanted: what it should be.
+        factor: how much of the tolerance.
+        samples: of how many samples the median is: noise counts the less, the more there are.
+    """
+    noise = limits.noise
+    off = FARTHEST / math.sqrt(samples)
+    rooms = (*[off * noise.linear_m_s] * 3, *[off * noise.angular_rad_s] * 3)
     return all(
-        abs(one - other) <= factor * (limits.tolerance_abs + limits.tolerance * abs(other))
-        for one, other in zip(measured, wanted, strict=True)
+        abs(one - other) <= factor * (limits.tolerance_abs + limits.tolerance * abs(other)) + room
+        for one, other, room in zip(measured, wanted, rooms, strict=True)
     )
 
 
@@ -114,10 +129,6 @@ class Robot:
         A quarter more than declared and a quarter of a second, for a loaded machine and a network between.
         """
         return 1.25 * self.limits.settle_s + 0.25 + 4 * self.usual_s
-
-    def patience(self, seconds: float) -> Patience:
-        """A wait for what the robot has so many seconds for."""
-        return Patience(self.rest.connection.pace, seconds)
 
     def get(self, path: str) -> Exchange:
         """GET as JSON."""

@@ -1,7 +1,5 @@
 """Velocities in any order, as a state machine: what was asked for last is what the robot does."""
 
-import time
-
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
@@ -85,15 +83,13 @@ class VelocityMachine(RuleBasedStateMachine):
         if not self._drive.reach(wanted, "rest-resources/linear-put", part=linear):
             return False
         # Whether the angular part lasts longer than it was asked for is the robot's affair.
-        turning, exchange = self._drive.look()
-        if time.monotonic() > self._drive.holds_until or turning is None:
-            return True
-        return self._robot.judge.check(
+        keeps, found = self._drive.sees(wanted, 1.5, part=slice(3, 6), until=self._drive.holds_until)
+        return keeps is None or self._robot.judge.check(
             "rest-resources/linear-keeps-angular",
-            self._robot.near(turning._replace(linear_x=wanted.linear_x), wanted, 1.5),
-            exchange,
+            keeps,
+            self._drive.trace.turns[-1].velocity_exchange,
             f"the angular part as it was, {self._wanted}",
-            found=str(turning),
+            found=found,
             cause="changed",
         )
 
@@ -102,14 +98,12 @@ class VelocityMachine(RuleBasedStateMachine):
         bad = [0.0] * 6
         bad[component] = times * 1e3
         self._robot.put_velocity(Velocity(*bad))
-        velocity, exchange = self._drive.look()
-        if time.monotonic() > self._drive.holds_until:
-            return True
-        return self._robot.judge.check(
+        keeps, found = self._drive.sees(self._wanted, 2, until=self._drive.holds_until)
+        return keeps is None or self._robot.judge.check(
             "safety/refused-keeps",
-            velocity is not None and self._robot.near(velocity, self._wanted, 2),
-            exchange,
+            keeps,
+            self._drive.trace.turns[-1].velocity_exchange,
             f"the velocity that was there before the refused one, {self._wanted}",
-            found=str(velocity) if velocity else "",
+            found=found,
             cause="changed",
         )

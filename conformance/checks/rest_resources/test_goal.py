@@ -186,17 +186,17 @@ def _await_motion(robot: Robot) -> None:
 
 def _stays(robot: Robot, judge: Judge) -> None:
     """No motion and no goal come back."""
+    drive = Drive(robot)
     until = time.monotonic() + _STAYS_S * robot.watchfulness
     while time.monotonic() < until:
-        velocity, exchange = robot.velocity()
+        stays, found = drive.sees(STILL, 2)
         goal, shown = robot.goal()
-        moving = velocity is not None and not robot.near(velocity, STILL, 2)
+        moving = stays is False
         judge.check(
             "safety/cancel-stays",
             not moving and goal is None,
-            exchange if moving else shown,
+            drive.trace.turns[-1].velocity_exchange if moving else shown,
             "rest, and no goal, after the goal was cancelled",
-            found=f"velocity {velocity}" if moving else "a goal is active again",
+            found=f"velocity {found}" if moving else "a goal is active again",
             cause="does not stay",
         )
-        time.sleep(0.02)

@@ -62,6 +62,25 @@ class _Relentless:
             time.sleep(0.15)
 
 
+class _LongWinded:
+    """A velocity is renewed by the robot itself, once, after half of its hold time."""
+
+    def __init__(self) -> None:
+        self._turn = 0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if (_PUT(request) or rest("PUT", GOAL)(request)) and success(response):
+            self._turn += 1
+            if moving(request):
+                later(0.55, self._renew, self._turn, request.copy(), forward)
+        return response
+
+    def _renew(self, turn: int, request: Request, forward: Forward) -> None:
+        if self._turn == turn:
+            sent(request, forward, "PUT", VELOCITY, parsed(request.body))
+
+
 class _ShortOfBreath:
     """A velocity ends after 0.15 s."""
 
@@ -186,6 +205,7 @@ _mutant = of_class("safety", "rest")
 
 MUTANTS = (
     _mutant("safety-relentless", "A velocity holds for ten seconds.", "watchdog", _Relentless),
+    _mutant("safety-long-winded", "A velocity holds for half as long again.", "hold-ends", _LongWinded),
     _mutant("safety-short-of-breath", "A velocity holds for 0.15 s.", "hold", _ShortOfBreath),
     _mutant("safety-no-renewal", "The same velocity again does not renew it.", "renewal", _Once),
     _mutant(

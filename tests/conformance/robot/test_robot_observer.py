@@ -69,16 +69,30 @@ def test_good_readings_are_cases(api):
         ("/robot/pose/", odometry(6, w=0), "rest-resources/pose-quaternion"),
         ("/robot/pose/", odometry(0), "rest-resources/pose-stamp"),
         ("/robot/velocity/", {"linear": _ZERO}, "rest-resources/velocity-type"),
-        ("/robot/velocity/", {"linear": _ZERO | {"x": 0.6}, "angular": _ZERO}, "safety/limits-hold"),
-        ("/robot/velocity/", {"linear": _ZERO, "angular": _ZERO | {"z": -2.2}}, "safety/limits-hold"),
         ("/robot/velocity/linear/", [0, 0, 0], "rest-resources/linear-type"),
-        ("/robot/velocity/linear/", _ZERO | {"y": 1.0}, "safety/limits-hold"),
     ],
 )
 def test_one_bad_reading_among_good_ones_is_found(api, path, value, requirement):
     see(api, "/robot/pose/", odometry(5))
     see(api, path, value)
     assert found(api) == {requirement}
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("/robot/velocity/", {"linear": _ZERO | {"x": 0.6}, "angular": _ZERO}),
+        ("/robot/velocity/", {"linear": _ZERO, "angular": _ZERO | {"z": -2.2}}),
+        ("/robot/velocity/linear/", _ZERO | {"y": 1.0}),
+    ],
+)
+def test_a_robot_is_too_fast_by_several_samples_never_by_one(api, path, value):
+    for second in range(1, 4):
+        assert not found(api)
+        see(api, "/robot/pose/", odometry(second))
+        see(api, path, value)
+        see(api, path, value)
+    assert found(api) == {"safety/limits-hold"}
 
 
 def test_an_error_is_no_reading(api):
@@ -122,5 +136,7 @@ def test_a_limit_declared_as_high_as_one_that_nobody_declared_is_judged(api):
     declared = DeclaredLimits(linear_m_s=undeclared.linear_m_s)
     api.run.statement = Statement(declared=declared)
     fast = _ZERO | {"x": 2 * undeclared.linear_m_s}
-    see(api, "/robot/velocity/", {"linear": fast, "angular": _ZERO | {"z": 9.0}})
+    for second in range(1, 4):
+        see(api, "/robot/pose/", odometry(second))
+        see(api, "/robot/velocity/", {"linear": fast, "angular": _ZERO | {"z": 9.0}})
     assert found(api) == {"safety/limits-hold"}

@@ -2,6 +2,7 @@ import math
 
 import pytest
 
+from conformance.contract.limits import Noise
 from conformance.robot.geometry import Pose, length_of, quaternion_of, wrapped, yaw_of
 from conformance.robot.path import judge_path
 from conformance.robot.robot import Odometry, Velocity
@@ -28,7 +29,7 @@ def drive(v: float, w: float, start: Pose, change=lambda pose: pose, seconds: fl
 
 def refuted(v: float, w: float, change=lambda pose: pose, start: Pose = _START) -> set[str]:
     judge = Judge(_IDS)
-    judge_path(judge, *drive(v, w, start, change))
+    judge_path(judge, *drive(v, w, start, change), Noise())
     assert sum(evidence.cases for evidence in judge.evidence.values())
     return {id_.split("/")[1] for id_ in judge.refuted()}
 
@@ -60,7 +61,7 @@ def test_a_pose_that_moves_otherwise_is_refuted(change, v, w, found):
 
 def test_a_robot_that_did_not_move_is_not_judged():
     judge = Judge(_IDS)
-    judge_path(judge, *drive(0.0, 0.0, Pose(0, 0, 0)))
+    judge_path(judge, *drive(0.0, 0.0, Pose(0, 0, 0)), Noise())
     assert not any(evidence.cases for evidence in judge.evidence.values())
 
 
@@ -68,7 +69,7 @@ def test_a_simulation_at_half_speed_goes_by_its_stamps():
     trace, measured = drive(0.3, 0.0, Pose(0, 0, 0))
     slow = [Odometry(2 * o.sent, 2 * o.received, o.stamp, o.pose, o.velocity, o.exchange) for o in trace]
     judge = Judge(_IDS)
-    judge_path(judge, slow, measured)
+    judge_path(judge, slow, measured, Noise())
     assert not judge.refuted()
 
 
