@@ -10,6 +10,7 @@ from conformance.documents.representation import flattened
 from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.interface import RestInterface
 from conformance.rest.snapshot import flatten
+from conformance.transport.pace import Patience
 
 _PAUSE_S = 0.01
 
@@ -34,7 +35,8 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
     if read is None or not isinstance(call.value, dict):
         return None
     limits = api.run.statement.limits
-    until = time.monotonic() + 1.25 * limits.settle_s + 0.5 + 4 * api.run.effort.usual_ms / 1000
+    pace = api.client.connection.pace
+    patience = Patience(pace, 1.25 * limits.settle_s + 0.5 + 4 * pace.usual_s)
     wanted = flattened(call.value)
     renew_at = time.monotonic() + 0.4 * (limits.hold_s or math.inf)
     while True:
@@ -48,7 +50,7 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
         ]
         if not other:
             return ""
-        if time.monotonic() > until:
+        if patience.over:
             return other[0]
         if time.monotonic() > renew_at:
             renew_at = math.inf

@@ -11,6 +11,7 @@ from conformance.robot.message_shapes import read_as
 from conformance.robot.probe.client import Probe, ProbeError, RosProbe
 from conformance.robot.robot import ACCEPT_JSON, DELIVERIES
 from conformance.transport.client import HttpClient
+from conformance.transport.pace import Patience
 
 # How long messages are waited for, and how long after the last one another would still be noticed, s.
 _ARRIVES_S: Final = 2.0
@@ -75,8 +76,8 @@ class ListObserver:
 
     def collect(self, count: int) -> list[Seen]:
         """See DeliveryObserver."""
-        until = time.monotonic() + _ARRIVES_S + 4 * self._slow_s
-        while len(self._new(self._listed())) < count and time.monotonic() < until:
+        patience = Patience(self._rest.connection.pace, _ARRIVES_S + 4 * self._slow_s)
+        while len(self._new(self._listed())) < count and not patience.over:
             time.sleep(_STEP_S)
         time.sleep(_QUIET_S)
         listed = self._listed()

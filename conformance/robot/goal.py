@@ -83,21 +83,21 @@ def await_goal(robot: Robot, put: dict[str, Any]) -> tuple[Any, str, Exchange]:
     Returns:
         The goal (None where none is shown), in what it differs, and the evidence.
     """
-    until = time.monotonic() + robot.settle_s
+    patience = robot.patience(robot.settle_s)
     while True:
         goal, exchange = robot.goal()
         problem = exchange.came if goal is None else difference(goal, put)
-        if not problem or time.monotonic() > until:
+        if not problem or patience.over:
             return goal, problem, exchange
         time.sleep(_STEP_S)
 
 
 def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
     """Read the active goal until there is none, for as long as commands may take, or for so long."""
-    until = time.monotonic() + (robot.settle_s if seconds is None else seconds)
+    patience = robot.patience(robot.settle_s if seconds is None else seconds)
     while True:
         exchange = robot.get(GOAL_PATH)
-        if exchange.response.status == HTTPStatus.NOT_FOUND or time.monotonic() > until:
+        if exchange.response.status == HTTPStatus.NOT_FOUND or patience.over:
             return exchange
         time.sleep(_STEP_S)
 

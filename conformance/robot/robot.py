@@ -15,6 +15,7 @@ from conformance.rest.interface import RestInterface
 from conformance.robot.geometry import Pose, pose_of
 from conformance.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
 from conformance.transport.exchange import Exchange
+from conformance.transport.pace import Patience
 
 POSE: Final = "/robot/pose/"
 VELOCITY: Final = "/robot/velocity/"
@@ -129,6 +130,10 @@ class Robot:
         A quarter more than declared and a quarter of a second, for a loaded machine and a network between.
         """
         return 1.25 * self.limits.settle_s + 0.25 + 4 * self.usual_s
+
+    def patience(self, seconds: float) -> Patience:
+        """A wait for what the robot has so many seconds for."""
+        return Patience(self.rest.connection.pace, seconds)
 
     def get(self, path: str) -> Exchange:
         """GET as JSON."""

@@ -1,5 +1,6 @@
 """Bringing a robot to rest: before a check that needs it there, and at the end of every run."""
 
+import math
 import time
 from dataclasses import replace
 from http import HTTPStatus
@@ -11,6 +12,7 @@ from conformance.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
 from conformance.robot.robot import ACCEPT_JSON, GOAL_PATH, JSON_BODY, POSE, STILL, VELOCITY, Velocity
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Response
+from conformance.transport.pace import Pace, Patience
 
 # A robot with a queue of missions starts the next one when the first is cancelled: cancel again for so long, s.
 _CANCEL_S: Final = 3.0
@@ -51,9 +53,10 @@ def leave_at_rest(api: RestInterface) -> None:
     if not api.run.allow_motion or not api.run.contract.own:
         return
     try:
-        # A client of its own: no listener judges any more, and an endpoint that hung once is asked again all the same.
+        # A client of its own: no listener judges any more, an endpoint that hung once is asked again all the same, and
+        # nothing is late.
         timeout_s = min(_LAST_TIMEOUT_S + 3 * api.run.effort.usual_ms / 1000, api.client.connection.timeout_s)
-        connection = replace(api.client.connection, timeout_s=timeout_s, listeners=[])
+        connection = replace(api.client.connection, timeout_s=timeout_s, listeners=[], pace=Pace(math.inf))
         client = HttpClient(api.client.base_url, connection)
         try:
             _Stiller(client, _slowest(api)).bring(_LAST_S, _LAST_S)
@@ -90,14 +93,17 @@ class _Stiller:
 
     def bring(self, cancel_s: float, settle_s: float) -> str:
         """Cancel and stop; what bring_to_rest() says of it."""
-        cancelled = self._no_goal_left(time.monotonic() + cancel_s)
+        cancelled = self._no_goal_left(self._patience(cancel_s))
         # Also where the goal could not be cancelled: a robot that takes velocities meanwhile stops for a moment.
         self._ask("PUT", VELOCITY, JSON_BODY, body_of(STILL.twist))
         if not cancelled:
             return f"its goal is still active after {cancel_s:g} s of cancelling it"
-        return self._wait(time.monotonic() + settle_s)
+        return self._wait(self._patience(settle_s))
 
-    def _no_goal_left(self, until: float) -> bool:
+    def _patience(self, seconds: float) -> Patience:
+        return Patience(self._client.connection.pace, seconds)
+
+    def _no_goal_left(self, patience: Patience) -> bool:
         while True:
             cancelled = self._ask("DELETE", GOAL_PATH)
             current = self._ask("GET", GOAL_PATH, ACCEPT_JSON)
@@ -105,12 +111,12 @@ class _Stiller:
             # moves is seen by its velocity.
             if current is None or not current.response.ok or not _shows(current.response):
                 return True
-            if time.monotonic() > until:
+            if patience.over:
                 return False
             if cancelled is None or not cancelled.response.ok:
                 time.sleep(_STEP_S)
 
-    def _wait(self, until: float) -> str:
+    def _wait(self, patience: Patience) -> str:
         calm = 0
         while True:
             speed, problem = self._speed()
@@ -119,7 +125,7 @@ class _Stiller:
             calm = calm + 1 if speed <= self._tolerance else 0
             if calm > 1:
                 return ""
-            if time.monotonic() > until:
+            if patience.over:
                 return f"it still moves with {speed:.3g} m/s or rad/s"
             time.sleep(_STEP_S if calm == 0 else 0.002)
 

@@ -189,10 +189,10 @@ def test_goal(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effo
 
 def _compare_goals(robot: Robot, subscribers: SoapService, judge: Judge) -> None:
     """Compare the goals that both interfaces show; the two may learn of a change one after the other."""
-    until = time.monotonic() + robot.settle_s
+    patience = robot.patience(robot.settle_s)
     while True:
         problem, exchange = _goal_difference(robot, subscribers)
-        if not problem or time.monotonic() > until:
+        if not problem or patience.over:
             break
         time.sleep(0.05)
     if problem is not None:

@@ -25,9 +25,9 @@ def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
     """Each reading is a whole odometry, and from one to the next time goes on; the observer judges them one by one."""
     stamps: set[float] = set()
     exchange: Exchange | None = None
-    until = time.monotonic() + _PATIENCE_S
+    patience = robot.patience(_PATIENCE_S)
     readings = 0
-    while readings < effort.cases(100) or (len(stamps) < 2 and time.monotonic() < until):
+    while readings < effort.cases(100) or (len(stamps) < 2 and not patience.over):
         odometry = robot.odometry()
         readings += 1
         if odometry is not None:

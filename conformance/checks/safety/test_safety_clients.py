@@ -12,16 +12,19 @@ from conformance.robot.message_shapes import body_of
 from conformance.robot.robot import GOAL_PATH, LINEAR, POSE, STILL, VELOCITY, Robot, Velocity
 from conformance.robot.stopping import bring_to_rest
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import NoAnswerError
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
 from conformance.transport.incomplete_request import PartialRequest
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
-_WATCH_S: Final = 0.3
+# After each; all are watched for the settle time in the end, s.
+_WATCH_S: Final = 0.06
 # For so long a robot has time to read what has come before the connection breaks, s.
 _READ_S: Final = 0.03
 # The usual time may be a tenth of a millisecond; a scheduler's turn on a busy machine is no failure, s.
 _USUAL_S: Final = 1.0
+# Nor is an answer that the network held up: who waits for the others' requests to end does not answer the third one.
+_TRIES: Final = 3
 
 
 @pytest.mark.phase("motion")
@@ -43,7 +46,7 @@ def test_client_vanished(api: RestInterface, robot: Robot, rest: HttpClient, jud
         partial = PartialRequest(rest, "PUT", path, sent=sent, promised=promised)
         time.sleep(_READ_S)
         partial.vanish(reset=reset)
-        until = time.monotonic() + _WATCH_S / 5 * robot.watchfulness**2
+        until = time.monotonic() + _WATCH_S * robot.watchfulness**2
         while True:
             still, found = drive.sees(STILL, 2)
             moves = still is False
@@ -59,7 +62,7 @@ def test_client_vanished(api: RestInterface, robot: Robot, rest: HttpClient, jud
         )
         if moves:
             bring_to_rest(api)
-    drive.keep(_WATCH_S / 2 * robot.watchfulness)
+    drive.keep(robot.limits.settle_s)
     still, found = drive.sees(STILL, 2)
     judge.check(
         "safety/client-vanished",
@@ -77,20 +80,33 @@ def test_half_requests(robot: Robot, rest: HttpClient, judge: Judge) -> None:
     """While three clients do not come to an end of their requests, others are answered in the usual time."""
     patience_s = max(_USUAL_S, 20 * robot.usual_s)
     judge.at_risk = ("safety/half-request",)
-    # A client of its own: what hangs here, for once, need not hang later.
-    others = HttpClient(rest.base_url, rest.connection)
     with (
-        closing(others),
         PartialRequest(rest, "GET", POSE, head_only=20),
         PartialRequest(rest, "GET", POSE, head_only=-2),
         PartialRequest(rest, "OPTIONS", GOAL_PATH, sent=b"{", promised=100),
     ):
         expected = f"an answer within {patience_s:g} s while three other requests are incomplete"
         for path in (POSE, VELOCITY, POSE):
-            try:
-                # A connection of its own: one that is open already might be served by a thread of its own.
-                exchange = others.send("GET", path, fresh=True, timeout_s=patience_s)
-            except NoAnswerError as none:
-                judge.check("safety/half-request", holds=False, exchange=none.unanswered, expected=expected)
+            attempt = _asked(rest, path, patience_s)
+            answered = isinstance(attempt, Exchange)
+            if not judge.check("safety/half-request", answered, attempt, expected):
                 return
-            judge.check("safety/half-request", holds=True, exchange=exchange, expected=expected)
+
+
+def _asked(client: HttpClient, path: str, patience_s: float) -> Attempt:
+    """What became of a GET, which is asked again when its answer does not come in time."""
+    attempt = _ask_once(client, path, patience_s)
+    for _ in range(_TRIES - 1):
+        if isinstance(attempt, Unanswered) and attempt.kind is NoAnswer.TIMEOUT:
+            attempt = _ask_once(client, path, patience_s)
+    return attempt
+
+
+def _ask_once(client: HttpClient, path: str, patience_s: float) -> Attempt:
+    # A client of its own: what hangs here, for once, need not hang later. A connection of its own: one that is open
+    # already might be served by a thread of its own.
+    with closing(HttpClient(client.base_url, client.connection)) as other:
+        try:
+            return other.send("GET", path, fresh=True, timeout_s=patience_s)
+        except NoAnswerError as none:
+            return none.unanswered

@@ -15,8 +15,6 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
 # No robot of this contract is as fast, whatever its statement leaves out: m/s and rad/s.
 _BEYOND_ANY: Final = 1e3
 _FARTHER: Final = (1e6, 1e308)
-# For so long a command that was taken after all would show, s.
-_WATCH_S: Final = 0.25
 
 
 def _only(component: int, value: float) -> Velocity:
@@ -70,9 +68,9 @@ def _judge_refused(robot: Robot, judge: Judge, bad: Velocity) -> None:
 
 
 def _judge_rest(robot: Robot, judge: Judge) -> None:
-    """Nothing of what was refused shows a little later."""
+    """Nothing of what was refused shows in the settle time, by which a robot that took it would move."""
     drive = Drive(robot)
-    until = time.monotonic() + _WATCH_S * robot.watchfulness
+    until = time.monotonic() + robot.limits.settle_s
     still, found = drive.sees(STILL, 2)
     while still is not False and time.monotonic() < until:
         still, found = drive.sees(STILL, 2)

@@ -21,12 +21,15 @@ from conformance.soap import content
 from conformance.soap.calls import call
 from conformance.soap.service import SoapService
 from conformance.transport.client import HttpClient
+from conformance.transport.pace import Patience
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 # A delivery with these coordinates is none that any other check sends.
 _DEPOT_X = 4711.125
 _STEP_S = 0.02
+# A robot has read both of two requests, one after the other, by then, s.
+_LISTED_S = 1.0
 
 
 def _listed(rest: HttpClient, depot_x: float) -> int | None:
@@ -57,7 +60,7 @@ def test_misunderstood_has_no_effect(interfaces: Interfaces, judge: Judge, effor
         # A valid delivery after it shows when the robot is through with both.
         marker = depot_x + 0.5
         call(service, delivery_messages.delivery(depot_x=repr(marker)))
-        _until(partial(_listed, api.client, marker), 1.0)
+        _until(partial(_listed, api.client, marker), Patience(api.client.connection.pace, _LISTED_S))
         listed = _listed(api.client, depot_x)
         for id_ in ("soap-basic-profile/R1025", "soap-basic-profile/R1028"):
             judge.check(
@@ -89,7 +92,7 @@ def test_goal_is_shown(interfaces: Interfaces, judge: Judge) -> None:
     exchange = put_goal(robot, put)
     if exchange.response.status not in {201, 202}:
         return
-    shown = _until(lambda: _goal_id(service) == id_, robot.settle_s)
+    shown = _until(lambda: _goal_id(service) == id_, robot.patience(robot.settle_s))
     # A short goal may have ended before anybody could see it; then REST does not show it either.
     ended = robot.goal()[0] is None
     if shown or not ended:
@@ -110,11 +113,10 @@ def _goal_id(service: SoapService) -> str | None:
     return content.text_at(first, "goal_id", "id") if first is not None else None
 
 
-def _until(condition: Callable[[], object], seconds: float) -> bool:
+def _until(condition: Callable[[], object], patience: Patience) -> bool:
     """Ask until it is so, or the time is over."""
-    end = time.monotonic() + seconds
     while not condition():
-        if time.monotonic() > end:
+        if patience.over:
             return False
         time.sleep(_STEP_S)
     return True

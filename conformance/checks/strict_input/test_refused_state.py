@@ -27,7 +27,6 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.needs("rest"), pytest.mark.motion]
-_WATCH_S: Final = 0.3
 _CORRECT: Final = ("3", "1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
 _BAD_PARTS: Final = (
     *((0, text) for text in ("0", "5", "abc", "", "3.5", "2147483648")),
@@ -60,7 +59,8 @@ def test_an_invalid_velocity_moves_nothing(api: RestInterface, robot: Robot, jud
             if not _judge_still(robot, judge, velocity, sent):
                 bring_to_rest(api)
                 sent.clear()
-    drive.keep(_WATCH_S * robot.watchfulness)
+    # In the settle time a robot that took the last of them after all would move.
+    drive.keep(robot.limits.settle_s)
     velocity, _ = drive.look()
     _judge_still(robot, judge, velocity, sent)
 
