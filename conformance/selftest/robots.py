@@ -14,12 +14,17 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO
 
+import conformance.contract
+from conformance.selftest.servers.programs import built, program
+
 _HERE = Path(__file__).parent
-_READY = re.compile(r"ready rest=(\S+) soap=(\S+)")
+_READY = re.compile(r"ready rest=(\S+) soap=(\S*)")
 _START_S, _STOP_S = 40.0, 10.0
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
 _DOMAINS = 102
 INDEPENDENT_ROBOTS = ("plain", "baroque", "legacy")
+# Those whose web server answers much by itself; of most there are fewer resources.
+ON_SERVERS = ("node", "golang")
 REFERENCE = "reference"
 
 
@@ -34,7 +39,7 @@ class Robot:
     Attributes:
         kind: "reference" or an independent robot's name.
         rest: REST's base URL.
-        soap: the publishers' WSDL.
+        soap: the publishers' WSDL, or empty.
         domain_id: its ROS domain, or None.
     """
 
@@ -72,6 +77,7 @@ def running(kind: str, domain_id: int) -> Iterator[Robot]:
 
     Raises:
         RobotError: it does not start.
+        NotInstalledError: what it runs on is not there.
     """
     check_available(kind)
     if kind == REFERENCE:
@@ -105,11 +111,7 @@ def _own_domain(first: int) -> Iterator[int]:
 
 @contextlib.contextmanager
 def _started(kind: str, domain_id: int) -> Iterator[Robot]:
-    ports = ["--rest-port", "0", "--soap-port", "0"]
-    if kind == REFERENCE:
-        command = [sys.executable, "-m", "roaas", "robot", *ports, "--domain-id", str(domain_id)]
-    else:
-        command = [sys.executable, "-m", "conformance.selftest.independent_robots", kind, *ports]
+    command = _command(kind, domain_id)
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     # The command is this interpreter with arguments made above.
     process = subprocess.Popen(  # noqa: S603
@@ -127,6 +129,23 @@ def _started(kind: str, domain_id: int) -> Iterator[Robot]:
             process.wait()
         if process.stdout is not None:
             process.stdout.close()
+
+
+def _command(kind: str, domain_id: int) -> list[str]:
+    """What starts a robot on free ports.
+
+    Raises:
+        NotInstalledError: what it runs on is not there.
+    """
+    ports = ["--rest-port", "0", "--soap-port", "0"]
+    if kind == REFERENCE:
+        return [sys.executable, "-m", "roaas", "robot", *ports, "--domain-id", str(domain_id)]
+    folder = _HERE / "independent_robots" / kind
+    if kind == "node":
+        return [program("node", "nodejs"), str(folder / "robot.js")]
+    if kind == "golang":
+        return [str(built(*sorted(folder.glob("*.go")))), str(Path(conformance.contract.__file__).parent)]
+    return [sys.executable, "-m", "conformance.selftest.independent_robots", kind, *ports]
 
 
 def _ready(process: subprocess.Popen[str], kind: str) -> tuple[str, str]:

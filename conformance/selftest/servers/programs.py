@@ -27,22 +27,22 @@ def program(name: str, package: str) -> str:
     return found
 
 
-def built(source: Path) -> Path:
-    """A Go program, built from one file and the standard library; kept until its source changes.
+def built(*sources: Path) -> Path:
+    """A Go program, built from its files and the standard library; kept until one of them changes.
 
     Raises:
         NotInstalledError: there is no Go, or it fails.
     """
     go = program("go", "golang-go")
-    checksum = zlib.crc32(source.read_bytes())
-    binary = Path(tempfile.gettempdir(), f"roaas-go-{os.getuid()}", f"{source.stem}-{checksum:08x}")
+    checksum = zlib.crc32(b"".join(source.read_bytes() for source in sources))
+    binary = Path(tempfile.gettempdir(), f"roaas-go-{os.getuid()}", f"{sources[0].stem}-{checksum:08x}")
     if binary.exists():
         return binary
     binary.parent.mkdir(mode=0o700, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=binary.parent) as folder:
         environment = {**os.environ, "GOFLAGS": "-mod=mod", "GOPROXY": "off"}
-        command = [go, "build", "-o", f"{folder}/built", str(source)]
-        done = subprocess.run(  # noqa: S603 - the program found above, on a file of ours
+        command = [go, "build", "-o", f"{folder}/built", *map(str, sources)]
+        done = subprocess.run(  # noqa: S603 - the program found above, on files of ours
             command, capture_output=True, check=False, env=environment, timeout=_BUILD_S
         )
         if done.returncode:
