@@ -67,7 +67,7 @@ _SHORT = (
 @click.option(
     "--variants/--no-variants",
     default=True,
-    help="Try good robots behind TLS, a prefix, a token and the like, and behind nginx and other web servers.",
+    help="Try good robots behind TLS, a prefix, a token and the like, behind nginx and on other web servers.",
 )
 @click.option("--parallel", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at once.")
 @click.option(
@@ -203,6 +203,7 @@ def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) 
         # The slow one first, so that it does not keep all others waiting in the end.
         cases += [Case(variant.robot, variant, 0) for variant in VARIANTS]
         cases += [Case(front.robot, front, 0) for front in FRONTS if front.robot in kinds]
+        cases += [Case(kind, None, 0) for kind in robots.ON_SERVERS]
     cases += [Case(kind, None, seed) for seed in range(options["seeds"]) for kind in kinds]
     progress.total = len(cases)
     report.control_results = run_controls(

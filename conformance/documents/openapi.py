@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
+from urllib.parse import unquote
 
 from conformance.contract.files import Contract, ContractError
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, opened, resolved
@@ -256,6 +257,12 @@ def matching(contract: Contract, method: str, path: str) -> Operation | None:
 def known_path(contract: Contract, path: str) -> bool:
     """Whether any resource of the contract has this path."""
     return resource_at(contract, path) is not None
+
+
+def is_normal(path: str) -> bool:
+    """Whether a path has no segment that servers take away by themselves: an empty one, ``.`` or ``..``."""
+    segments = [unquote(segment) for segment in path.split("/")]
+    return "" not in segments[1:-1] and not {".", ".."} & set(segments)
 
 
 def inside_prefix(contract: Contract, path: str) -> bool:

@@ -4,7 +4,7 @@ import re
 from typing import Any
 
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import inside_prefix
+from conformance.documents.openapi import inside_prefix, is_normal
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
 from conformance.rest.interface import RestInterface
 from conformance.rest.request_context import RequestContext
@@ -70,7 +70,7 @@ def _by_server(api: RestInterface, context: RequestContext, answer: Response) ->
     path = context.target.split("?", 1)[0]
     return (
         context.request.method not in STANDARD_METHODS
-        or "//" in path
+        or not is_normal(path)
         or not inside_prefix(api.run.contract, path)
         or (answer.status == _NOT_ACCEPTABLE and not answer.body)
     )

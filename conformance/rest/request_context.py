@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from conformance.contract.files import Contract
-from conformance.documents.openapi import Operation, matching
+from conformance.documents.openapi import Operation, is_normal, matching
 from conformance.rest.accept import accept_of, quality
 from conformance.transport.exchange import Request
 
@@ -30,7 +30,7 @@ class RequestContext:
     Attributes:
         request: as it went out.
         target: path and query below the base URL.
-        operation: the one that it is for, or None.
+        operation: the one that it is for, or None; also where a server may make another path of it.
     """
 
     request: Request
@@ -46,7 +46,7 @@ class RequestContext:
         if target and target[0] not in "/?":
             return None
         path = target.split("?", 1)[0]
-        return cls(request, target, matching(contract, request.method, path))
+        return cls(request, target, matching(contract, request.method, path) if is_normal(path) else None)
 
     @property
     def is_head(self) -> bool:

@@ -8,7 +8,7 @@ from urllib.parse import parse_qsl, unquote
 from conformance.contract.files import Contract
 from conformance.documents.json_schema import Schema, kind_of, shape_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, Parameter, is_json, is_xml, matching
+from conformance.documents.openapi import Operation, Parameter, is_json, is_normal, is_xml, matching
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
 
 VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
@@ -56,7 +56,7 @@ def validity(contract: Contract, method: str, target: str, media_type: str, body
     """
     path, _, query = target.partition("?")
     operation = matching(contract, method, path)
-    if operation is None or method != operation.method:
+    if operation is None or method != operation.method or not is_normal(path):
         return Validity(UNCLEAR)
     found = [*_of_path(operation, path), *_of_query(operation, query), _of_body(operation, media_type, body)]
     for wanted in (UNCLEAR, INVALID):

@@ -42,6 +42,7 @@ def test_good_answers_raise_no_alarm():
     assert seen("GET", "/robot/velocity/", 431, [DATE], sent=(("X-Long", "a" * 9000),)) == set()
     assert seen("GET", "/robot/pose/", 503, [PROBLEM, ("Retry-After", "1")], b'{"status": 503, "detail": "x"}') == set()
     assert seen("FOO", "/robot/pose/", 501) == set()
+    assert seen("GET", "/robot//pose/", 301, [DATE, ("Location", "/robot/pose/")]) == set()
     assert seen("GET", "", 400, [("Content-Type", "text/plain")], b"?", raw=b"GARBAGE") == set()
     assert seen("PUT", "/robot/velocity/", None, problem="connection closed without an answer") == set()
 

@@ -39,6 +39,8 @@ DELIVERY = "/robot/app/delivery/{}/depot_x/{}/depot_y/1/dest_x/1/dest_y/1/source
         ("PUT", DELIVERY.format(5, "1"), "", b"", "invalid", "path-parameter"),
         ("PUT", DELIVERY.format(3, "1%2C5"), "", b"", "unclear", ""),
         ("PUT", DELIVERY.format(3, "one"), "", b"", "invalid", "path-parameter"),
+        ("PUT", DELIVERY.format(3, ""), "", b"", "unclear", ""),
+        ("PUT", DELIVERY.format(3, "%2E."), "", b"", "unclear", ""),
     ],
 )
 def test_requests_are_judged_by_what_they_are_on_the_wire(method, target, media_type, body, verdict, requirement):

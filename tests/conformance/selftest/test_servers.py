@@ -1,8 +1,11 @@
 """Robots behind and on mainstream web servers are not blamed; a server that is not there is named."""
 
+from dataclasses import replace
+
 import pytest
 
 from conformance.selftest.controls import Case, run_controls
+from conformance.selftest.robots import ON_SERVERS
 from conformance.selftest.servers import programs
 from conformance.selftest.servers.fronts import FRONTS
 
@@ -14,17 +17,20 @@ def judged(case, domain_id):
     return result
 
 
-@pytest.mark.parametrize("name", ["nginx"])
-def test_a_robot_behind_a_server_is_not_blamed(name, domain_id):
-    front = _FRONTS[name]
-    result = judged(Case(front.robot, front, 0), domain_id)
-    assert (result.not_tried, result.blamed, result.unjudged) == ("", {}, {})
-    assert result.conformant
+@pytest.mark.parametrize("name", ["nginx", "node"])
+def test_a_robot_behind_or_on_a_server_is_not_blamed(name, domain_id):
+    result = judged(_case(name), domain_id)
+    assert (result.not_tried, result.blamed, result.conformant) == ("", {}, True)
 
 
-@pytest.mark.parametrize("name", sorted(_FRONTS))
+@pytest.mark.parametrize("name", [*sorted(_FRONTS), "node", "golang"])
 def test_a_server_that_is_not_there_is_named_with_what_installs_it(name, monkeypatch, domain_id):
     monkeypatch.setattr(programs.shutil, "which", lambda *_, **__: None)
-    result = judged(Case("plain", _FRONTS[name], 0), domain_id)
+    result = judged(replace(_case(name), robot=name if name in ON_SERVERS else "plain"), domain_id)
     assert result.outcome is None
     assert result.not_tried.startswith("not installed: apt install ")
+
+
+def _case(name):
+    front = _FRONTS.get(name)
+    return Case(front.robot if front else name, front, 0)
