@@ -6,7 +6,7 @@ Rooms are imported when their command is used, so that ``roaas certify`` needs n
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,8 +17,11 @@ _COMMANDS = {
     "robot": ("reference_robot.cli", "robot"),
     "certify": ("conformance.cli.certify", "certify"),
     "load": ("loadtests.cli", "load"),
-    "report": ("reports.cli", "report"),
-    "compare": ("reports.cli", "compare"),
+    "report": ("reports.cli.pages", "report"),
+    "compare": ("reports.cli.pages", "compare"),
+    "keygen": ("reports.cli.attestation", "keygen"),
+    "sign": ("reports.cli.signing", "sign"),
+    "verify": ("reports.cli.attestation", "verify"),
     "selftest": ("conformance.cli.selftest", "selftest"),
     "contract": ("conformance.cli.contract", "contract"),
 }
@@ -29,6 +32,9 @@ _SUMMARIES = {
     "load": "Measure SOAP against REST.",
     "report": "Write the pages from the result files again.",
     "compare": "Say whether a robot got slower between two load tests.",
+    "keygen": "Make a key pair for signing results.",
+    "sign": "Sign a result, so that others can check whose it is.",
+    "verify": "Say what a signed certificate proves, and whether it is enough.",
     "selftest": "Show that the suite catches faulty robots and blames no good one.",
     "contract": "Show the requirements, export the contract's files.",
 }
@@ -65,13 +71,31 @@ class _Rooms(click.Group):
         return command
 
 
-def render(written: Path) -> None:
-    """Have the reports room render what a command wrote, also when it failed or was interrupted."""
-    for path in import_module("reports").render(written.parent):
-        click.echo(f"report: {path}")
+class FrontDoor:
+    """What a room asks of another one."""
+
+    @staticmethod
+    def notary(key: Path) -> Any:
+        """Have the reports room read a private key before a run that is to be signed by it."""
+        try:
+            return import_module("reports.attestation.signing").Notary(key)
+        except import_module("reports.errors").ReportError as error:
+            raise click.UsageError(str(error)) from error
+
+    @staticmethod
+    def render(written: Path, notary: Any = None) -> None:
+        """Have the reports room render, and sign, what a command wrote, also when it failed or was interrupted."""
+        for path in import_module("reports.rendering").render(written.parent, notary):
+            click.echo(f"report: {path}")
+
+    @staticmethod
+    def known() -> dict[str, Any]:
+        """What the installed suite knows: its digest, the requirement sets, the profiles."""
+        known: dict[str, Any] = import_module("conformance.engine.suite").known()
+        return known
 
 
-@click.command(cls=_Rooms, context_settings={"help_option_names": ["-h", "--help"], "obj": render})
+@click.command(cls=_Rooms, context_settings={"help_option_names": ["-h", "--help"], "obj": FrontDoor()})
 @click.version_option(package_name="roaas", prog_name="roaas")
 def main() -> None:
     """Conformance and load tests for robots that are web services."""

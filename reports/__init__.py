@@ -1,9 +1,5 @@
-"""Turns result files into what people read.
+"""Turns result files into what people read, and signs them.
 
-`render(directory)` writes everything that belongs to the result files of a directory; `reports.errors` names
-what can be wrong with them.
+`reports.rendering.render(directory)` writes everything that belongs to the result files of a directory;
+`reports.attestation` signs and verifies; `reports.errors` names what can be wrong.
 """
-
-from reports.rendering import render
-
-__all__ = ["render"]

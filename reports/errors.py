@@ -31,3 +31,15 @@ class ResultInvalidError(ReportError):
 
 class ResultsIncompatibleError(ReportError):
     """Both files are valid, and hold nothing that could be compared."""
+
+
+class KeyUnusableError(ReportError):
+    """A key file that cannot be read, or holds another kind of key than the one that is needed."""
+
+
+class PolicyUnusableError(ReportError):
+    """A policy file that cannot be read, or asks for something that does not exist."""
+
+
+class EnvelopeRefusedError(ReportError):
+    """An envelope that proves nothing: it is garbled, of another kind, or not signed by the key that was given."""

@@ -1,20 +1,31 @@
 """Writes the pages that belong to the result files of a directory."""
 
-from pathlib import Path
+from __future__ import annotations
 
+from functools import partial
+from typing import TYPE_CHECKING
+
+from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope, statement_in
+from reports.attestation.statement import RESULT_SUBJECT, sha256
 from reports.certificate.junit import junit
-from reports.certificate.page import certificate_html, certificate_markdown
+from reports.certificate.page import Seal, certificate_html, certificate_markdown
 from reports.errors import ReportError, ResultMissingError
 from reports.pages.page import write_pages
 from reports.reading import LATENCY_NAME, RESULT_NAME, read_latency, read_result
 
+if TYPE_CHECKING:
+    from pathlib import Path
 
-def render(directory: Path) -> list[Path]:
+    from reports.attestation.signing import Notary
+
+
+def render(directory: Path, notary: Notary | None = None) -> list[Path]:
     """Write what belongs to the result files in a directory, beside them.
 
-    `result.json` gives certificate.html, certificate.md and junit.xml; `latency.json` gives latency.html and
-    latency.md. Each file is replaced at once, so that a reader never sees half of one. Where one of the two
-    results is broken, the other's pages are written before the error is raised.
+    `result.json` gives certificate.html, certificate.md and junit.xml, and with a notary the signed
+    certificate.intoto.json; `latency.json` gives latency.html and latency.md. Each file is replaced at once, so that
+    a reader never sees half of one. Where one of the two results is broken, the other's pages are written before the
+    error is raised.
 
     Returns:
         The files written.
@@ -24,7 +35,8 @@ def render(directory: Path) -> list[Path]:
         ResultUnreadableError: a file cannot be read, or the directory not be written to.
         ResultGarbledError: a file is no JSON.
         ResultFormatError: a file is of another format or version.
-        ResultInvalidError: a file breaks its schema, or a histogram in it cannot be decoded.
+        ResultInvalidError: a file breaks its schema, a histogram in it cannot be decoded, or what is to be signed
+            contradicts itself.
     """
     if not directory.is_dir():
         raise ResultMissingError(f"{directory}: there is no such directory")
@@ -33,7 +45,7 @@ def render(directory: Path) -> list[Path]:
         raise ResultMissingError(f"{directory}: it holds neither {RESULT_NAME} nor {LATENCY_NAME}")
     written: list[Path] = []
     problems: list[ReportError] = []
-    for path, pages_of in ((result, _conformance), (latency, _latency)):
+    for path, pages_of in ((result, partial(_conformance, notary=notary)), (latency, _latency)):
         if not path.exists():
             continue
         try:
@@ -46,13 +58,25 @@ def render(directory: Path) -> list[Path]:
     return written
 
 
-def _conformance(path: Path) -> dict[str, str]:
+def _conformance(path: Path, notary: Notary | None) -> dict[str, str]:
     document = read_result(path)
-    return {
-        "certificate.html": certificate_html(document),
+    digest = sha256(path.read_bytes())
+    page = certificate_html(document, Seal(digest, notary.key if notary else _signed_by(path, digest)))
+    pages = {
+        "certificate.html": page,
         "certificate.md": certificate_markdown(document),
         "junit.xml": junit(document).decode(),
     }
+    return {**pages, ENVELOPE_NAME: notary.envelope(path, document, page)} if notary else pages
+
+
+def _signed_by(path: Path, digest: str) -> str | None:
+    """The key that signed this very result, as the envelope beside it says: it is shown, and nothing follows."""
+    try:
+        opened = open_envelope(read_envelope(path.with_name(ENVELOPE_NAME)))
+        return opened.keyid if statement_in(opened).digest_of(RESULT_SUBJECT) == digest else None
+    except ReportError:
+        return None
 
 
 def _latency(path: Path) -> dict[str, str]:

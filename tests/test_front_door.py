@@ -6,21 +6,23 @@ import click
 import pytest
 from click.testing import CliRunner
 
-import reports
 import roaas
 from conformance.contract.command import CommandResult, ResultCommand
 from conformance.contract.exit_codes import ExitCode
+from reports import rendering
 
 
 @pytest.fixture
 def rendered(monkeypatch):
     folders = []
-    monkeypatch.setattr(reports, "render", lambda folder: folders.append(folder) or [])
+    monkeypatch.setattr(rendering, "render", lambda folder, _: folders.append(folder) or [])
     return folders
 
 
 def run(callback) -> int:
-    return CliRunner().invoke(ResultCommand("certify", callback=callback, params=[]), [], obj=roaas.render).exit_code
+    return (
+        CliRunner().invoke(ResultCommand("certify", callback=callback, params=[]), [], obj=roaas.FrontDoor()).exit_code
+    )
 
 
 @pytest.mark.parametrize("code", list(ExitCode))

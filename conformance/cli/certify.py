@@ -13,7 +13,7 @@ import msgspec
 
 from conformance.cli.summary import print_summary
 from conformance.contract.classes import CLASSES, PROFILES
-from conformance.contract.command import CommandResult, ResultCommand
+from conformance.contract.command import CommandResult, FrontDoor, ResultCommand
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.files import CONTRACT_DIR, Contract, ContractError
 from conformance.contract.statement import Statement, StatementError, load_statement
@@ -82,8 +82,10 @@ _FILE = click.Path(exists=True, dir_okay=False)
     show_default=True,
     help="Folder for the results.",
 )
+@click.option("--sign", "key", type=_FILE, metavar="KEY", help="Sign the result with this private key.")
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
-def certify(statement: Path | None, **options: Any) -> CommandResult:
+@click.pass_obj
+def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> CommandResult:
     """Judge a robot by its contract, requirement by requirement.
 
     STATEMENT is the robot's implementation conformance statement (TOML); options win over it.
@@ -98,13 +100,15 @@ def certify(statement: Path | None, **options: Any) -> CommandResult:
         chosen = _apply(declared, options)
         if options["init"]:
             return _init(statement, chosen, force=options["force"])
-        outcome = _certify(chosen, options)
+        # Before the run: what cannot be signed by this key is told at once.
+        notary = door.notary(Path(options["key"])) if options["key"] else None
+        outcome = _certify(chosen, options, statement)
     except (StatementError, ContractError) as error:
         raise click.UsageError(str(error)) from error
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
     print_summary(outcome)
-    return CommandResult(outcome.exit_code, outcome.path)
+    return CommandResult(outcome.exit_code, outcome.path, notary)
 
 
 def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
@@ -141,13 +145,14 @@ def _init(path: Path | None, chosen: Statement, *, force: bool) -> CommandResult
     return CommandResult(ExitCode.PASSED)
 
 
-def _certify(chosen: Statement, options: dict[str, Any]) -> Certification:
+def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None) -> Certification:
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
     from conformance.engine.certification import certify as judge  # noqa: PLC0415
     from conformance.engine.pytest_run import connection_of  # noqa: PLC0415
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
+    from conformance.engine.suite import file_digest  # noqa: PLC0415
     from conformance.verdict.baseline import BaselineError, load_baseline  # noqa: PLC0415
-    from conformance.verdict.run import Run  # noqa: PLC0415
+    from conformance.verdict.run import Given, Run  # noqa: PLC0415
 
     contract = Contract.load(options["contract"])
     try:
@@ -155,6 +160,7 @@ def _certify(chosen: Statement, options: dict[str, Any]) -> Certification:
         if chosen.endpoints.ca_file:
             connection.tls()
         baseline = load_baseline(options["baseline"], contract.ledger) if options["baseline"] else ()
+        given = Given(*(file_digest(path) if path else None for path in (statement, options["baseline"])))
     except (OSError, BaselineError) as error:
         raise StatementError(str(error)) from error
     claims = tuple(name for name in chosen.claimed() if any(r.class_ == name for r in contract.ledger.values()))
@@ -164,6 +170,7 @@ def _certify(chosen: Statement, options: dict[str, Any]) -> Certification:
         claims=claims,
         allow_motion=options["allow_motion"],
         seed=options["seed"],
+        given=given,
         effort=Effort(options["effort"], minutes=options["minutes"]),
     )
     notes = _notes(run)

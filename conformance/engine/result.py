@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import platform
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
@@ -15,11 +12,14 @@ from conformance.contract.atomic_write import write_atomically
 from conformance.contract.classes import CLASS_TITLES
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
 from conformance.contract.interfaces import Interface
+from conformance.contract.requirement_sets import set_of
+from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
 from conformance.transport.exchange import Unanswered
 
 if TYPE_CHECKING:
     import datetime as dt
     from collections.abc import Mapping
+    from pathlib import Path
 
     from conformance.contract.files import Contract
     from conformance.engine.robot_under_test import RobotUnderTest
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from conformance.verdict.verdicts import Verdict
 
 RESULT_FORMAT = "roaas-result/1"
-_PACKAGE = Path(__file__).parents[1]
-# The rooms that decide what is asked and what is said of it.
-JUDGING = ("contract", "transport", "documents", "verdict", "rest", "soap", "robot", "checks", "engine")
 # As much of a body as a reader looks at; its length is always told.
 _SHOWN_BODY = 4096
 _SHOWN_CURL = 20_000
@@ -60,6 +57,10 @@ def result_document(
             "contract": _contract_name(run.contract),
             "digest": suite_digest(run.contract),
         },
+        "requirement_set": set_of(run.contract),
+        "digests": {"statement": run.given.statement, "contract": contract_digests(run.contract)},
+        "baseline": {"digest": run.given.baseline} if run.given.baseline else None,
+        "nonce": run.given.nonce,
         "target": _target(robot),
         "statement": {
             "robot": statement.robot,
@@ -84,7 +85,7 @@ def result_document(
         "environment": {
             "python": platform.python_version(),
             "platform": platform.platform(),
-            "libraries": {name: _installed(name) for name in _LIBRARIES},
+            "libraries": {name: installed(name) for name in _LIBRARIES},
         },
         "classes": {name: value for name, (value, _) in classes.items()},
         "class_titles": {name: CLASS_TITLES[name] for name in classes},
@@ -179,34 +180,6 @@ def _body(body: bytes) -> dict[str, Any]:
 
 def _rfc3339(moment: dt.datetime) -> str:
     return moment.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
-
-
-def _installed(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "not installed"
-
-
-def suite_version() -> str:
-    """Version of the installed distribution."""
-    return _installed("roaas")
-
-
-def suite_digest(contract: Contract, package: Path = _PACKAGE) -> str:
-    """Digest over the package's modules that judge and the contract's files: two runs of one digest asked the same."""
-    modules = {
-        path.relative_to(package).as_posix(): path for room in JUDGING for path in (package / room).rglob("*.py")
-    }
-    texts = {
-        f"the contract: {path.name}": path
-        for path in contract.directory.iterdir()
-        if path.is_file() and path.suffix != ".py"
-    }
-    digest = hashlib.sha256()
-    for name, path in sorted({**modules, **texts}.items()):
-        digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return f"sha256:{digest.hexdigest()}"
 
 
 def write_result(document: dict[str, Any], directory: Path) -> Path:

@@ -16,6 +16,21 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+@dataclass(frozen=True)
+class Given:
+    """What a run was asked with, for whoever checks its result.
+
+    Attributes:
+        statement: digest of the statement's file, as `sha256:…`; None where there was none.
+        baseline: digest of the file of accepted failures, likewise.
+        nonce: what the relying party chose, or None.
+    """
+
+    statement: str | None = None
+    baseline: str | None = None
+    nonce: str | None = None
+
+
 @dataclass
 class Run:
     """One run: data only, whoever is connected to what.
@@ -26,6 +41,7 @@ class Run:
         claims: the classes that are judged.
         allow_motion: whether the robot may be moved.
         seed: of everything random.
+        given: what is told of that in the result, beside the statement.
         effort: how much is tried; lessened once it is known how slowly the robot answers.
         judge: what has been found.
         aborted: why the robot cannot be asked any more, or empty.
@@ -38,6 +54,7 @@ class Run:
     allow_motion: bool = False
     seed: int = 0
     effort: Effort = field(default_factory=Effort)
+    given: Given = Given()
     judge: Judge = field(init=False)
     aborted: str = ""
     unreachable: dict[Interface, str] = field(default_factory=dict)

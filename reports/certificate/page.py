@@ -173,9 +173,22 @@ def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
         yield Untested(reason, tuple(requirements))
 
 
-def certificate_html(result: Mapping[str, Any]) -> str:
+@dataclass(frozen=True, slots=True)
+class Seal:
+    """What the page is checked by.
+
+    Attributes:
+        result: SHA-256 of result.json, in hexadecimal.
+        key: fingerprint of the key that signed it, or None where none did.
+    """
+
+    result: str
+    key: str | None = None
+
+
+def certificate_html(result: Mapping[str, Any], seal: Seal | None = None) -> str:
     """The certificate as one HTML file."""
-    return html_page("certificate.html.j2", **_values(result))
+    return html_page("certificate.html.j2", seal=seal, **_values(result))
 
 
 def certificate_markdown(result: Mapping[str, Any]) -> str:

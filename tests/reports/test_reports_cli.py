@@ -5,9 +5,9 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from reports import render
-from reports.cli import compare, report
+from reports.cli.pages import compare, report
 from reports.errors import ResultMissingError
+from reports.rendering import render
 
 
 def run(command, *arguments):

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from conformance.contract.files import CONTRACT_DIR, Contract
-from conformance.engine.result import JUDGING, suite_digest
+from conformance.engine.suite import JUDGING, suite_digest
 
 
 @pytest.fixture

@@ -1,10 +1,10 @@
-"""The commands `roaas report` and `roaas compare`."""
+"""`roaas report` and `roaas compare`."""
 
 from pathlib import Path
-from typing import NoReturn
 
 import click
 
+from reports.cli.refusal import refuse
 from reports.errors import ReportError
 from reports.pages.page import write_pages
 from reports.pages.untrusted import visible
@@ -13,7 +13,6 @@ from reports.rendering import render
 
 EXIT_OK = 0
 EXIT_SLOWER = 1
-EXIT_UNREADABLE = 2
 EXIT_INVALID = 4
 
 
@@ -28,7 +27,7 @@ def report(directory: Path) -> None:
     try:
         written = render(directory)
     except ReportError as error:
-        _refuse(error)
+        refuse(error)
     for path in written:
         click.echo(path)
 
@@ -72,7 +71,7 @@ def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
             for path in write_pages(out, pages):
                 click.echo(path, err=True)
     except ReportError as error:
-        _refuse(error)
+        refuse(error)
     verdict = comparison_page.verdict(found)
     click.echo(comparison_page.table(found))
     for remark in found.remarks:
@@ -85,8 +84,3 @@ def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
 
 def _latency_file(path: Path) -> Path:
     return path / LATENCY_NAME if path.is_dir() else path
-
-
-def _refuse(error: ReportError) -> NoReturn:
-    click.echo(f"Error: {error}", err=True)
-    raise SystemExit(EXIT_UNREADABLE)

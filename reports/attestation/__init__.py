@@ -1,0 +1,1 @@
+"""Signed certificates: keys, the signed statement, its envelope, the policy that a relying party checks it by."""

@@ -1,0 +1,96 @@
+"""Ed25519 keys as PEM files, which `openssl pkey` reads as well.
+
+A key is named by its fingerprint: SHA-256 over the public key as DER (SubjectPublicKeyInfo, RFC 8410). It is what
+`openssl pkey -pubin -in public-key.pem -outform DER | sha256sum` shows.
+"""
+
+import hashlib
+import os
+from pathlib import Path
+
+from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+from cryptography.hazmat.primitives.serialization import (
+    Encoding,
+    PublicFormat,
+    load_pem_private_key,
+    load_pem_public_key,
+)
+from securesystemslib.signer import CryptoSigner, SSlibKey
+
+from reports.errors import KeyUnusableError
+
+PRIVATE_NAME = "signing-key.pem"
+PUBLIC_NAME = "public-key.pem"
+
+
+def generate(directory: Path) -> str:
+    """Make a key pair and write it to signing-key.pem (for its owner's eyes alone) and public-key.pem.
+
+    Returns:
+        Its fingerprint.
+
+    Raises:
+        KeyUnusableError: one of the files is there already, or the folder cannot be written to.
+    """
+    signer = CryptoSigner.generate_ed25519()
+    public = load_pem_private_key(signer.private_bytes, None).public_key()
+    assert isinstance(public, Ed25519PublicKey)  # noqa: S101 - for the type checker: it was made so
+    pem = public.public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for name, octets, mode in ((PRIVATE_NAME, signer.private_bytes, 0o600), (PUBLIC_NAME, pem, 0o644)):
+            # Created with its mode, and never over a key that somebody may still need.
+            with os.fdopen(os.open(directory / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
+                file.write(octets)
+    except OSError as error:
+        raise KeyUnusableError(
+            f"{error.filename or directory}: cannot be written: {error.strerror or error}"
+        ) from error
+    return fingerprint(public)
+
+
+def signer_of(path: Path) -> CryptoSigner:
+    """Read a private key.
+
+    Raises:
+        KeyUnusableError: it cannot be read, has a passphrase, or is no Ed25519 private key.
+    """
+    try:
+        key = load_pem_private_key(_octets(path), None)
+    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
+        raise KeyUnusableError(f"{path}: it is no private key in PEM without a passphrase") from error
+    if not isinstance(key, Ed25519PrivateKey):
+        raise KeyUnusableError(f"{path}: it is no Ed25519 key; `roaas keygen` makes one")
+    return CryptoSigner(key, _named(key.public_key()))
+
+
+def public_key(path: Path) -> SSlibKey:
+    """Read a public key.
+
+    Raises:
+        KeyUnusableError: it cannot be read, or is no Ed25519 public key.
+    """
+    try:
+        key = load_pem_public_key(_octets(path))
+    except (ValueError, UnsupportedAlgorithm) as error:
+        raise KeyUnusableError(f"{path}: it is no public key in PEM") from error
+    if not isinstance(key, Ed25519PublicKey):
+        raise KeyUnusableError(f"{path}: it is no Ed25519 key")
+    return _named(key)
+
+
+def fingerprint(key: Ed25519PublicKey) -> str:
+    """SHA-256 over the key as DER, in hexadecimal."""
+    return hashlib.sha256(key.public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)).hexdigest()
+
+
+def _named(key: Ed25519PublicKey) -> SSlibKey:
+    return SSlibKey.from_crypto(key, keyid=fingerprint(key))
+
+
+def _octets(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise KeyUnusableError(f"{path}: {error.strerror or error}") from error

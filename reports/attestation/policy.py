@@ -1,0 +1,166 @@
+"""The policy: what a relying party asks of a certificate beyond its signature, each point a line of a TOML file."""
+
+import datetime as dt
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import msgspec
+
+from reports.attestation.statement import Run, Statement, passed, seed_of
+from reports.errors import PolicyUnusableError
+
+_SKEW = dt.timedelta(minutes=5)
+"""As much as the clock of whoever certified may be ahead of ours."""
+OWN = "installed"
+"""In a policy, the suite that verifies."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the suite that verifies knows.
+
+    Attributes:
+        suite: its own digest.
+        requirement_sets: name to digest.
+        profiles: name to the classes that it holds.
+    """
+
+    suite: str = ""
+    requirement_sets: Mapping[str, str] = field(default_factory=dict)
+    profiles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What is asked; the defaults are the default policy, and docs/certificates.md explains each.
+
+    Attributes:
+        robot: the robot's name, or None for any; vendor and firmware likewise.
+        verdicts: of the whole run that will do.
+        profile: whose classes have to have passed; classes: these instead.
+        suites: digests of suites that are trusted; "installed" is the one that verifies.
+        requirement_sets: names of sets that this suite knows, too.
+        efforts: how much has to have been tried.
+        motion: whether the robot has to have been moved.
+        ros: whether its ROS side has to have been watched.
+        baseline: whether failures may have been accepted.
+        interrupted: whether a part of a run will do.
+        max_age_days: since the end of the run.
+        nonce: that the run has to have been made with, or None.
+    """
+
+    robot: str | None = None
+    vendor: str | None = None
+    firmware: str | None = None
+    verdicts: tuple[str, ...] = ("conformant",)
+    profile: str = "full"
+    classes: tuple[str, ...] | None = None
+    suites: tuple[str, ...] = (OWN,)
+    requirement_sets: tuple[str, ...] = ("1.1",)
+    efforts: tuple[str, ...] = ("standard", "deep")
+    motion: bool = True
+    ros: bool = False
+    baseline: bool = False
+    interrupted: bool = False
+    max_age_days: Annotated[float, msgspec.Meta(gt=0)] = 365
+    nonce: str | None = None
+
+
+class Point(NamedTuple):
+    """One point of a policy: its line, whether the certificate meets it, and what was found."""
+
+    name: str
+    met: bool
+    found: str
+
+
+def read_policy(path: Path, known: Known) -> Policy:
+    """Read a policy file.
+
+    Raises:
+        PolicyUnusableError: it cannot be read, has an unknown line, or names a profile that there is not.
+    """
+    try:
+        policy = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Policy)
+    except OSError as error:
+        raise PolicyUnusableError(f"{path}: {error.strerror or error}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        raise PolicyUnusableError(f"{path}: {error}") from error
+    if policy.classes is None and policy.profile not in known.profiles:
+        raise PolicyUnusableError(f"{path}: profile = {policy.profile!r} must be one of {', '.join(known.profiles)}")
+    return policy
+
+
+def judge(statement: Statement, policy: Policy, known: Known, now: dt.datetime) -> list[Point]:
+    """Compare a verified statement with a policy, point by point."""
+    run = statement.predicate.roaas
+    return [*_who(run, policy), *_what(run, policy, known), *_how(run, policy, known), *_when(run, policy, now)]
+
+
+def _who(run: Run, policy: Policy) -> Iterator[Point]:
+    for line, found in (("robot", run.robot.name), ("vendor", run.robot.vendor), ("firmware", run.robot.version)):
+        wanted = policy.firmware if line == "firmware" else getattr(policy, line)
+        asked = "" if wanted in {None, found} else f"; you asked for {wanted!r}"
+        yield Point(line, not asked, f"{found or 'not named'}{asked}")
+
+
+def _what(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
+    yield Point("verdicts", run.verdict in policy.verdicts, run.verdict)
+    wanted = known.profiles.get(policy.profile, ()) if policy.classes is None else policy.classes
+    there = passed(run)
+    missing = [name for name in wanted if name not in there]
+    told = f"{', '.join(there) or 'none'} passed"
+    yield Point(
+        "classes", not missing and bool(there), f"{told}; not passed: {', '.join(missing)}" if missing else told
+    )
+    accepted = f": {', '.join(run.accepted)}" if run.accepted else ""
+    used = run.baseline is not None or bool(run.accepted) or run.accepted_until is not None
+    yield Point("baseline", policy.baseline or not used, f"failures were accepted{accepted}" if used else "none")
+    yield Point(
+        "interrupted", policy.interrupted or not run.interrupted, "a part of a run" if run.interrupted else "no"
+    )
+
+
+def _how(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
+    trusted = {known.suite if digest == OWN else digest for digest in policy.suites} - {""}
+    unknown = "" if run.suite.digest in trusted else ", which is not known"
+    yield Point("suites", not unknown, f"RoAAS {run.suite.version}, {run.suite.digest}{unknown}")
+    yield _requirement_set(run, policy, known)
+    yield Point("efforts", run.effort in policy.efforts, run.effort)
+    moved = "the robot was allowed to move" if run.motion_allowed else "the robot was not allowed to move"
+    yield Point("motion", run.motion_allowed or not policy.motion, moved)
+    yield Point("ros", run.observed == "ROS" or not policy.ros, f"seen: {run.observed}")
+
+
+def _requirement_set(run: Run, policy: Policy, known: Known) -> Point:
+    found = run.requirement_set
+    wrong = ""
+    if found is None:
+        wrong = "none that is frozen: a contract of its own"
+    elif found.name not in policy.requirement_sets:
+        wrong = f"{found.name}, which is not accepted"
+    elif known.requirement_sets.get(found.name) != found.digest:
+        wrong = f"{found.name}, with other requirements than are known by that name"
+    return Point("requirement_sets", not wrong, wrong or (found.name if found else ""))
+
+
+def _when(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
+    try:
+        finished = dt.datetime.fromisoformat(run.finished)
+        age = now - finished
+    except (ValueError, TypeError):
+        yield Point("max_age_days", met=False, found=f"{run.finished[:40]!r} is no time in UTC")
+    else:
+        told = f"the run ended on {finished:%Y-%m-%d %H:%M} UTC"
+        days = f", {age.days} days ago" if age.days > 0 else ""
+        yield Point("max_age_days", -_SKEW <= age <= dt.timedelta(days=policy.max_age_days), told + days)
+    if policy.nonce is None:
+        told, fresh = "you asked for none", True
+    elif run.nonce != policy.nonce:
+        told, fresh = f"the run has {run.nonce!r}, and you gave {policy.nonce!r}", False
+    else:
+        told, fresh = "yours", run.seed == seed_of(policy.nonce)
+        told += "" if fresh else f", and its seed {run.seed} does not follow from it"
+    yield Point("nonce", fresh, told)

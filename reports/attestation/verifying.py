@@ -1,0 +1,63 @@
+"""Verification: the signature, the policy, the files beside it, and in plain words what that proves."""
+
+import datetime as dt
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from securesystemslib.signer import Key
+
+from reports.attestation.policy import Known, Point, Policy, judge
+from reports.attestation.signature import unseal
+from reports.attestation.statement import PAGE_SUBJECT, RESULT_SUBJECT, Statement, sha256
+from reports.errors import ResultUnreadableError
+
+PROVED = (
+    "Proved: the holder of this key says that this run took place and gave this, and nothing was changed since it "
+    "was signed."
+)
+NOT_PROVED = (
+    "Not proved: that the robot is genuine, that the software that ran was the suite that it names, or that another "
+    "run would give the same. Who holds the key, and whether to believe them, is for you to know."
+)
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What came of it: what was signed, and the points of the policy, the files compared included."""
+
+    statement: Statement
+    points: tuple[Point, ...]
+
+    @property
+    def accepted(self) -> bool:
+        """Whether every point is met."""
+        return all(point.met for point in self.points)
+
+
+def verify(
+    octets: bytes, key: Key, policy: Policy, known: Known, *, now: dt.datetime, directory: Path | None = None
+) -> Verification:
+    """Verify an envelope, and the result in a directory where one is given.
+
+    Raises:
+        EnvelopeRefusedError: it is not signed by the key, or no certificate.
+        ResultUnreadableError: the directory's result cannot be read.
+    """
+    statement = unseal(octets, key)
+    files = () if directory is None else _files(statement, directory)
+    return Verification(statement, (*judge(statement, policy, known, now), *files))
+
+
+def _files(statement: Statement, directory: Path) -> Iterator[Point]:
+    """Whether result.json, and the page where there is one, are those that were signed."""
+    for name in (RESULT_SUBJECT, PAGE_SUBJECT):
+        path = directory / name
+        if name == PAGE_SUBJECT and not path.exists():
+            continue
+        try:
+            digest = sha256(path.read_bytes())
+        except OSError as error:
+            raise ResultUnreadableError(f"{path}: {error.strerror or error}") from error
+        same = digest == statement.digest_of(name)
+        yield Point(name, same, "as it was signed" if same else "not the file that was signed")

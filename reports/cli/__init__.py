@@ -1,0 +1,1 @@
+"""The room's commands: report and compare, keygen, sign and verify."""

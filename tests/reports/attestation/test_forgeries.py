@@ -1,0 +1,187 @@
+"""Each forgery is refused, and by its own reason: the envelope's are raised, the policy's are told point by point."""
+
+import base64
+import json
+
+import pytest
+from securesystemslib.dsse import Envelope
+
+from reports.attestation.envelope import ENVELOPE_NAME
+from reports.attestation.keys import PRIVATE_NAME, generate, signer_of
+from reports.attestation.signing import Notary
+from reports.attestation.statement import seed_of
+from reports.errors import EnvelopeRefusedError
+from reports.rendering import render
+
+
+def test_the_good_one_is_accepted(desk):
+    found = desk.check()
+    assert [point for point in found.points if not point.met] == []
+    assert found.statement.predicate.properties == ["ROAAS_CLASS_HTTP", "ROAAS_CLASS_SAFETY"]
+
+
+def own_key(desk):
+    generate(desk.keys / "forger")
+    render(desk.folder, Notary(desk.keys / "forger" / PRIVATE_NAME))
+
+
+def own_key_under_my_name(desk):
+    mine = desk.signatures[0]["keyid"]
+    own_key(desk)
+    desk.edit(signatures=[{**desk.signatures[0], "keyid": mine}])
+
+
+def resigned_as(**texts):
+    """Another statement of the vendor's own, which is no certificate."""
+
+    def forge(desk):
+        document = {**json.loads(desk.payload), **texts}
+        envelope = Envelope(json.dumps(document).encode(), "application/vnd.in-toto+json", {})
+        envelope.sign(signer_of(desk.keys / PRIVATE_NAME))
+        desk.envelope.write_text(json.dumps(envelope.to_dict()))
+
+    return forge
+
+
+def loose_base64(desk):
+    """The same octets by another text: of the last letter before the padding, some bits say nothing."""
+    signature = desk.signatures[0]
+    letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
+    last = letters[letters.index(signature["sig"][-3]) + 1]
+    loose = f"{signature['sig'][:-3]}{last}=="
+    assert base64.b64decode(loose) == base64.b64decode(signature["sig"])
+    desk.edit(signatures=[{**signature, "sig": loose}])
+
+
+def cut(octets):
+    return lambda desk: desk.envelope.write_bytes(desk.envelope.read_bytes()[:octets])
+
+
+def stripped_key_id(desk):
+    desk.edit(signatures=[{**desk.signatures[0], "keyid": ""}])
+
+
+def key_beside_the_signature(desk):
+    desk.edit(signatures=[{**desk.signatures[0], "publicKey": "…"}])
+
+
+ENVELOPES = [
+    ("swapped subject", lambda desk: desk.edit_payload("result.json", "other.json"), "not by your key over this"),
+    ("edited class", lambda desk: desk.edit_payload('"safety":"pass"', '"safety":"fail"'), "not by your key over this"),
+    ("hidden baseline", lambda desk: desk.edit_payload('"accepted":[]', '"accepted" :[]'), "not by your key over this"),
+    ("own key", own_key, "foreign key"),
+    ("own key under my name", own_key_under_my_name, "not by your key over this"),
+    ("key inside the envelope", lambda desk: desk.edit(publicKey="…"), "unknown field `publicKey`"),
+    ("key beside the signature", key_beside_the_signature, "unknown field `publicKey`"),
+    ("other payload type", lambda desk: desk.edit(payloadType="application/json"), "payload type"),
+    ("stripped signature", lambda desk: desk.edit(signatures=[]), "length >= 1"),
+    ("doubled signature", lambda desk: desk.edit(signatures=desk.signatures * 2), "length <= 1"),
+    ("no key id", stripped_key_id, "names no key"),
+    ("other statement type", resigned_as(_type="https://in-toto.io/Statement/v0.1"), "Statement/v0.1"),
+    ("other predicate type", resigned_as(predicateType="https://in-toto.io/attestation/vulns/v0.1"), "vulns/v0.1"),
+    ("other predicate", resigned_as(predicate={"verifier": {}}), "no certificate of a run"),
+    ("loose base64", loose_base64, "as no encoder writes it"),
+    ("no base64", lambda desk: desk.edit(payload="{}"), "no base64"),
+    ("truncated file", cut(500), "no envelope"),
+    ("empty file", cut(0), "no envelope"),
+    ("nested file", lambda desk: desk.envelope.write_text("[" * 100_000), "no envelope"),
+    ("huge file", lambda desk: desk.envelope.write_text(" " * (5 << 20)), "octets"),
+]
+
+
+@pytest.mark.parametrize(("forge", "reason"), [pytest.param(*rest, id=name) for name, *rest in ENVELOPES])
+def test_a_forged_envelope_proves_nothing(desk, forge, reason):
+    forge(desk)
+    with pytest.raises(EnvelopeRefusedError, match=reason):
+        desk.check()
+
+
+def edited(name):
+    return lambda desk: (desk.folder / name).write_text((desk.folder / name).read_text().replace("Courier", "Carrier"))
+
+
+def other_envelope(desk):
+    """A good certificate beside the result of another robot."""
+    good = desk.envelope.read_bytes()
+    desk.sign(statement__robot__name="Courier 8")
+    (desk.folder / ENVELOPE_NAME).write_bytes(good)
+
+
+def accepted_failure(desk):
+    desk.result["requirements"][0] |= {"verdict": "warn", "expected_failure": {"reason": "ticket 7"}}
+    desk.sign(requirements=desk.result["requirements"])
+
+
+def signed_with(**changes):
+    return lambda desk: desk.sign(**changes)
+
+
+def nothing(_):
+    pass
+
+
+# Signed by the vendor's key, each is genuine, and not what was asked for.
+RESULTS = [
+    ("edited page", edited("certificate.html"), {}, {"certificate.html"}),
+    ("edited result", edited("result.json"), {}, {"result.json"}),
+    ("beside another result", other_envelope, {}, {"result.json", "certificate.html"}),
+    ("another robot", nothing, {"robot": "Courier 8"}, {"robot"}),
+    ("another vendor", nothing, {"vendor": "Somebody"}, {"vendor"}),
+    ("old firmware", signed_with(statement__robot__version="1.0"), {"firmware": "2.4.1"}, {"firmware"}),
+    ("dropped class", signed_with(classes={"http": "pass"}), {}, {"classes"}),
+    ("fewer classes than asked", nothing, {"classes": ("http", "describe")}, {"classes"}),
+    (
+        "inconclusive class",
+        signed_with(verdict="inconclusive", classes={"http": "pass", "safety": "inconclusive"}),
+        {},
+        {"verdicts", "classes"},
+    ),
+    ("patched suite", signed_with(suite__digest="sha256:" + "6" * 64), {}, {"suites"}),
+    ("requirements of one's own", signed_with(requirement_set=None), {}, {"requirement_sets"}),
+    (
+        "old requirements",
+        signed_with(requirement_set={"name": "1.0", "digest": "sha256:" + "0" * 64}),
+        {},
+        {"requirement_sets"},
+    ),
+    ("patched requirements", signed_with(requirement_set__digest="sha256:" + "0" * 64), {}, {"requirement_sets"}),
+    ("quick effort", signed_with(effort="quick"), {}, {"efforts"}),
+    ("no motion", signed_with(statement__motion_allowed=False), {}, {"motion"}),
+    ("ROS not seen", nothing, {"ros": True}, {"ros"}),
+    ("baseline", signed_with(baseline={"digest": "sha256:" + "3" * 64}), {}, {"baseline"}),
+    ("accepted failure", accepted_failure, {}, {"baseline", "classes"}),
+    ("part of a run", signed_with(interrupted=True), {}, {"interrupted"}),
+    ("expired", signed_with(finished="2025-11-20T12:00:00Z"), {}, {"max_age_days"}),
+    ("from the future", signed_with(finished="2026-11-22T12:00:00Z"), {}, {"max_age_days"}),
+    ("replayed nonce", signed_with(nonce="monday", seed=seed_of("monday")), {"nonce": "tuesday"}, {"nonce"}),
+    ("nonce and another seed", signed_with(nonce="monday", seed=0), {"nonce": "monday"}, {"nonce"}),
+    ("no nonce", nothing, {"nonce": "monday"}, {"nonce"}),
+]
+
+
+@pytest.mark.parametrize(("forge", "asked", "refused"), [pytest.param(*rest, id=name) for name, *rest in RESULTS])
+def test_a_genuine_certificate_of_something_else_is_refused_by_its_point(desk, forge, asked, refused):
+    forge(desk)
+    found = desk.asking(**asked).check()
+    assert {point.name for point in found.points if not point.met} == refused
+    assert not found.accepted
+
+
+WAIVERS = [
+    (signed_with(effort="quick"), {"efforts": ("quick",)}),
+    (signed_with(statement__motion_allowed=False), {"motion": False}),
+    (signed_with(suite__digest="sha256:6"), {"suites": ("installed", "sha256:6")}),
+    (signed_with(classes={"http": "pass"}), {"profile": "paper"}),
+    (signed_with(baseline={"digest": "sha256:" + "3" * 64}), {"baseline": True}),
+    (signed_with(interrupted=True), {"interrupted": True}),
+    (signed_with(finished="2025-11-20T12:00:00Z"), {"max_age_days": 400}),
+    (signed_with(target__ros_domain_id=7), {"ros": True}),
+    (signed_with(nonce="monday", seed=seed_of("monday")), {"nonce": "monday"}),
+    (nothing, {"robot": "Courier 7", "vendor": "Example Robotics", "firmware": "2.4.1"}),
+]
+
+
+@pytest.mark.parametrize(("make", "asked"), WAIVERS)
+def test_what_a_policy_allows_is_accepted(desk, make, asked):
+    make(desk)
+    assert desk.asking(**asked).check().accepted
