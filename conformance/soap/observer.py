@@ -41,6 +41,7 @@ PASSIVE: Final = tuple(
         "R1012",
         "R1013",
         "R1014",
+        "R1018",
         "R1111",
         "R1124",
         "R1126",
@@ -119,6 +120,7 @@ class SoapObserver(Listener):
         that = self._that
         that("content-type", response.media_type == "text/xml", exchange, "text/xml", lambda: _type(response))
         that("R1012", encoding in _ENCODINGS, exchange, "UTF-8 or UTF-16", lambda: f"the encoding {encoding!r}")
+        that("R1018", _fits(response), exchange, "a charset that is the body's", lambda: _type(response))
         that("R1008", not has_doctype(root), exchange, "no DOCTYPE", lambda: "a DOCTYPE")
         that("R1009", not _has_instruction(root), exchange, "no processing instruction", lambda: "one")
         try:
@@ -211,6 +213,16 @@ def _encoding(response: Response) -> str:
         return charset[1].lower()
     declared = _DECLARED.match(response.body)
     return declared[1].decode("ascii").lower() if declared else ""
+
+
+def _fits(response: Response) -> bool:
+    """Whether the body is in the character encoding that Content-Type names; R1012 judges others than UTF-8 and -16."""
+    charset = _CHARSET.search(response.header("content-type") or "")
+    if charset is None or charset[1].lower() not in _ENCODINGS:
+        return True
+    # XML begins with "<" or a byte order mark, so that UTF-16 has a zero or a mark of its own in its first two octets.
+    wide = response.body[:2] in {b"\xff\xfe", b"\xfe\xff"} or 0 in response.body[:2]
+    return wide == charset[1].lower().startswith("utf-16")
 
 
 def _has_instruction(root: etree._Element) -> bool:

@@ -152,5 +152,5 @@ def _attempts(mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Att
     for requirements in dict.fromkeys((types, near)):
         if requirements and len(requirements) < len(first):
             yield classes[:1], requirements
-    for class_ in classes:
-        yield (class_,), ()
+    # What is watched over a whole run is in classes of its own, so that in the end all are judged at once.
+    yield from dict.fromkeys((tuple(classes[:number]), ()) for number in (1, len(classes)) if classes)

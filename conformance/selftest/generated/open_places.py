@@ -27,6 +27,11 @@ class Rule:
 
 
 RULES = (
+    Rule(
+        r"body-bom:\w+:body:xml",
+        "A document of XML may begin with a byte order mark (XML 1.0 4.3.3), and every receiver has to take it "
+        "(BP R4001); what forbids one is RFC 8259 8.1, of JSON.",
+    ),
     Rule(r"status:putDelivery:2\d\d-2\d\d", "A delivery answers 2xx, and 204 is only preferred (contract.md#rest)."),
     Rule(
         r"status:\w+:(400|422)-4\d\d",

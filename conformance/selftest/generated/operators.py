@@ -76,12 +76,15 @@ def _always(do: Callable[[Slot], object]) -> Callable[[Place], Edit]:
 
 
 def _number(change: Callable[[float], float]) -> Callable[[Place], Edit]:
-    """Give every number another value; integers stay integers."""
+    """Give every number another finite value; integers stay integers."""
 
     def apply(value: Any) -> Any:
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise TypeError
-        return int(change(value)) if isinstance(value, int) else change(value)
+        made = change(value)
+        if not math.isfinite(made):
+            raise OverflowError
+        return int(made) if isinstance(value, int) else made
 
     return _each(apply)
 

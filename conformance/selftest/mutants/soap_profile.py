@@ -111,6 +111,12 @@ MUTANTS = (
     _mutant("bp-instruction", "Answers have a processing instruction.", "R1009", _answers(instructed)),
     _mutant("bp-trailer", "Something follows Body.", "R1011", _answers(tree(trailer))),
     _mutant("bp-latin", "Answers are ISO 8859-1.", "R1012", _answers(latin)),
+    _mutant(
+        "bp-charset-wrong",
+        "Content-Type says UTF-16 of messages in UTF-8.",
+        "R1018",
+        _answers(header("Content-Type", "text/xml; charset=utf-16")),
+    ),
     _mutant("bp-must-understand-true", "mustUnderstand is written true.", "R1013", _answers(tree(understood_true))),
     _mutant(
         "bp-body-unqualified",

@@ -84,6 +84,7 @@ def test_breaches_of_a_response(old, new, name):
         (RESPONSE, 201, XML, "HTTP/1.1", "R1111"),
         (RESPONSE, 200, "application/soap+xml", "HTTP/1.1", "content-type"),
         (RESPONSE, 200, "text/xml; charset=iso-8859-1", "HTTP/1.1", "R1012"),
+        (RESPONSE, 200, "text/xml; charset=utf-16", "HTTP/1.1", "R1018"),
         (RESPONSE, 200, XML, "HTTP/1.2", "R1141"),
     ],
 )
