@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Iterable
-from inspect import iscoroutinefunction
 from typing import Final
 
 from reference_robot.webservices.http.authorization import Authorization
 from reference_robot.webservices.http.interface import Interface
-from reference_robot.webservices.http.messages import Message, Request, Response
+from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.resources.delivery import Delivery
 from reference_robot.webservices.resources.resource import Resource
@@ -25,17 +24,6 @@ class RestInterface(Interface):
         super().__init__(authorization)
         self._fixed: dict[bytes, Handlers] = {resource.path.encode(): resource.handlers() for resource in resources}
         self._delivery = delivery
-        self._immediate = {
-            (method, path)
-            for path, handlers in self._fixed.items()
-            for method, handler in handlers.items()
-            if not iscoroutinefunction(handler)
-        }
-
-    def never_waits(self, scope: Message) -> bool:
-        """Tell whether the resource's handler is a plain function."""
-        method, path = scope["method"], scope["raw_path"]
-        return (method, path) in self._immediate or (method == "PUT" and path.startswith(_DELIVERY_PATHS))
 
     def answer(self, request: Request) -> Response | Awaitable[Response]:
         """Return the resource's answer.

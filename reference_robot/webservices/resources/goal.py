@@ -29,7 +29,7 @@ class Goal(Resource):
     async def put(self, request: Request) -> Response:
         """Send a goal; 201 with Location for a new one, 202 where it preempts another, 200 for a repeat."""
         media_type = wanted_format(request)
-        status, goal = await self._goals.send(await sent(request, GOAL))
+        status, goal = await self._goals.send(sent(request, GOAL))
         location = ((b"location", self.path.encode()),) if status == _CREATED else ()
         return represented(goal, GOAL.name, media_type, status, location)
 

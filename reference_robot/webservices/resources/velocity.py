@@ -23,7 +23,7 @@ class Velocity(Resource):
     async def put(self, request: Request) -> Response:
         """Set all six components; 200 with the accepted Twist."""
         media_type = wanted_format(request)
-        twist = await sent(request, shape_of(Twist))
+        twist = sent(request, shape_of(Twist))
         await self._velocity.command(twist)
         return represented(twist, "Twist", media_type)
 
@@ -43,6 +43,6 @@ class LinearVelocity(Resource):
     async def put(self, request: Request) -> Response:
         """Set the three linear components; 200 with the accepted Vector3."""
         media_type = wanted_format(request)
-        linear = await sent(request, shape_of(Vector3))
+        linear = sent(request, shape_of(Vector3))
         await self._velocity.command_linear(linear)
         return represented(linear, "Vector3", media_type)

@@ -36,12 +36,12 @@ class SoapService:
         namespace = self.description.namespace
         self._operations = {f"{{{namespace}}}{name}": operation for name, operation in operations.items()}
 
-    async def post(self, request: Request) -> Response:
+    def post(self, request: Request) -> Response | Awaitable[Response]:
         """Answer a message: 200, or 500 with a fault (WS-I BP R1126).
 
         Raises:
-            Problem: 415 for another media type, 400 for what is no XML and for a DOCTYPE or processing instruction,
-                413 for too much of it: without a fault, for there was no message.
+            Problem: 415 for another media type, 400 for what is no XML and for a DOCTYPE or processing instruction:
+                without a fault, for there was no message.
         """
         media_type, charset = parsed_content_type(request.headers.get(b"content-type"))
         if media_type != _MEDIA_TYPE:
@@ -50,20 +50,12 @@ class SoapService:
                 f"SOAP 1.1 comes as text/xml, not {media_type[:200]!a} (WS-I BP R1115)",
                 ((b"accept", _MEDIA_TYPE.encode()),),
             )
-        root = parsed(await request.body(), charset)
+        root = parsed(request.content(), charset)
         try:
             outcome = self._answer(root)
-            envelope = outcome if isinstance(outcome, bytes) else await outcome
-        except Fault as fault:
-            return content(500, _MEDIA_TYPE, fault.envelope())
-        except Problem as problem:
-            code = FaultCode.SERVER if problem.status >= _SERVERS_FAULT else FaultCode.CLIENT
-            return content(500, _MEDIA_TYPE, Fault(code, problem.detail).envelope())
-        except Exception:
-            _LOGGER.exception("no answer to %s", root.tag)
-            failure = Fault(FaultCode.SERVER, "the robot failed to answer; its log says why")
-            return content(500, _MEDIA_TYPE, failure.envelope())
-        return content(200, _MEDIA_TYPE, envelope)
+        except Exception as error:  # noqa: BLE001 - whatever went wrong, the client gets a fault
+            return _faulted(root, error)
+        return content(200, _MEDIA_TYPE, outcome) if isinstance(outcome, bytes) else _awaited(root, outcome)
 
     def _answer(self, root: etree._Element) -> bytes | Awaitable[bytes]:
         element = operation_element(root)
@@ -72,3 +64,20 @@ class SoapService:
             raise client_fault(f"no operation is asked for by {shown(element.tag)}")
         self.description.require_valid(element)
         return operation(element)
+
+
+async def _awaited(root: etree._Element, outcome: Awaitable[bytes]) -> Response:
+    try:
+        return content(200, _MEDIA_TYPE, await outcome)
+    except Exception as error:  # noqa: BLE001 - as above
+        return _faulted(root, error)
+
+
+def _faulted(root: etree._Element, error: Exception) -> Response:
+    if isinstance(error, Problem):
+        code = FaultCode.SERVER if error.status >= _SERVERS_FAULT else FaultCode.CLIENT
+        error = Fault(code, error.detail)
+    elif not isinstance(error, Fault):
+        _LOGGER.error("no answer to %s", root.tag, exc_info=error)
+        error = Fault(FaultCode.SERVER, "the robot failed to answer; its log says why")
+    return content(500, _MEDIA_TYPE, error.envelope())

@@ -81,7 +81,7 @@ def test_the_robot_ends_with_its_simulation(domain_id):
         assert "ended by itself" in served.process.stderr.read()
 
 
-@pytest.mark.parametrize("package", ["rclpy", "mybot_delivery_app", "nav2_msgs", "uvicorn"])
+@pytest.mark.parametrize("package", ["rclpy", "mybot_delivery_app", "nav2_msgs", "httptools"])
 def test_a_missing_package_is_named_with_its_remedy(package):
     program = f"import sys; sys.modules[{package!r}] = None; from reference_robot.cli import robot; robot(['--attach'])"
     done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True, timeout=60)

@@ -1,0 +1,81 @@
+"""What the HTTP parser must not see as it came, and what a complete head must be."""
+
+import re
+from typing import Final
+
+from reference_robot.webservices.http.messages import BODY_LIMIT, Field
+from reference_robot.webservices.representation.problems import Problem
+
+TARGET_LIMIT: Final = 8000  # octets (RFC 9110 4.1 asks for at least that)
+HEAD_LIMIT: Final = 64 * 1024  # octets: request line and fields (RFC 6585 5)
+
+# Fields of which a request has at most one (RFC 9110 5.3; 9112 3.2 for Host).
+_SINGLE: Final = frozenset({b"host", b"content-type", b"content-length", b"authorization"})
+
+_SERVED: Final = (b"GET ", b"PUT ", b"POST ", b"DELETE ", b"HEAD ", b"OPTIONS ")
+_UPGRADE: Final = re.compile(rb"(?i)(?<=\r\n)Upgrade(?=:)")
+_METHOD: Final = re.compile(rb"[!#$%&'*+.^_`|~0-9A-Za-z-]++(?= [^ \r\n]+ HTTP/1\.[01]\r?\n)")
+
+
+def readable(data: bytes) -> bytes:
+    """Return the first octets of a request as the parser takes them.
+
+    A method that no resource offers becomes TRACE, which is one of them: the parser refuses methods that it does not
+    know, and so they get what every unsupported method gets, 405, or 404 (RFC 9110 15.5.6).
+
+    The Upgrade field gets a name that says nothing: the robot upgrades to nothing and may ignore it (RFC 9110 7.8), but
+    the parser would take the content for another protocol's octets. Java's HttpClient asks for h2c with every first
+    request.
+    """
+    if not data.startswith(_SERVED):
+        method = _METHOD.match(data)
+        data = data if method is None else b"TRACE" + data[method.end() :]
+    if b"pgrade:" not in data:
+        return data
+    head, end, rest = data.partition(b"\r\n\r\n")
+    return _UPGRADE.sub(b"X-Ignored-Upgrade", head) + end + rest
+
+
+def fields_by_name(fields: list[Field]) -> dict[bytes, bytes]:
+    """Return field values by lower-case name, several lines joined; for a head in which names occur twice.
+
+    Raises:
+        Problem: 400 for a single field that is repeated.
+    """
+    headers: dict[bytes, bytes] = {}
+    for name, value in fields:
+        if name not in headers:
+            headers[name] = value
+        elif name in _SINGLE:
+            raise Problem(400, f"the field {name.decode('latin-1')} occurs more than once (RFC 9110 5.3)")
+        else:
+            headers[name] += b", " + value
+    return headers
+
+
+def require_short_head(fields: list[Field]) -> None:
+    """Raise the Problem 431 for fields beyond the limit."""
+    if sum(len(name) + len(value) for name, value in fields) > HEAD_LIMIT:
+        raise head_too_large()
+
+
+def head_too_large() -> Problem:
+    """Return the refusal of a head that is too long (RFC 6585 5)."""
+    return Problem(431, f"the head of the request exceeds {HEAD_LIMIT} octets")
+
+
+def require_old_version(version: str) -> None:
+    """Raise the Problem 400 for a head without a Host field, which HTTP/1.0 does not know."""
+    if version != "1.0":
+        raise Problem(400, "the request has no Host field (RFC 9112 3.2)")
+
+
+def require_bounded(octets: int) -> None:
+    """Raise the Problem 413 for so much content (RFC 9110 15.5.14)."""
+    if octets > BODY_LIMIT:
+        raise Problem(413, f"{octets} octets exceed the limit of {BODY_LIMIT} octets")
+
+
+def no_request(error: BaseException) -> Problem:
+    """Return the refusal of what the parser does not take (RFC 9112 2.2)."""
+    return Problem(400, f"no valid HTTP request: {error}")
