@@ -163,16 +163,16 @@ def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None)
         given = Given(*(file_digest(path) if path else None for path in (statement, options["baseline"])))
     except (OSError, BaselineError) as error:
         raise StatementError(str(error)) from error
-    claims = tuple(name for name in chosen.claimed() if any(r.class_ == name for r in contract.ledger.values()))
     run = Run(
         statement=chosen,
         contract=contract,
-        claims=claims,
         allow_motion=options["allow_motion"],
         seed=options["seed"],
         given=given,
         effort=Effort(options["effort"], minutes=options["minutes"]),
     )
+    known = {item.class_ for item in contract.ledger.values()}
+    run.claims = tuple(name for name in chosen.claimed(run.interfaces) if name in known)
     notes = _notes(run)
     for note in notes:
         click.echo(note, err=True)
@@ -184,6 +184,10 @@ def _notes(run: Run) -> tuple[str, ...]:
     notes = []
     if run.statement.claims is None:
         notes.append(f"No classes were claimed; judged are those that have an address: {', '.join(run.claims)}.")
+    notes += [
+        f"Class {name} is not claimed: the robot's {' and '.join(missing)} interface has no address."
+        for name, missing in run.statement.lacking(run.interfaces).items()
+    ]
     if not run.allow_motion:
         notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")
     return tuple(notes)

@@ -32,8 +32,9 @@ def print_summary(outcome: Certification) -> None:
             _print_finding(requirement)
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
     told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()))
+    accepted = f", accepted by the baseline until {document['accepted_until']}" if "accepted_until" in document else ""
     click.echo(
-        f"\n{document['verdict']}: {told}; "
+        f"\n{document['verdict']}{accepted}: {told}; "
         f"{document['requests']} requests in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
     click.echo(f"result: {outcome.path}")

@@ -25,6 +25,8 @@ class Prerequisite(StrEnum):
 
     MOTION = "motion"  # permission to move the robot
     OBSERVER = "observer"  # a ROS probe, or the robot's list of deliveries
+    LIMITS = "limits"  # that the statement declares them
+    HOLD = "hold"  # that the statement declares the hold time
     PROBE = "probe"  # a ROS probe; without one the requirement is skipped and does not hold its class back
 
 

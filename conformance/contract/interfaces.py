@@ -30,18 +30,15 @@ class Need:
 
     Attributes:
         interfaces: those that it judges.
-        named: whether it is about these and no others, so that each has to be there; else about whatever a robot has.
         each: whether each that is there has to answer; else one is enough.
     """
 
     interfaces: tuple[Interface, ...]
-    named: bool = True
     each: bool = True
 
-    def can_be_judged(self, there: Collection[Interface]) -> bool:
-        """Whether the class can be judged by the interfaces that are there."""
-        found = [name in there for name in self.interfaces]
-        return all(found) if self.named else any(found)
+    def missing(self, there: Collection[Interface], described: Collection[Interface] = EVERY) -> tuple[Interface, ...]:
+        """What the class would judge, of what the contract describes, and the robot has no address of."""
+        return tuple(name for name in self.interfaces if name in described and name not in there)
 
 
 _REST = Need((Interface.REST,))
@@ -53,9 +50,9 @@ NEEDS: dict[str, Need] = {
     ConformanceClass.SAFETY: _REST,
     ConformanceClass.SOAP_DELIVERY: Need((Interface.PUBLISHERS,)),
     ConformanceClass.SOAP_SUBSCRIBERS: Need((Interface.SUBSCRIBERS,)),
-    ConformanceClass.SOAP_BASIC_PROFILE: Need(SOAP, named=False, each=False),
-    ConformanceClass.STRICT_INPUT: Need(EVERY, named=False),
-    ConformanceClass.XML_SECURITY: Need(EVERY, named=False, each=False),
-    ConformanceClass.EQUIVALENCE: Need((Interface.REST, Interface.PUBLISHERS)),
-    ConformanceClass.DESCRIBE: Need(EVERY, named=False),
+    ConformanceClass.SOAP_BASIC_PROFILE: Need(SOAP, each=False),
+    ConformanceClass.STRICT_INPUT: Need(EVERY),
+    ConformanceClass.XML_SECURITY: Need(EVERY, each=False),
+    ConformanceClass.EQUIVALENCE: Need(EVERY),
+    ConformanceClass.DESCRIBE: Need(EVERY),
 }

@@ -68,14 +68,18 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The table ``[limits]`` of a statement: fields as in Limits; None: not declared."""
+    """The table ``[limits]`` of a statement: fields as in Limits; None: not declared.
+
+    The bounds are the contract's (contract.md#statement): by a wider tolerance a robot would be judged by nothing.
+    """
 
     linear_m_s: NotNegative | None = None
     angular_rad_s: NotNegative | None = None
-    settle_s: NotNegative | None = None
-    hold_s: NotNegative | None = None
-    tolerance: NotNegative | None = None
-    tolerance_abs: NotNegative | None = None
+    settle_s: Annotated[float, Meta(ge=0, le=5)] | None = None
+    hold_s: Annotated[float, Meta(ge=0.2, le=10)] | None = None
+    tolerance: Annotated[float, Meta(ge=0, le=0.25)] | None = None
+    # One figure for both: what is allowed in rad/s (0.2) is twice what is in m/s.
+    tolerance_abs: Annotated[float, Meta(ge=0, le=0.1)] | None = None
     noise: Noise | None = None
     odometry_hz: Positive | None = None
     time_scale: Positive | None = None

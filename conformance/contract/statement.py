@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 
 from conformance.contract.classes import CLASSES, PROFILES, ConformanceClass, Profile
-from conformance.contract.interfaces import NEEDS, Interface
+from conformance.contract.interfaces import EVERY, NEEDS, Interface
 from conformance.contract.limits import DeclaredLimits, Limits
 from conformance.contract.thresholds import Threshold
 from conformance.contract.toml_file import Finite, NotNegative, Positive, Text, TomlFileError, read_toml
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
     from pathlib import Path
 
 Component = Literal["linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z"]
@@ -129,12 +130,27 @@ class Statement(msgspec.Struct, frozen=True):
         """What the robot is judged by, declared or not."""
         return self.declared.resolved()
 
-    def claimed(self) -> tuple[ConformanceClass, ...]:
-        """The classes to judge: those that are claimed, else those whose interfaces have an address."""
+    def claimed(self, described: Collection[Interface] = EVERY) -> tuple[ConformanceClass, ...]:
+        """The classes to judge: those that are claimed, else those whose interfaces all have an address.
+
+        So who names no classes is never judged more mildly than who names them.
+
+        Args:
+            described: the interfaces that the contract describes.
+        """
         if self.claims is not None:
             return tuple(name for name in CLASSES if name in self.claims)
+        lacking = self.lacking(described)
+        judged = (name for name in CLASSES if name not in lacking)
+        return tuple(name for name in judged if any(one in described for one in NEEDS[name].interfaces))
+
+    def lacking(self, described: Collection[Interface] = EVERY) -> dict[ConformanceClass, tuple[Interface, ...]]:
+        """The classes that are not judged where none are named, with the interfaces that have no address."""
+        if self.claims is not None:
+            return {}
         there = self.endpoints.interfaces
-        return tuple(name for name in CLASSES if NEEDS[name].can_be_judged(there))
+        found = {name: NEEDS[name].missing(there, described) for name in CLASSES}
+        return {name: missing for name, missing in found.items() if missing}
 
 
 class _Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -15,8 +15,8 @@ from conformance.contract.exit_codes import OF_VERDICT, ExitCode
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.progress import Progress
 from conformance.engine.result import result_document, write_result
-from conformance.verdict.baseline import Expectation, apply_baseline
-from conformance.verdict.verdicts import class_verdicts, overall, verdict_of
+from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
+from conformance.verdict.verdicts import Overall, class_verdicts, overall, verdict_of
 
 if TYPE_CHECKING:
     from conformance.engine.robot_under_test import RobotUnderTest
@@ -82,13 +82,17 @@ def certify(
         remarks.append("The run was interrupted; what follows is what was judged until then.")
     if run.effort.speed.remark:
         remarks.append(run.effort.speed.remark)
-    verdicts = draw_verdicts(run, baseline)
-    classes = class_verdicts(verdicts, run.claims)
+    seen = draw_verdicts(run)
+    verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
+    # A baseline makes a run green, not a robot conformant: the classes fail all the same.
+    classes, accepted = class_verdicts(seen, run.claims), class_verdicts(verdicts, run.claims)
+    failed = overall(classes) is Overall.NOT_CONFORMANT
     document = result_document(
         robot,
         verdicts,
-        classes,
-        overall(classes),
+        classes if failed else accepted,
+        overall(classes if failed else accepted),
+        accepted_until=accepted_until(verdicts) if failed and overall(accepted) is not Overall.NOT_CONFORMANT else "",
         started=started,
         finished=dt.datetime.now(dt.UTC),
         command=command,
@@ -98,21 +102,20 @@ def certify(
     path = write_result(document, out)
     if interrupted:
         return Certification(ExitCode.INTERRUPTED, document, path)
-    return Certification(OF_VERDICT[document["verdict"]] if reached else ExitCode.UNREACHABLE, document, path)
+    return Certification(OF_VERDICT[overall(accepted)] if reached else ExitCode.UNREACHABLE, document, path)
 
 
-def draw_verdicts(run: Run, baseline: tuple[Expectation, ...]) -> list[Verdict]:
-    """The verdict of each requirement, in the ledger's order, with the baseline applied."""
+def draw_verdicts(run: Run) -> list[Verdict]:
+    """The verdict of each requirement, in the ledger's order, whatever a baseline accepts."""
     judge = run.judge
     for requirement in run.contract.ledger.values():
         evidence = judge.evidence[requirement.id]
         if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.error(requirement.id, run.aborted)
-    verdicts = [
-        verdict_of(requirement, judge.evidence[requirement.id], run.claims)
+    return [
+        verdict_of(requirement, judge.evidence[requirement.id], run.claims, run.undeclared)
         for requirement in run.contract.ledger.values()
     ]
-    return apply_baseline(verdicts, baseline, dt.datetime.now(dt.UTC).date())
 
 
 def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str]) -> bool:

@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from conformance.contract.classes import CLASSES
-from conformance.contract.interfaces import Interface
+from conformance.contract.interfaces import NEEDS, Interface
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.transport.exchange import NoAnswerError
@@ -124,13 +124,39 @@ def _endpoints(robot: RobotUnderTest) -> list[str]:
     return lines
 
 
+def _undescribed(robot: RobotUnderTest) -> list[str]:
+    """The descriptions that the robot does not serve."""
+    asked: list[tuple[HttpClient, str, str]] = []
+    if robot.rest:
+        asked += [(robot.rest.client, path, path) for path in ("/openapi.json", "/application.wadl")]
+    asked += [(there.client, f"{there.path}?wsdl", f"?wsdl of {name}") for name, there in robot.soap.there.items()]
+    missing = []
+    for client, path, told in asked:
+        try:
+            served = client.send("GET", path).response.ok
+        except NoAnswerError:
+            served = False
+        if not served:
+            missing.append(told)
+    return missing
+
+
 def _doubts(robot: RobotUnderTest) -> dict[str, str]:
     """A doubt for each class that the robot does not look as if it had."""
-    claimed = robot.run.statement.claimed()
+    unreached = robot.run.unreachable
     doubts: dict[str, str] = {
-        name: "no address for an interface that it needs" for name in CLASSES if name not in claimed
+        name: f"no address for {' and '.join(missing)}" for name, missing in robot.run.statement.lacking().items()
     }
-    if robot.rest and Interface.REST not in robot.run.unreachable and "rest-formats" not in doubts:
+    for name in CLASSES:
+        silent = [one for one in NEEDS[name].interfaces if one in unreached]
+        if silent:
+            doubts.setdefault(name, f"{' and '.join(silent)} did not answer")
+    doubts.setdefault("safety", "to claim it, declare limits and hold time below")
+    if "describe" not in doubts:
+        missing = _undescribed(robot)
+        if missing:
+            doubts["describe"] = f"the robot serves no {' and no '.join(missing)}"
+    if robot.rest and "rest-formats" not in doubts:
         try:
             answer = robot.rest.client.send("GET", robot.rest.path, headers=[("Accept", "application/xml")]).response
             xml = answer.media_type == "application/xml"

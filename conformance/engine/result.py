@@ -15,6 +15,7 @@ from conformance.contract.interfaces import Interface
 from conformance.contract.requirement_sets import set_of
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
 from conformance.transport.exchange import Unanswered
+from conformance.verdict.verdicts import views
 
 if TYPE_CHECKING:
     import datetime as dt
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from conformance.contract.files import Contract
+    from conformance.contract.limits import DeclaredLimits
     from conformance.engine.robot_under_test import RobotUnderTest
     from conformance.transport.exchange import Attempt
     from conformance.verdict.evidence import Finding
@@ -45,12 +47,14 @@ def result_document(
     command: str,
     notes: list[str],
     interrupted: bool,
+    accepted_until: str = "",
 ) -> dict[str, Any]:
     """Put a run together as result.json has it."""
     run, statement = robot.run, robot.run.statement
     return {
         "format": RESULT_FORMAT,
         "verdict": overall,
+        **({"accepted_until": accepted_until} if accepted_until else {}),
         "interrupted": interrupted,
         "suite": {
             "version": suite_version(),
@@ -66,6 +70,7 @@ def result_document(
             "robot": statement.robot,
             "endpoints": {key: value for key, value in asdict(statement.endpoints).items() if value is not None},
             "claims": list(run.claims),
+            "declared": _declared(statement.declared),
             "limits": statement.limits.figures,
             "tolerances": statement.limits.tolerances,
             "motion_allowed": run.allow_motion,
@@ -89,11 +94,19 @@ def result_document(
         },
         "classes": {name: value for name, (value, _) in classes.items()},
         "class_titles": {name: CLASS_TITLES[name] for name in classes},
+        "class_views": dict(views(verdicts)),
         "class_reasons": {name: reason for name, (_, reason) in classes.items() if reason},
         "requirements": [_requirement(verdict) for verdict in verdicts],
         "contract_sections": {anchor: section._asdict() for anchor, section in run.contract.cited_sections.items()},
         "notes": notes,
     }
+
+
+def _declared(limits: DeclaredLimits) -> dict[str, float]:
+    """The figures that the statement itself names, those of the noise as ``noise_NAME``."""
+    figures = {name: figure for name, figure in asdict(limits).items() if figure is not None}
+    noise = figures.pop("noise", None)
+    return figures | {f"noise_{name}": figure for name, figure in (asdict(noise) if noise else {}).items() if figure}
 
 
 def _contract_name(contract: Contract) -> str:

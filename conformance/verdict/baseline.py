@@ -61,6 +61,11 @@ def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation],
     ]
 
 
+def accepted_until(verdicts: Iterable[Verdict]) -> str:
+    """The last day on which all failures that the baseline accepts still are; empty where it accepts none."""
+    return min((verdict.expected_failure[1] for verdict in verdicts if verdict.expected_failure), default="")
+
+
 def _applied(verdict: Verdict, entry: Expectation, today: dt.date) -> Verdict:
     day = entry.expires.isoformat()
     if verdict.value in {Value.FAIL, Value.WARN}:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from conformance.contract.classes import Prerequisite
 from conformance.contract.files import Contract
 from conformance.contract.interfaces import Interface
 from conformance.contract.statement import Statement
@@ -61,6 +62,21 @@ class Run:
 
     def __post_init__(self) -> None:
         self.judge = Judge(set(self.contract.ledger))
+
+    @property
+    def undeclared(self) -> dict[str, str]:
+        """Why what needs a figure is not judged, by the prerequisite that the statement does not declare."""
+        limits = self.statement.limits
+        kinds = {name.partition(".")[0] for name in self.statement.motion.actuated}
+        declared = {"linear": limits.linear_declared, "angular": limits.angular_declared}
+        there = {
+            Prerequisite.HOLD: limits.hold_s is not None,
+            Prerequisite.LIMITS: all(declared[kind] for kind in kinds),
+        }
+        words = {Prerequisite.HOLD: "hold time", Prerequisite.LIMITS: "limits of speed and turning rate"}
+        return {
+            need: f"not judged: the statement declares no {words[need]}" for need, known in there.items() if not known
+        }
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from conformance.contract.classes import Level, Prerequisite
@@ -47,6 +48,13 @@ class Overall(StrEnum):
     INCONCLUSIVE = "inconclusive"
 
 
+class View(StrEnum):
+    """From where a robot was seen."""
+
+    BLACK_BOX = "black box"  # through its web services alone
+    ON_ROS = "seen on ROS"  # by a probe as well
+
+
 @dataclass(frozen=True)
 class Verdict:
     """What is said of one requirement.
@@ -66,8 +74,20 @@ class Verdict:
     expected_failure: tuple[str, str] | None = None
 
 
-def verdict_of(requirement: Requirement, evidence: Evidence, claims: Iterable[str]) -> Verdict:
-    """Judge one requirement by its evidence."""
+def verdict_of(
+    requirement: Requirement,
+    evidence: Evidence,
+    claims: Iterable[str],
+    undeclared: Mapping[str, str] = MappingProxyType({}),
+) -> Verdict:
+    """Judge one requirement by its evidence.
+
+    Args:
+        requirement: which.
+        evidence: what was seen.
+        claims: the classes that are claimed.
+        undeclared: why what needs a figure is not judged, by the prerequisite that the statement does not declare.
+    """
 
     def verdict(value: Value, reason: str = "") -> Verdict:
         return Verdict(requirement, value, reason, evidence)
@@ -85,6 +105,7 @@ def verdict_of(requirement: Requirement, evidence: Evidence, claims: Iterable[st
     for value, reasons in (
         (Value.SKIP, [requirement.untestable] if requirement.untestable else []),
         (Value.ERROR, evidence.errors),
+        (Value.SKIP, [undeclared[need] for need in requirement.needs if need in undeclared]),
         (Value.SKIP, evidence.skips),
         (Value.SKIP, [] if evidence.cases else evidence.notes or ["nothing was executed for it"]),
     ):
@@ -120,6 +141,17 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
     if not any(item.evidence.cases for item in verdicts):
         return ClassValue.INCONCLUSIVE, "nothing was executed"
     return ClassValue.PASS, ""
+
+
+def views(verdicts: Iterable[Verdict]) -> dict[str, View]:
+    """How each claimed class was looked at that a look at the ROS side could have judged further."""
+    seen: dict[str, View] = {}
+    for verdict in verdicts:
+        if verdict.value is Value.NOT_CLAIMED or Prerequisite.PROBE not in verdict.requirement.needs:
+            continue
+        on_ros = verdict.evidence.cases > 0 and seen.get(verdict.requirement.class_) is not View.BLACK_BOX
+        seen[verdict.requirement.class_] = View.ON_ROS if on_ros else View.BLACK_BOX
+    return seen
 
 
 def _holds_back(requirement: Requirement) -> bool:

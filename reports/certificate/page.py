@@ -43,6 +43,8 @@ class ClassSummary:
     verdict: str
     reason: str
     requirements: tuple[Mapping[str, Any], ...]
+    view: str = ""
+    """From where it was seen, where that makes a difference: black box, or seen on ROS."""
 
     @property
     def cases(self) -> int:
@@ -112,7 +114,24 @@ class Certificate:
 
     @property
     def headline(self) -> str:
-        """The verdict in a sentence."""
+        """The verdict in a sentence, and what of it is accepted until when."""
+        accepted = self.result.get("accepted_until")
+        if not accepted:
+            return self._headline
+        known = [r for r in self.with_verdict("warn") if r.get("expected_failure")]
+        named = "; ".join(
+            f"{r['id']} until {r['expected_failure'].get('expires')} ({r['expected_failure']['reason']})" for r in known
+        )
+        return f"{self._headline} Known failures are accepted until {accepted}: {named}."
+
+    @property
+    def declared(self) -> str:
+        """The figures that the statement declares, on which the verdict rests."""
+        figures = self.result["statement"].get("declared", {})
+        return ", ".join(f"{name} = {figure:g}" for name, figure in figures.items()) or "nothing"
+
+    @property
+    def _headline(self) -> str:
         judged = len(self.claimed)
         classes = f"{judged} claimed {'class' if judged == 1 else 'classes'}"
         verdict = self.result["verdict"]
@@ -157,6 +176,7 @@ def _classes(result: Mapping[str, Any]) -> Iterator[ClassSummary]:
             verdict=result["classes"].get(name, "inconclusive"),
             reason=result["class_reasons"].get(name, ""),
             requirements=tuple(sorted(requirements, key=lambda r: _ORDER.index(r["verdict"]))),
+            view=result.get("class_views", {}).get(name, ""),
         )
 
 

@@ -42,8 +42,6 @@ def _needed(run: Run, class_: str) -> tuple[Interface, ...]:
     """The interfaces that a class needs of a robot."""
     need = NEEDS[class_]
     there = run.interfaces
-    if run.statement.claims is None and not need.named:
-        there = tuple(name for name in there if name in run.statement.endpoints.interfaces)
     return tuple(name for name in need.interfaces if name in there)
 
 

@@ -1,8 +1,11 @@
 """A statement is read as it stands, and refused with the offending value."""
 
+import re
+
 import pytest
 
 from conformance.contract.classes import CLASSES
+from conformance.contract.interfaces import Interface
 from conformance.contract.limits import Noise
 from conformance.contract.statement import Endpoints, Statement, StatementError, load_statement
 from conformance.contract.thresholds import ApiStyle, Operation, Quantile, Threshold
@@ -69,8 +72,8 @@ def test_a_full_statement(tmp_path):
         ("[claims]\nclasses = 'http'", "[claims] classes = 'http' must be a list, each item one of rest-resources,"),
         ("[limits]\nlinear_m_s = 'fast'", "[limits] linear_m_s = 'fast' must be a number, and not negative"),
         ("[limits]\nlinear_m_s = true", "[limits] linear_m_s = True must be a number, and not negative"),
-        ("[limits]\nsettle_s = nan", "[limits] settle_s = nan must be a number, and not negative"),
-        ("[limits]\nsettle_s = inf", "[limits] settle_s = inf must be a number, and not negative"),
+        ("[limits]\nsettle_s = nan", "[limits] settle_s = nan must be a number from 0 to 5"),
+        ("[limits]\nsettle_s = inf", "[limits] settle_s = inf must be a number from 0 to 5"),
         ("[limits]\nodometry_hz = 0", "[limits] odometry_hz = 0 must be a positive number"),
         ("[limits.noise]\nposition_m = 0.06", "position_m = 0.06 must be"),
         ("[limits.noise]\nangular_rad_s = 0.2", "angular_rad_s = 0.2 must be"),
@@ -126,7 +129,28 @@ def test_noise_rate_and_clock_are_declared_among_the_limits(tmp_path):
 
 def test_without_claims_the_classes_follow_from_the_addresses():
     only_rest = Statement(endpoints=Endpoints(rest="http://r2"))
-    assert "soap-delivery" not in only_rest.claimed()
-    assert "rest-resources" in only_rest.claimed()
+    # What judges several interfaces is not judged by one of them: that would be milder than to claim it.
+    assert only_rest.claimed() == ("rest-resources", "rest-delivery", "rest-formats", "http", "safety")
+    assert only_rest.lacking()["strict-input"] == ("publishers", "subscribers")
+    assert "strict-input" in only_rest.claimed([Interface.REST])
+    assert "soap-delivery" not in only_rest.claimed([Interface.REST])
     both = Endpoints(rest="http://r2", publishers_wsdl="x", subscribers_wsdl="y")
     assert Statement(endpoints=both).claimed() == CLASSES
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("settle_s = 5.1", "settle_s = 5.1 must be a number from 0 to 5"),
+        ("hold_s = 0.1", "hold_s = 0.1 must be a number from 0.2 to 10"),
+        ("hold_s = 11", "hold_s = 11 must be a number from 0.2 to 10"),
+        ("tolerance = 1000", "tolerance = 1000 must be a number from 0 to 0.25"),
+        ("tolerance_abs = 0.11", "tolerance_abs = 0.11 must be a number from 0 to 0.1"),
+        ("noise.position_m = 0.06", "position_m = 0.06 must be a number from 0 to 0.05"),
+    ],
+)
+def test_a_statement_declares_within_the_contract_s_bounds(tmp_path, line, told):
+    path = tmp_path / "robot.toml"
+    path.write_text(f"[limits]\n{line}\n", encoding="utf-8")
+    with pytest.raises(StatementError, match=re.escape(told)):
+        load_statement(path)

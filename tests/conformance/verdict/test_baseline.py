@@ -6,7 +6,7 @@ import pytest
 
 from conformance.contract.classes import Level, Origin
 from conformance.contract.ledger import Requirement
-from conformance.verdict.baseline import BaselineError, Expectation, apply_baseline, load_baseline
+from conformance.verdict.baseline import BaselineError, Expectation, accepted_until, apply_baseline, load_baseline
 from conformance.verdict.evidence import Evidence
 from conformance.verdict.verdicts import Value, Verdict
 
@@ -33,6 +33,12 @@ def _applied(value, expires):
 )
 def test_an_entry_changes_the_verdict_it_is_for(value, expires, expected):
     assert _applied(value, expires).value == expected
+
+
+def test_accepted_is_what_all_entries_still_accept():
+    verdicts = [_applied("fail", day) for day in ("2027-01-31", "2026-12-31")]
+    assert accepted_until([*verdicts, _applied("skip", "2026-11-30")]) == "2026-12-31"
+    assert accepted_until([_applied("fail", "2026-11-19")]) == ""
 
 
 def test_an_expired_entry_is_named():

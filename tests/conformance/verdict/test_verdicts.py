@@ -5,7 +5,7 @@ import pytest
 from conformance.contract.classes import Level, Origin
 from conformance.contract.ledger import Requirement
 from conformance.verdict.evidence import MAX_FINDINGS, Evidence, Judge
-from conformance.verdict.verdicts import class_verdicts, overall, verdict_of
+from conformance.verdict.verdicts import class_verdicts, overall, verdict_of, views
 
 _CLAIMS = ("http",)
 
@@ -41,6 +41,24 @@ def _evidence(*, cases=0, failing=False, skips=(), errors=()) -> Evidence:
 )
 def test_a_requirement_is_judged_by_its_level_and_evidence(level, evidence, expected):
     assert verdict_of(_requirement(level), _evidence(**evidence), _CLAIMS).value == expected
+
+
+def test_what_needs_an_undeclared_figure_is_not_judged_and_holds_its_class_back():
+    requirement = _requirement(needs=("motion", "hold"))
+    undeclared = {"hold": "not judged: the statement declares no hold time"}
+    passing = verdict_of(requirement, _evidence(cases=3), _CLAIMS, undeclared)
+    assert (passing.value, passing.reason) == ("skip", undeclared["hold"])
+    assert class_verdicts([passing], _CLAIMS)["http"][0] == "inconclusive"
+    assert verdict_of(requirement, _evidence(failing=True), _CLAIMS, undeclared).value == "fail"
+    assert verdict_of(requirement, _evidence(cases=3), _CLAIMS).value == "pass"
+
+
+@pytest.mark.parametrize(
+    ("cases", "expected"), [((1, 1), "seen on ROS"), ((1, 0), "black box"), ((0, 1), "black box"), ((), None)]
+)
+def test_from_where_a_class_was_seen(cases, expected):
+    seen = [verdict_of(_requirement(needs=("probe",)), _evidence(cases=number), _CLAIMS) for number in cases]
+    assert views([verdict_of(_requirement(), _evidence(cases=1), _CLAIMS), *seen]).get("http") == expected
 
 
 def test_what_is_not_claimed_is_not_judged():

@@ -31,12 +31,13 @@ def certified(robot, folder, expires):
     baseline = folder / "known.toml"
     baseline.write_text(BASELINE.format(EXPECTED, expires), encoding="utf-8")
     command = [sys.executable, "-m", "roaas", "certify", f"--rest={robot}", "--class=soap-delivery", "--effort=quick"]
-    run = subprocess.run(
+    done = subprocess.run(
         [*command, f"--baseline={baseline}", f"--out={folder}"], capture_output=True, text=True, timeout=60, check=False
     )
-    assert "Traceback" not in run.stderr
+    assert "Traceback" not in done.stderr
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     requirement = next(item for item in result["requirements"] if item["id"] == EXPECTED)
+    requirement["whole run"] = (done.returncode, result["verdict"], result.get("accepted_until"))
     return requirement, etree.parse(folder / "junit.xml").find(f".//testcase[@name='{EXPECTED}']")
 
 
@@ -44,14 +45,19 @@ def test_an_expected_failure_is_skipped_with_its_reason(robot, tmp_path):
     requirement, case = certified(robot, tmp_path, "2999-12-31")
     assert requirement["verdict"] == "warn"
     assert requirement["expected_failure"] == {"reason": "ticket 7", "expires": "2999-12-31"}
+    # The failure is accepted, and the robot does not conform all the same; that the rest was not judged stays.
+    assert requirement["whole run"] == (4, "not-conformant", "2999-12-31")
     assert case.find("skipped").get("message") == "Expected by the baseline until 2999-12-31: ticket 7"
     assert case.find("failure") is None
     for page in ("certificate.html", "certificate.md"):
-        assert "ticket 7 (until 2999-12-31)" in (tmp_path / page).read_text(encoding="utf-8")
+        shown = (tmp_path / page).read_text(encoding="utf-8")
+        assert "ticket 7 (until 2999-12-31)" in shown
+        assert "accepted until 2999-12-31" in shown
 
 
 def test_a_failure_whose_entry_has_expired_is_a_failure(robot, tmp_path):
     requirement, case = certified(robot, tmp_path, "2020-12-31")
     assert requirement["verdict"] == "fail"
+    assert requirement["whole run"] == (1, "not-conformant", None)
     assert "expected_failure" not in requirement
     assert case.find("failure") is not None
