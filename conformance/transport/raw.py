@@ -58,6 +58,12 @@ def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = 
     return ("\r\n".join([*lines, *fields]) + "\r\n\r\n").encode("latin-1")
 
 
+def chunked(body: bytes, size: int) -> bytes:
+    """A body in chunks of so many octets (RFC 9112 7.1)."""
+    pieces = (body[start : start + size] for start in range(0, len(body), size))
+    return b"".join(b"%x\r\n%b\r\n" % (len(piece), piece) for piece in pieces) + b"0\r\n\r\n"
+
+
 def talk(client: HttpClient, octets: bytes, *, timeout_s: float | None = None, answers: int = 0) -> RawAnswer:
     """Send octets over a connection of their own, and read until the robot closes it or the deadline passes.
 

@@ -1,15 +1,19 @@
 """Bodies: media types that an operation does not take, charset, and sizes (RFC 9110 8.3, 15.5.14, 15.5.16)."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
-from conformance.rest.applicable import applicable_operations
+from conformance.documents.writing import json_text
+from conformance.rest.applicable import answered, applicable_operations
 from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.interface import RestInterface
+from conformance.rest.number_forms import at_integer_ends, with_numbers
 from conformance.rest.statuses import is_taken, judge_status
 from conformance.robot.stopping import stop_robot
-from conformance.transport.exchange import NoAnswer, NoAnswerError
+from conformance.transport import raw
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
@@ -21,6 +25,15 @@ _OTHERS = (
     "text/csv",
 )
 _CHARSETS = ("application/json; charset=utf-8", "application/json;charset=UTF-8", 'application/json; charset="utf-8"')
+# What a number may be written as and still be the same (RFC 8259 6); zero has a sign as well.
+_FORMS: tuple[Callable[[float], str], ...] = (
+    "{:.17e}".format,
+    "{:.17E}".format,
+    lambda value: f"{value!r}e+0" if "e" not in repr(value) else repr(value),
+    lambda value: f"{value!r}E-00" if "e" not in repr(value) else repr(value),
+    lambda value: repr(value) if value else "-0",
+    lambda value: repr(value) if value else "-0.0e-5",
+)
 _TAKEN = 64 * 1024
 _TOO_LARGE = 10 * 1024 * 1024 + 1
 
@@ -107,3 +120,74 @@ def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple
         found=f"status {status} for a body of {_TOO_LARGE:,} octets",
         cause=f"{status} {bool(fields)}",
     )
+
+
+@pytest.mark.requirement("http/chunked")
+def test_chunked_content(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+    """Content in chunks of one octet, of a few, and of all is what it is in one piece; also 64 KiB of it."""
+    for call in _valid(api, judge, ("http/chunked",)):
+        large = call.body[:1] + b" " * (_TAKEN - len(call.body)) + call.body[1:]
+        for body, size in ((call.body, 1), (call.body, 7), (call.body, len(call.body)), (large, 1000), (large, _TAKEN)):
+            fields = (f"Content-Type: {call.media_type}", "Transfer-Encoding: chunked")
+            octets = raw.head(rest, call.operation.method, call.path, *fields) + raw.chunked(body, size)
+            attempt, _ = raw.read_one(rest, octets, raw.talk(rest, octets, answers=1), call.operation.method)
+            judge.check(
+                "http/chunked",
+                isinstance(attempt, Exchange) and (is_taken(attempt) or _knows_no_chunks(attempt)),
+                attempt,
+                f"{len(body)} octets in chunks of {size} taken as in one piece",
+                cause=f"{attempt.came}",
+            )
+
+
+def _knows_no_chunks(exchange: Exchange) -> bool:
+    """Whether a server of HTTP/1.0, which has no chunks, asks for a length (RFC 9112 6.1)."""
+    return exchange.response.http_version == "HTTP/1.0" and exchange.response.status == 411
+
+
+@pytest.mark.requirement("http/media-type-case")
+def test_case_of_media_types(api: RestInterface, judge: Judge) -> None:
+    """Media types are the same in upper case, of what is sent and of what is asked for."""
+    for call in answered(api):
+        for media_type in call.operation.formats:
+            exchange = call.send(api, ("Accept", media_type.upper()))
+            judge.check(
+                "http/media-type-case",
+                exchange.response.ok and exchange.response.media_type == media_type,
+                exchange,
+                f"200 with {media_type} for Accept: {media_type.upper()}",
+                cause=f"Accept {exchange.came}",
+            )
+    for call in _valid(api, judge, ("http/media-type-case",)):
+        for media_type in ("Application/Json", "APPLICATION/JSON; CHARSET=UTF-8"):
+            exchange = call.send(api, ("Content-Type", media_type))
+            judge.check(
+                "http/media-type-case",
+                is_taken(exchange),
+                exchange,
+                f"Content-Type: {media_type} taken like {JSON}",
+                cause=f"Content-Type {exchange.came}",
+            )
+
+
+@pytest.mark.requirement("http/json-numbers", "http/json-integers")
+def test_numbers_in_json(api: RestInterface, judge: Judge) -> None:
+    """A number is the same with an exponent, and zero with a sign; integers reach from end to end of their type."""
+    for call in _valid(api, judge, ("http/json-numbers",)):
+        for write in _FORMS:
+            exchange = call.carrying(with_numbers(call.value, write)).send(api)
+            judge.check(
+                "http/json-numbers",
+                is_taken(exchange),
+                exchange,
+                f"{write(-1.5)} and {write(0.0)} taken as the numbers that they are",
+                cause=f"{write(0.0)} {exchange.came}",
+            )
+    tried = 0
+    for call in _valid(api, judge, ("http/json-integers",)):
+        for value in at_integer_ends(call.value, call.operation.bodies[JSON].schema):
+            tried += 1
+            exchange = call.carrying(json_text(value).encode()).send(api)
+            judge.check("http/json-integers", is_taken(exchange), exchange, "the ends of an int32's range taken")
+    if not tried:
+        judge.unclaimed("http/json-integers", "the contract has no operation that takes an int32")

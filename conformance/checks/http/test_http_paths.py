@@ -6,9 +6,10 @@ import pytest
 
 from conformance.documents.openapi import inside_prefix, known_path, resources_of
 from conformance.rest.applicable import reads
-from conformance.rest.calls import example_call
+from conformance.rest.calls import JSON, example_call
 from conformance.rest.interface import RestInterface
 from conformance.rest.statuses import judge_status
+from conformance.transport import raw
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
 from conformance.verdict.evidence import Judge
@@ -19,6 +20,7 @@ _STRANGE = "roaas-nobody-has-this"
 # At quick effort; at any other one, all.
 _FEW_PATHS = 4
 _LONG_TARGETS = (9_000, 70_000)
+_TARGET_TAKEN = 8_000
 _LONG_FIELD = 128 * 1024
 
 
@@ -156,4 +158,37 @@ def test_large_field(api: RestInterface, judge: Judge) -> None:
             exchange,
             "431, 400, 413, a closed connection, or no matter",
             found=f"status {status} for a field of {_LONG_FIELD:,} octets",
+        )
+
+
+@pytest.mark.requirement("http/target-length")
+def test_targets_of_8000_octets(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+    """A target of 8,000 octets is taken by whoever takes the same with a short query."""
+    for call in [call for call in reads(api) if not call.operation.optional]:
+        path = f"{call.path}{'&' if '?' in call.path else '?'}roaas="
+        usual = rest.send("GET", f"{path}a").response.status
+        exchange = rest.send("GET", path + "a" * (_TARGET_TAKEN - len(rest.prefix) - len(path)))
+        judge_status(
+            judge,
+            "http/target-length",
+            exchange.response.status == usual,
+            exchange,
+            f"{usual} for a target of {_TARGET_TAKEN:,} octets, as for a short one",
+        )
+
+
+@pytest.mark.requirement("http/absolute-form")
+def test_absolute_form(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+    """A target with scheme and authority is the one without them (RFC 9112 3.2.2)."""
+    for call in reads(api):
+        usual = call.send(api, ("Accept", JSON)).response.status
+        head = raw.head(rest, "GET", call.path, f"Accept: {JSON}", "Connection: close")
+        absolute = head.replace(b" ", f" {rest.scheme}://{rest.authority}".encode(), 1)
+        attempt, _ = raw.read_one(rest, absolute, raw.talk(rest, absolute, answers=1), "GET")
+        judge.check(
+            "http/absolute-form",
+            isinstance(attempt, Exchange) and attempt.response.status == usual,
+            attempt,
+            f"{usual}, as for {call.path}",
+            cause=f"{attempt.came}",
         )

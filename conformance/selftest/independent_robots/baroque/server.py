@@ -1,6 +1,7 @@
 """HTTP/1.1 on asyncio's streams, framed by h11."""
 
 import asyncio
+import re
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -145,7 +146,8 @@ def _asked(event: h11.Request) -> Ask:
         raise _TooLargeError(414, f"a target of {len(event.target)} octets")
     if fields.get("content-length", "0").isdigit() and int(fields.get("content-length", "0")) > _MAX_BODY:
         raise _TooLargeError(413, f"a body of more than {_MAX_BODY} octets")
-    path, _, query = event.target.decode("latin-1").partition("?")
+    target = re.sub(r"^https?://[^/?]*", "", event.target.decode("latin-1"), flags=re.IGNORECASE)
+    path, _, query = target.partition("?")
     return Ask(event.method.decode("latin-1"), path, query, fields)
 
 

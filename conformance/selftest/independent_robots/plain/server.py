@@ -29,6 +29,12 @@ class Application(Protocol):
         """Answer one request."""
 
 
+def origin_form(target: str) -> str:
+    """A target without scheme and authority, where it has them (RFC 9112 3.2.2)."""
+    scheme, separator, rest = target.partition("://")
+    return f"/{rest.partition('/')[2]}" if separator and scheme.lower() in {"http", "https"} else target
+
+
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.0"
     timeout = 20
@@ -50,7 +56,7 @@ class _Handler(BaseHTTPRequestHandler):
         body = self.rfile.read(length)
         if len(body) < length:
             return  # the client has gone in the middle of its request: nothing is done
-        answer = self.application.answer(self.command, self.path, self.headers, body)
+        answer = self.application.answer(self.command, origin_form(self.path), self.headers, body)
         self._send(answer)
 
     def _refusal(self) -> tuple[int, str] | None:
