@@ -53,7 +53,7 @@ class Speed:
 
 # A robot on a network nearby is local, even one that is written in Python and on a loaded machine; one on a wireless
 # link is near, whether it keeps connections or not; an Arduino is far.
-SPEEDS = (Speed("local", 25, 1.0), Speed("near", 130, 0.2), Speed("far", 800, 0.05), Speed("slow", math.inf, 0.02))
+SPEEDS = (Speed("local", 40, 1.0), Speed("near", 130, 0.2), Speed("far", 800, 0.05), Speed("slow", math.inf, 0.02))
 # Only what is so much beyond a class's bound is in the next one.
 _CLEARLY = 1.25
 
