@@ -1,0 +1,196 @@
+"""What changed between two conformance results: each requirement that did, under what happened to it.
+
+A failure is a requirement that was judged and not met, whatever its level and whether or not a baseline accepts it;
+so a change of level, or of what is accepted, is no change of the robot.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+Requirement = Mapping[str, Any]
+
+
+class Kind(StrEnum):
+    """What happened to a requirement, the worst first."""
+
+    NEW_FAILURE = "new failures"
+    LOST = "lost coverage"
+    NEW_WARNING = "new warnings"
+    ACCEPTED = "failures accepted since"
+    OUT_OF_SIGHT = "failures out of sight"
+    FIXED = "fixed"
+    FIRST_JUDGED = "judged for the first time"
+    LEVEL = "changed levels"
+    TEXT = "changed texts"
+    ADDED = "added to the requirements"
+    REMOVED = "taken out of the requirements"
+
+
+MEANINGS = {
+    Kind.NEW_FAILURE: "A MUST that fails and did not before.",
+    Kind.LOST: "It passed before and was not judged now: nobody knows whether it still holds.",
+    Kind.NEW_WARNING: "A recommendation (SHOULD) that is not followed any more.",
+    Kind.ACCEPTED: "The baseline accepts a failure that it did not accept before, or that is new.",
+    Kind.OUT_OF_SIGHT: "It failed before and was not judged now: that is not fixed.",
+    Kind.FIXED: "It failed before and passes now.",
+    Kind.FIRST_JUDGED: "It was not judged before: nothing can be compared.",
+    Kind.LEVEL: "The suite's requirements changed, and not the robot.",
+    Kind.TEXT: "The suite asks for something else under the same name.",
+    Kind.ADDED: "The older suite did not have it: nothing can be compared.",
+    Kind.REMOVED: "The newer suite does not have it.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One requirement in both results; None where one of them has none such."""
+
+    id: str
+    kind: Kind
+    old: Requirement | None
+    new: Requirement | None
+
+    @property
+    def text(self) -> str:
+        """What is required, by the newer result."""
+        return str((self.new or self.old or {})["text"])
+
+    @property
+    def course(self) -> str:
+        """From what to what: levels and verdicts."""
+        levels = [item["level"] for item in (self.old, self.new) if item]
+        verdicts = [item["verdict"] if item else "absent" for item in (self.old, self.new)]
+        level = levels[0] if levels[0] == levels[-1] else f"{levels[0]} → {levels[-1]}"
+        return f"{level}, {verdicts[0]} → {verdicts[1]}"
+
+    @property
+    def reason(self) -> str:
+        """Why the newer result says what it says."""
+        return str((self.new or {}).get("reason") or "")
+
+    @property
+    def regression(self) -> bool:
+        """Whether the robot kept it and does not any more, or nobody knows any more whether it does."""
+        return self.kind is Kind.NEW_FAILURE or (
+            self.kind is Kind.LOST and self.new is not None and self.new["level"] == "MUST"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Two results compared.
+
+    Attributes:
+        changes: what changed, the worst first.
+        circumstances: what was different about the runs: name, before, now.
+        still_failing: how many requirements failed before and fail now.
+    """
+
+    old: Mapping[str, Any]
+    new: Mapping[str, Any]
+    changes: tuple[Change, ...]
+    circumstances: tuple[tuple[str, str, str], ...]
+    still_failing: int
+
+    @property
+    def groups(self) -> dict[Kind, tuple[Change, ...]]:
+        """The changes by what happened, each kind that occurs."""
+        return {
+            kind: found for kind in Kind if (found := tuple(change for change in self.changes if change.kind is kind))
+        }
+
+    @property
+    def regressions(self) -> tuple[Change, ...]:
+        """The changes for the worse."""
+        return tuple(change for change in self.changes if change.regression)
+
+
+def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Difference:
+    """Compare two valid `roaas-result/1` documents."""
+    before = {item["id"]: item for item in old["requirements"]}
+    now = {item["id"]: item for item in new["requirements"]}
+    changes = [
+        Change(id_, kind, before.get(id_), now.get(id_))
+        for id_ in {**before, **now}
+        for kind in _kinds(before.get(id_), now.get(id_))
+    ]
+    order = list(Kind)
+    changes.sort(key=lambda change: (order.index(change.kind), change.id))
+    still = sum(_failed(item) and id_ in now and _failed(now[id_]) for id_, item in before.items())
+    return Difference(old, new, tuple(changes), tuple(_circumstances(old, new)), still)
+
+
+def _kinds(old: Requirement | None, new: Requirement | None) -> Iterator[Kind]:
+    if new is None:
+        yield Kind.REMOVED
+    elif old is None:
+        yield Kind.ADDED
+    else:
+        if old["level"] != new["level"]:
+            yield Kind.LEVEL
+        if old["text"] != new["text"]:
+            yield Kind.TEXT
+        yield from _course(old, new)
+
+
+def _course(old: Requirement, new: Requirement) -> Iterator[Kind]:
+    """What became of the verdict."""
+    if old["verdict"] == "not-claimed" and _judged(new):
+        yield Kind.FIRST_JUDGED
+    elif _failed(new):
+        if "expected_failure" in new:
+            if "expected_failure" not in old:
+                yield Kind.ACCEPTED
+        elif not _failed(old):
+            yield Kind.NEW_WARNING if new["verdict"] == "warn" else Kind.NEW_FAILURE
+        elif "expected_failure" in old and new["verdict"] == "fail":
+            yield Kind.NEW_FAILURE
+    elif _failed(old):
+        yield Kind.FIXED if _judged(new) else Kind.OUT_OF_SIGHT
+    elif _judged(old) and not _judged(new):
+        yield Kind.LOST
+    elif _judged(new) and not _judged(old):
+        yield Kind.FIRST_JUDGED
+
+
+def _failed(item: Requirement) -> bool:
+    return item["verdict"] in {"fail", "warn"}
+
+
+def _judged(item: Requirement) -> bool:
+    return item["verdict"] in {"pass", "fail", "warn"}
+
+
+def _circumstances(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    for name, path in _CIRCUMSTANCES.items():
+        before, now = (_at(result, path) for result in (old, new))
+        if before != now:
+            yield name, before, now
+
+
+_CIRCUMSTANCES = {
+    "robot": "statement.robot.name",
+    "vendor": "statement.robot.vendor",
+    "firmware": "statement.robot.version",
+    "suite": "suite.version",
+    "suite's digest": "suite.digest",
+    "contract": "suite.contract",
+    "requirement set": "requirement_set.name",
+    "effort": "effort",
+    "seed": "seed",
+    "motion allowed": "statement.motion_allowed",
+    "ROS domain watched": "target.ros_domain_id",
+    "baseline": "baseline.digest",
+    "verdict": "verdict",
+}
+
+
+def _at(result: Mapping[str, Any], path: str) -> str:
+    value: Any = result
+    for key in path.split("."):
+        value = value.get(key) if isinstance(value, Mapping) else None
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "none" if value is None else str(value)

@@ -1,0 +1,59 @@
+"""What `roaas diff` says: in the terminal, as a page and as Markdown."""
+
+from typing import Any
+
+from reports.certificate.difference import MEANINGS, Difference, Kind
+from reports.pages.page import html_page, markdown_page, opened
+from reports.pages.untrusted import excerpt
+
+SHOWN = 50
+"""Requirements of one kind that are listed; the rest are counted."""
+_TONES = {Kind.NEW_FAILURE: "bad", Kind.LOST: "warning", Kind.FIXED: "good"}
+
+
+def headline(found: Difference) -> str:
+    """The answer in a sentence."""
+    counts = [f"{len(changes)} {kind}" for kind, changes in found.groups.items() if kind in _TONES]
+    still = f"{found.still_failing} still failing" if found.still_failing else ""
+    told = ", ".join([*counts, *filter(None, [still])]) or "no requirement changed its verdict"
+    number = len(found.regressions)
+    worse = f"{number} {'regression' if number == 1 else 'regressions'}" if number else "No regression"
+    return f"{worse}: {told}."
+
+
+def difference_text(found: Difference) -> str:
+    """For a terminal."""
+    lines = [headline(found)]
+    for kind, changes in found.groups.items():
+        lines += ["", f"{opened(kind)} ({len(changes)}). {MEANINGS[kind]}"]
+        for change in changes[:SHOWN]:
+            lines.append(f"  {change.id} ({change.course})")
+            if change.reason and kind in {Kind.NEW_FAILURE, Kind.LOST, Kind.NEW_WARNING}:
+                lines.append(f"      {excerpt(change.reason, 200)}")
+        if len(changes) > SHOWN:
+            lines.append(f"  and {len(changes) - SHOWN} more")
+    if found.circumstances:
+        lines += ["", "The runs themselves differ:"]
+        lines += [f"  {name}: {excerpt(old, 100)} → {excerpt(new, 100)}" for name, old, new in found.circumstances]
+    return "\n".join(lines)
+
+
+def difference_html(found: Difference, names: tuple[str, str]) -> str:
+    """The page; `names` are the two files."""
+    return html_page("diff.html.j2", **_values(found, names))
+
+
+def difference_markdown(found: Difference, names: tuple[str, str]) -> str:
+    """The short form for a pull request; `names` are the two files."""
+    return markdown_page("diff.md.j2", **_values(found, names))
+
+
+def _values(found: Difference, names: tuple[str, str]) -> dict[str, Any]:
+    return {
+        "found": found,
+        "names": names,
+        "headline": headline(found),
+        "meanings": MEANINGS,
+        "tones": _TONES,
+        "shown": SHOWN,
+    }

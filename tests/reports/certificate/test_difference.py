@@ -1,0 +1,145 @@
+"""What changed between two results, each requirement under what happened to it."""
+
+import copy
+import json
+
+import pytest
+from click.testing import CliRunner
+from lxml import html
+
+from reports.certificate.difference import Kind, difference
+from reports.certificate.difference_page import SHOWN, difference_html, difference_markdown, difference_text
+from reports.cli.difference import diff
+
+ACCEPTED = {"expected_failure": {"reason": "ticket 7", "expires": "2027-01-01"}}
+
+
+def requirement(verdict, level="MUST", **more):
+    finding = {"message": "m", "expected": "e", "seen": 1, "request": None, "response": None}
+    return {
+        "id": "http/x",
+        "class": "http",
+        "level": level,
+        "source": "RFC 9110",
+        "text": "It does.",
+        "cases": 1,
+        "verdict": verdict,
+        "reason": "why",
+        "untestable": None,
+        "checks": [],
+        "failures": [finding] if verdict == "fail" else [],
+        **more,
+    }
+
+
+@pytest.fixture
+def pair(result):
+    def of(old, new):
+        results = []
+        for items in (old, new):
+            one = copy.deepcopy(result)
+            one["requirements"] = items
+            results.append(one)
+        return results
+
+    return of
+
+
+COURSES = [
+    ("pass", "fail", {}, {Kind.NEW_FAILURE}, True),
+    ("skip", "fail", {}, {Kind.NEW_FAILURE}, True),
+    ("error", "fail", {}, {Kind.NEW_FAILURE}, True),
+    ("pass", "skip", {}, {Kind.LOST}, True),
+    ("pass", "error", {}, {Kind.LOST}, True),
+    ("pass", "not-claimed", {}, {Kind.LOST}, True),
+    ("pass", "warn", {"level": "SHOULD"}, {Kind.NEW_WARNING}, False),
+    ("pass", "skip", {"level": "SHOULD"}, {Kind.LOST}, False),
+    ("warn", "pass", {"level": "SHOULD"}, {Kind.FIXED}, False),
+    ("fail", "pass", {}, {Kind.FIXED}, False),
+    ("fail", "skip", {}, {Kind.OUT_OF_SIGHT}, False),
+    ("fail", "not-claimed", {}, {Kind.OUT_OF_SIGHT}, False),
+    ("skip", "pass", {}, {Kind.FIRST_JUDGED}, False),
+    ("not-claimed", "fail", {}, {Kind.FIRST_JUDGED}, False),
+    ("not-claimed", "skip", {}, set(), False),
+    ("pass", "pass", {}, set(), False),
+    ("fail", "fail", {}, set(), False),
+    ("skip", "error", {}, set(), False),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "both", "kinds", "regression"), COURSES)
+def test_each_course_has_its_name(pair, old, new, both, kinds, regression):
+    found = difference(*pair([requirement(old, **both)], [requirement(new, **both)]))
+    assert {change.kind for change in found.changes} == kinds
+    assert bool(found.regressions) is regression
+    assert found.still_failing == (old == new == "fail")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "kinds", "regression"),
+    [
+        (requirement("pass"), requirement("warn", **ACCEPTED), {Kind.ACCEPTED}, False),
+        (requirement("fail"), requirement("warn", **ACCEPTED), {Kind.ACCEPTED}, False),
+        (requirement("fail"), requirement("fail", **ACCEPTED), {Kind.ACCEPTED}, False),
+        (requirement("warn", **ACCEPTED), requirement("warn", **ACCEPTED), set(), False),
+        (requirement("warn", **ACCEPTED), requirement("fail"), {Kind.NEW_FAILURE}, True),
+        (requirement("warn", **ACCEPTED), requirement("pass"), {Kind.FIXED}, False),
+        (requirement("warn", "SHOULD"), requirement("fail"), {Kind.LEVEL}, False),
+        (requirement("fail"), requirement("warn", "SHOULD"), {Kind.LEVEL}, False),
+        (requirement("pass", "SHOULD"), requirement("fail"), {Kind.LEVEL, Kind.NEW_FAILURE}, True),
+        (requirement("pass"), requirement("pass", text="It does more."), {Kind.TEXT}, False),
+        (None, requirement("fail"), {Kind.ADDED}, False),
+        (requirement("pass"), None, {Kind.REMOVED}, False),
+    ],
+)
+def test_what_the_suite_or_the_baseline_changed_is_no_change_of_the_robot(pair, old, new, kinds, regression):
+    found = difference(*pair([old] if old else [], [new] if new else []))
+    assert {change.kind for change in found.changes} == kinds
+    assert bool(found.regressions) is regression
+
+
+def test_how_the_runs_differ_is_told(pair):
+    old, new = pair([], [])
+    new["suite"]["version"] = "9.9"
+    new["statement"]["robot"]["version"] = "3.0"
+    new["statement"]["motion_allowed"] = True
+    found = difference(old, new)
+    told = [("firmware", "2.4.1", "3.0"), ("suite", "0.1.0", "9.9"), ("motion allowed", "no", "yes")]
+    assert list(found.circumstances) == told
+    for text in (difference_text(found), difference_markdown(found, ("a", "b")), difference_html(found, ("a", "b"))):
+        assert "9.9" in text
+
+
+def test_every_form_names_what_changed(pair):
+    items = [requirement("pass", id=f"http/x{number}") for number in range(SHOWN + 3)]
+    found = difference(*pair(items, [{**item, "verdict": "fail"} for item in items]))
+    page = html.document_fromstring(difference_html(found, ("old.json", "new.json")))
+    assert page.xpath("//h2")[0].text_content().strip() == f"{SHOWN + 3} New failures"
+    for text in (difference_text(found), difference_markdown(found, ("a", "b")), page.text_content()):
+        assert "http/x0" in text
+        assert "3 more" in text
+        assert f"{SHOWN + 3} regressions" in text
+
+
+def test_hostile_text_stays_text(hostile):
+    found = difference(hostile, {**hostile, "requirements": []})
+    page = difference_html(found, ("a", "b"))
+    assert "<script>alert" not in page
+    for text in (page, difference_markdown(found, ("a", "b")), difference_text(found)):
+        assert "\x1b" not in text
+        assert "\u202e" not in text
+
+
+@pytest.mark.parametrize(("new", "code"), [("fail", 1), ("pass", 0)])
+def test_the_command(pair, tmp_path, new, code):
+    folders = [tmp_path / "old", tmp_path / "new"]
+    for folder, document in zip(folders, pair([requirement("pass")], [requirement(new)]), strict=True):
+        folder.mkdir()
+        (folder / "result.json").write_text(json.dumps(document))
+    done = CliRunner().invoke(diff, [str(folders[0]), str(folders[1] / "result.json"), "--out", str(tmp_path / "out")])
+    assert done.exit_code == code, done.output
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["diff.html", "diff.md"]
+
+
+def test_what_cannot_be_read_is_no_difference(tmp_path):
+    assert CliRunner().invoke(diff, [str(tmp_path), str(tmp_path)]).exit_code == 2
