@@ -38,7 +38,8 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
     pace = api.client.connection.pace
     patience = Patience(pace, 1.25 * limits.settle_s + 0.5 + 4 * pace.usual_s)
     wanted = flattened(call.value)
-    renew_at = time.monotonic() + 0.4 * (limits.hold_s or math.inf)
+    every_s = 0.4 * (limits.hold_s or math.inf)
+    renew_at = time.monotonic() + every_s
     while True:
         shown = flatten(read.send(api, ("Accept", JSON)))
         if shown["status"] == HTTPStatus.NOT_FOUND:  # what was put has ended since: a goal that was reached
@@ -53,8 +54,8 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
         if patience.over:
             return other[0]
         if time.monotonic() > renew_at:
-            renew_at = math.inf
             call.send(api)
+            renew_at = time.monotonic() + every_s
         time.sleep(_PAUSE_S)
 
 

@@ -9,8 +9,8 @@ from conformance.verdict.effort import SPEEDS, Effort
     ("usual_ms", "speed"),
     [
         (0.4, "local"),
-        (31, "local"),
-        (32, "near"),
+        (50, "local"),
+        (51, "near"),
         (60, "near"),
         (140, "near"),
         (200, "far"),
@@ -28,12 +28,12 @@ def test_a_class_is_left_only_when_its_bound_is_clearly_passed_and_never_for_a_f
 
 
 def test_robots_of_one_class_get_the_same_cases():
-    assert {Effort().seen(usual_ms).cases(200) for usual_ms in (35, 60, 90, 160)} == {40}
+    assert {Effort().seen(usual_ms).cases(200) for usual_ms in (51, 60, 90, 160)} == {40}
     assert Effort("quick").seen(300).cases(100) == 3
 
 
 def test_what_was_left_out_is_told_with_the_class_and_no_figure_of_this_run():
     assert Effort().seen(3).speed.remark == ""
-    assert Effort().seen(50).speed.remark == Effort().seen(70).speed.remark
-    assert "one in 5" in Effort().seen(50).speed.remark
+    assert Effort().seen(60).speed.remark == Effort().seen(70).speed.remark
+    assert "one in 5" in Effort().seen(60).speed.remark
     assert "more than about 800 ms" in SPEEDS[-1].remark
