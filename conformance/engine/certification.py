@@ -13,6 +13,7 @@ import pytest
 
 from conformance.contract.exit_codes import OF_VERDICT, ExitCode
 from conformance.engine.checks_plugin import ChecksPlugin
+from conformance.engine.interruption import remembered
 from conformance.engine.progress import Progress
 from conformance.engine.result import result_document, write_result
 from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
@@ -65,19 +66,19 @@ def certify(
     """
     run, started = robot.run, dt.datetime.now(dt.UTC)
     remarks = list(notes)
-    interrupted = False
     try:
-        robot.connect()
-        reached = robot.reached
-        if reached:
-            interrupted = _run_checks(robot, progress, remarks)
-        else:
-            run.aborted = "the robot could not be reached: " + "; ".join(
-                f"{name}: {why}" for name, why in run.unreachable.items()
-            )
+        with remembered(run):
+            robot.connect()
+            reached = robot.reached
+            if reached:
+                run.interrupted |= _run_checks(robot, progress, remarks)
+            else:
+                run.aborted = "the robot could not be reached: " + "; ".join(
+                    f"{name}: {why}" for name, why in run.unreachable.items()
+                )
     except KeyboardInterrupt:
-        reached, interrupted = True, True
-    if interrupted:
+        reached, run.interrupted = True, True
+    if run.interrupted:
         run.aborted = "the run was interrupted"
         remarks.append("The run was interrupted; what follows is what was judged until then.")
     if run.effort.speed.remark:
@@ -97,10 +98,10 @@ def certify(
         finished=dt.datetime.now(dt.UTC),
         command=command,
         notes=remarks,
-        interrupted=interrupted,
+        interrupted=run.interrupted,
     )
     path = write_result(document, out)
-    if interrupted:
+    if run.interrupted:
         return Certification(ExitCode.INTERRUPTED, document, path)
     return Certification(OF_VERDICT[overall(accepted)] if reached else ExitCode.UNREACHABLE, document, path)
 

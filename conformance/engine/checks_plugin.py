@@ -94,6 +94,9 @@ class ChecksPlugin:
         run = self._robot().run
         run.judge.check_name = item.nodeid.rsplit("/", 1)[-1]
         run.judge.at_risk = ()
+        if run.interrupted:
+            # The exception was swallowed where nobody could see it.
+            raise KeyboardInterrupt
         if run.aborted:
             pytest.skip(run.aborted)
         if item.get_closest_marker("motion") and not run.allow_motion:

@@ -46,6 +46,7 @@ class Run:
         effort: how much is tried; lessened once it is known how slowly the robot answers.
         judge: what has been found.
         aborted: why the robot cannot be asked any more, or empty.
+        interrupted: whether somebody broke the run off.
         unreachable: why an interface was not reached at the start.
     """
 
@@ -58,6 +59,7 @@ class Run:
     given: Given = Given()
     judge: Judge = field(init=False)
     aborted: str = ""
+    interrupted: bool = False
     unreachable: dict[Interface, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

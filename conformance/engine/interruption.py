@@ -1,0 +1,42 @@
+"""Ctrl-C and SIGTERM in a run: remembered as well as raised, so that no run that was broken off looks complete.
+
+Python raises KeyboardInterrupt wherever the main thread is just then. Where that is a finalizer or a callback whose
+exceptions are ignored, the exception is lost; the flag is not, and is looked at before each check and at the end.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
+    from conformance.verdict.run import Run
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@contextmanager
+def remembered(run: Run) -> Iterator[None]:
+    """Put an interruption down in ``run.interrupted``, and raise KeyboardInterrupt as ever.
+
+    Outside the main thread, where no signal arrives, it does nothing.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(_signal: int, _frame: FrameType | None) -> None:
+        run.interrupted = True
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, interrupt) for number in _SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
