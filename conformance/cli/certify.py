@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 import msgspec
+from click.core import ParameterSource
 
 from conformance.cli.summary import print_summary
 from conformance.contract.classes import CLASSES, PROFILES
@@ -65,6 +66,7 @@ _FILE = click.Path(exists=True, dir_okay=False)
     show_default=True,
     help="Of everything random: same seed, same cases.",
 )
+@click.option("--nonce", metavar="TEXT", help="From whoever relies on the result: the seed is derived from it.")
 @click.option("--timeout", "timeout_s", type=_POSITIVE, metavar="S", help="Deadline of one request.  [default: 10]")
 @click.option("--request-rate", type=_POSITIVE, metavar="R", help="At most R requests per second.")
 @click.option("--ca-file", type=_FILE, help="Authorities to trust for HTTPS instead of the system's.")
@@ -100,6 +102,8 @@ def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> Comma
         chosen = _apply(declared, options)
         if options["init"]:
             return _init(statement, chosen, force=options["force"])
+        if options["nonce"] is not None:
+            _check_nonce(options["nonce"])
         # Before the run: what cannot be signed by this key is told at once.
         notary = door.notary(Path(options["key"])) if options["key"] else None
         outcome = _certify(chosen, options, statement)
@@ -145,6 +149,13 @@ def _init(path: Path | None, chosen: Statement, *, force: bool) -> CommandResult
     return CommandResult(ExitCode.PASSED)
 
 
+def _check_nonce(nonce: str) -> None:
+    if not nonce.strip() or not nonce.isprintable():
+        raise click.UsageError(f"--nonce {nonce!r} must be printable text")
+    if click.get_current_context().get_parameter_source("seed") is ParameterSource.COMMANDLINE:
+        raise click.UsageError("--seed follows from --nonce: give one of the two")
+
+
 def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None) -> Certification:
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
     from conformance.engine.certification import certify as judge  # noqa: PLC0415
@@ -152,7 +163,7 @@ def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None)
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.engine.suite import file_digest  # noqa: PLC0415
     from conformance.verdict.baseline import BaselineError, load_baseline  # noqa: PLC0415
-    from conformance.verdict.run import Given, Run  # noqa: PLC0415
+    from conformance.verdict.run import Given, Run, seed_of_nonce  # noqa: PLC0415
 
     contract = Contract.load(options["contract"])
     try:
@@ -160,14 +171,18 @@ def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None)
         if chosen.endpoints.ca_file:
             connection.tls()
         baseline = load_baseline(options["baseline"], contract.ledger) if options["baseline"] else ()
-        given = Given(*(file_digest(path) if path else None for path in (statement, options["baseline"])))
+        given = Given(
+            statement=file_digest(statement) if statement else None,
+            baseline=file_digest(options["baseline"]) if options["baseline"] else None,
+            nonce=options["nonce"],
+        )
     except (OSError, BaselineError) as error:
         raise StatementError(str(error)) from error
     run = Run(
         statement=chosen,
         contract=contract,
         allow_motion=options["allow_motion"],
-        seed=options["seed"],
+        seed=options["seed"] if options["nonce"] is None else seed_of_nonce(options["nonce"]),
         given=given,
         effort=Effort(options["effort"], minutes=options["minutes"]),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,11 @@ from conformance.verdict.evidence import Judge
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
+
+
+def seed_of_nonce(nonce: str) -> int:
+    """The seed of a run that a relying party asked for with a nonce: it could not be known before; 48 bits."""
+    return int.from_bytes(hashlib.sha256(b"roaas-nonce/1\0" + nonce.encode()).digest()[:6])
 
 
 @dataclass(frozen=True)

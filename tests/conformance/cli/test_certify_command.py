@@ -1,5 +1,6 @@
 """``roaas certify`` against what is no robot: a verdict and an exit code, never a traceback."""
 
+import hashlib
 import json
 import signal
 import subprocess
@@ -13,6 +14,10 @@ from urllib.request import urlopen
 import pytest
 
 from conformance import selftest
+from conformance.contract.files import CONTRACT_DIR
+from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, statement_in
+from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate
+from reports.attestation.statement import seed_of
 
 _INDEPENDENT_ROBOTS = Path(selftest.__file__).parent / "independent_robots"
 
@@ -31,6 +36,48 @@ def test_a_closed_port_is_not_reached(tmp_path, closed_port):
     assert "could not be reached" in done.stderr
     assert closed_port.removeprefix("http://127.0.0.1:") in result["target"]["rest"]
     assert {item["verdict"] for item in result["requirements"]} == {"error"}
+
+
+def test_a_nonce_gives_the_seed_and_stands_in_the_result(tmp_path, closed_port):
+    _, result = _certify(tmp_path, "--rest", closed_port, "--nonce", "monday, 9:00")
+    assert result["nonce"] == "monday, 9:00"
+    assert result["seed"] == seed_of("monday, 9:00"), "both rooms derive it alike"
+
+
+@pytest.mark.parametrize("wrong", [["--nonce", "a", "--seed", "1"], ["--nonce", " "], ["--nonce", "\n"]])
+def test_a_nonce_is_text_and_goes_without_a_seed(tmp_path, closed_port, wrong):
+    done, result = _certify(tmp_path, "--rest", closed_port, *wrong)
+    assert done.returncode == 2
+    assert "--nonce" in done.stderr
+    assert result is None
+
+
+def test_what_the_run_was_given_stands_in_the_result(tmp_path, closed_port):
+    statement, baseline = tmp_path / "robot.toml", tmp_path / "known.toml"
+    statement.write_text(f'[endpoints]\nrest = "{closed_port}"\n')
+    baseline.write_text("")
+    _, result = _certify(tmp_path, str(statement), "--baseline", str(baseline))
+    assert result["digests"]["statement"] == f"sha256:{hashlib.sha256(statement.read_bytes()).hexdigest()}"
+    assert result["baseline"] == {"digest": f"sha256:{hashlib.sha256(b'').hexdigest()}"}
+    assert result["requirement_set"]["name"] == "1.1"
+    openapi = (CONTRACT_DIR / "openapi.yaml").read_bytes()
+    assert result["digests"]["contract"]["openapi.yaml"] == f"sha256:{hashlib.sha256(openapi).hexdigest()}"
+
+
+def test_a_certificate_is_signed_also_when_the_robot_was_not_reached(tmp_path, closed_port):
+    generate(tmp_path / "keys")
+    done, _ = _certify(tmp_path, "--rest", closed_port, "--sign", str(tmp_path / "keys" / PRIVATE_NAME))
+    assert done.returncode == 3
+    opened = open_envelope((tmp_path / "out" / ENVELOPE_NAME).read_bytes())
+    assert statement_in(opened).predicate.properties == []
+
+
+def test_a_key_that_cannot_sign_is_told_before_the_run(tmp_path, closed_port):
+    generate(tmp_path / "keys")
+    done, result = _certify(tmp_path, "--rest", closed_port, "--sign", str(tmp_path / "keys" / PUBLIC_NAME))
+    assert done.returncode == 2
+    assert "no private key" in done.stderr
+    assert result is None
 
 
 def test_a_server_that_never_answers_is_not_reached(tmp_path, listening):
