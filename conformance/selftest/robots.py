@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO
 
 import conformance.contract
-from conformance.selftest.servers.programs import built, program
+from conformance.selftest.servers.programs import built, check_installed, program
 
 _HERE = Path(__file__).parent
 _READY = re.compile(r"ready rest=(\S+) soap=(\S*)")
@@ -24,7 +24,8 @@ _START_S, _STOP_S = 40.0, 10.0
 _DOMAINS = 102
 INDEPENDENT_ROBOTS = ("plain", "baroque", "legacy")
 # Those whose web server answers much by itself; of most there are fewer resources.
-ON_SERVERS = ("node", "golang")
+_FRAMEWORKS = {"flask": ("flask", "gunicorn"), "aiohttp": ("aiohttp",), "hypercorn": ("hypercorn", "starlette")}
+ON_SERVERS = ("node", "golang", *_FRAMEWORKS)
 REFERENCE = "reference"
 
 
@@ -145,6 +146,7 @@ def _command(kind: str, domain_id: int) -> list[str]:
         return [program("node", "nodejs"), str(folder / "robot.js")]
     if kind == "golang":
         return [str(built(*sorted(folder.glob("*.go")))), str(Path(conformance.contract.__file__).parent)]
+    check_installed(*_FRAMEWORKS.get(kind, ()))
     return [sys.executable, "-m", "conformance.selftest.independent_robots", kind, *ports]
 
 

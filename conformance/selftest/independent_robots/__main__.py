@@ -6,7 +6,7 @@ import sys
 import threading
 from importlib import import_module
 
-NAMES = ("plain", "baroque", "legacy")
+NAMES = ("plain", "baroque", "legacy", "flask", "aiohttp", "hypercorn")
 
 
 def main() -> int:

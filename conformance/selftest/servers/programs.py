@@ -1,10 +1,11 @@
-"""Programs that are not Python's: found, or named with what installs them; Go's are built first."""
+"""What servers are made of: found, or named with what installs it; programs in Go are built first."""
 
 import os
 import shutil
 import subprocess
 import tempfile
 import zlib
+from importlib.util import find_spec
 from pathlib import Path
 
 # Go compiles its standard library once, on a slow machine in more than a minute.
@@ -25,6 +26,17 @@ def program(name: str, package: str) -> str:
     if found is None:
         raise NotInstalledError(f"not installed: apt install {package}")
     return found
+
+
+def check_installed(*modules: str) -> None:
+    """See whether Python packages are there.
+
+    Raises:
+        NotInstalledError: they are not.
+    """
+    lacking = [name for name in modules if find_spec(name) is None]
+    if lacking:
+        raise NotInstalledError(f"not installed: pip install {' '.join(lacking)}")
 
 
 def built(*sources: Path) -> Path:

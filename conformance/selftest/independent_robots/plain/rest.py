@@ -33,15 +33,25 @@ _DELIVERY = re.compile(
     "/source_x/([^/]*)/source_y/([^/]*)"
 )
 _ORDER = ("depot_x", "depot_y", "destination_x", "destination_y", "source_x", "source_y")
+Handler = Callable[[Message, bytes, str], Answer]
+# The path of the delivery, for routers that know parameters in braces.
+DELIVERY = (
+    "/robot/app/delivery/{code}/depot_x/{depot_x}/depot_y/{depot_y}/dest_x/{dest_x}/dest_y/{dest_y}"
+    "/source_x/{source_x}/source_y/{source_y}"
+)
 
 
 class Rest:
-    """Answers REST requests for one body."""
+    """Answers REST requests for one body.
+
+    Attributes:
+        resources: by path without parameters, by method: what answers headers, body and target, or raises RefusedError.
+    """
 
     def __init__(self, body: Body) -> None:
         self._body = body
         get, put, delete = "GET", "PUT", "DELETE"
-        self._resources: dict[str, dict[str, Callable[[Message, bytes, str], Answer]]] = {
+        self.resources: dict[str, dict[str, Handler]] = {
             "/robot/pose/": {get: self._reads("Odometry", body.odometry)},
             "/robot/velocity/": {get: self._reads("Twist", body.velocity), put: self._put_velocity},
             "/robot/velocity/linear/": {
@@ -61,22 +71,15 @@ class Rest:
         try:
             answer = self._answer(method, target, headers, body)
         except RefusedError as refused:
-            answer = Answer(refused.status)
-            answer.body = as_json({"status": refused.status, "detail": str(refused)})
-            answer.media_type = "application/problem+json"
-            if choose(_accept(headers)) == "application/xml":
-                problem = {"status": refused.status, "detail": _printable(str(refused))}
-                xml = element("problem", problem).replace("<problem>", '<problem xmlns="urn:ietf:rfc:7807">', 1)
-                answer.body, answer.media_type = xml.encode(), "application/problem+xml"
+            answer = refusal(refused, headers)
             if refused.status == 405:  # noqa: PLR2004 - RFC 9110 15.5.6
                 answer.fields["Allow"] = ", ".join(self._allowed(target))
-            answer.fields["Vary"] = "Accept"
         return answer
 
-    def _methods(self, path: str) -> dict[str, Callable[[Message, bytes, str], Answer]] | None:
-        if path in self._resources:
-            return self._resources[path]
-        return {"PUT": self._deliver} if _DELIVERY.fullmatch(path) else None
+    def _methods(self, path: str) -> dict[str, Handler] | None:
+        if path in self.resources:
+            return self.resources[path]
+        return {"PUT": self.deliver} if _DELIVERY.fullmatch(path) else None
 
     def _allowed(self, target: str) -> list[str]:
         methods = self._methods(urlsplit(target).path) or {}
@@ -88,7 +91,7 @@ class Rest:
         path, _, query = target.partition("?")
         methods = self._methods(path)
         if methods is None:
-            if path + "/" in self._resources:
+            if path + "/" in self.resources:
                 return Answer(308, fields={"Location": path + "/" + ("?" + query if query else "")})
             raise RefusedError(404, f"there is no {path[:200]!r}")
         if method == "OPTIONS":
@@ -182,7 +185,12 @@ class Rest:
                 raise RefusedError(422, f"{name}: missing in the query")
         return _shown(200, plan_value(self._body, given), "GetPlan", headers)
 
-    def _deliver(self, _headers: Message, _body: bytes, target: str) -> Answer:
+    def deliver(self, _headers: Message, _body: bytes, target: str) -> Answer:
+        """Accept a delivery.
+
+        Raises:
+            RefusedError: its path has something that is no number, or no code.
+        """
         found = _DELIVERY.fullmatch(target.partition("?")[0])
         code, *texts = [unquote(text) for text in (found.groups() if found else ())]
         deliver(
@@ -202,6 +210,16 @@ class Rest:
         wadl = (_CONTRACT / "robot.wadl").read_bytes()
         host = str(headers.get("Host", "")).encode()
         return Answer(200, wadl.replace(b"127.0.0.1:7003", host), "application/vnd.sun.wadl+xml")
+
+
+def refusal(refused: RefusedError, headers: Message) -> Answer:
+    """A problem, in XML where the client wants that."""
+    document, fields = {"status": refused.status, "detail": str(refused)}, {"Vary": "Accept"}
+    if choose(_accept(headers)) == "application/xml":
+        document["detail"] = _printable(str(refused))
+        xml = element("problem", document).replace("<problem>", '<problem xmlns="urn:ietf:rfc:7807">', 1)
+        return Answer(refused.status, xml.encode(), "application/problem+xml", fields)
+    return Answer(refused.status, as_json(document), "application/problem+json", fields)
 
 
 def deliver(body: Body, interface: str, code: float, values: list[float]) -> None:
