@@ -3,18 +3,23 @@
 They judge only what the request itself makes applicable; strange requests are left to the checks that send them.
 """
 
+import re
 from collections.abc import Iterable
 from email.utils import parsedate_to_datetime
 from http import HTTPStatus
 
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import is_json
+from conformance.documents.openapi import is_json, is_xml
 from conformance.documents.traceback import inside_shown
 from conformance.rest import declared, problem
 from conformance.rest.interface import RestInterface
 from conformance.rest.request_context import RequestContext
 from conformance.rest.validity import INVALID, VALID, validity
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, Request, Response, Unanswered
+
+_CHARSET = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
+# Fields by which clients act, and which several values make meaningless (RFC 9110 5.3).
+_SINGLE = ("Content-Type", "Location", "Retry-After")
 
 
 class Observer(Listener):
@@ -38,6 +43,11 @@ class Observer(Listener):
         self._judge_fields(exchange, answer, context)
         if answer.body and not context.is_head and is_json(answer.media_type):
             self._judge_json(exchange, answer)
+        if answer.ok and answer.body and (is_xml(answer.media_type) or answer.media_type == "text/plain"):
+            wrong = _other_charset(answer)
+            api.run.judge.check(
+                "rest-formats/charset", not wrong, exchange, "content in the charset that is named", found=wrong
+            )
         if answer.status >= HTTPStatus.BAD_REQUEST:
             inside = inside_shown(answer.body)
             api.run.judge.check(
@@ -81,6 +91,10 @@ class Observer(Listener):
                 "Content-Type with a media type",
                 found=f"Content-Type {answer.header('content-type')!r} on {len(answer.body)} octets",
             )
+        twice = answer.repeated(*_SINGLE)
+        judge.check(
+            "http/field-once", not twice, exchange, "each field once that is no list", found=f"{twice} several times"
+        )
         # RFC 9110 6.6.1 leaves 5xx free.
         if answer.status < HTTPStatus.INTERNAL_SERVER_ERROR and context.request.raw is None:
             date = answer.header("date")
@@ -133,6 +147,26 @@ class Observer(Listener):
                     found=f"status {status}{retry} for {request.method}",
                     cause=f"{status} {operation}",
                 )
+
+
+def _other_charset(answer: Response) -> str:
+    """How the content is not in the charset that Content-Type names; empty where it is.
+
+    Without one, XML says its encoding itself, and plain text is UTF-8. A byte order mark is no part of the text.
+    """
+    named = _CHARSET.search(answer.header("content-type") or "")
+    if named is None and is_xml(answer.media_type):
+        return ""
+    charset = named[1] if named else "utf-8"
+    found = f"Content-Type {answer.header('content-type')!r} on octets that are not {charset}"
+    try:
+        text = answer.body.decode(charset).lstrip("\ufeff")
+    except (UnicodeError, LookupError):
+        return found
+    try:
+        return "" if text == answer.body.decode().lstrip("\ufeff") else found
+    except UnicodeDecodeError:
+        return ""
 
 
 def _is_date(value: str | None) -> bool:

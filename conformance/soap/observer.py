@@ -118,7 +118,8 @@ class SoapObserver(Listener):
         self, exchange: Exchange, response: Response, root: etree._Element, answers: Collection[str], encoding: str
     ) -> None:
         that = self._that
-        that("content-type", response.media_type == "text/xml", exchange, "text/xml", lambda: _type(response))
+        once = not response.repeated("Content-Type")
+        that("content-type", response.media_type == "text/xml" and once, exchange, "text/xml", lambda: _type(response))
         that("R1012", encoding in _ENCODINGS, exchange, "UTF-8 or UTF-16", lambda: f"the encoding {encoding!r}")
         that("R1018", _fits(response), exchange, "a charset that is the body's", lambda: _type(response))
         that("R1008", not has_doctype(root), exchange, "no DOCTYPE", lambda: "a DOCTYPE")

@@ -103,6 +103,11 @@ class Response:
         values = [value for key, value in self.headers if key.lower() == name.lower()]
         return ", ".join(values) if values else None
 
+    def repeated(self, *names: str) -> str:
+        """The first of these fields that stands more than once; empty where none does."""
+        there = [key.lower() for key, _ in self.headers]
+        return next((name for name in names if there.count(name.lower()) > 1), "")
+
     @property
     def media_type(self) -> str:
         """Content-Type without parameters, in lower case; empty where there is none."""

@@ -19,6 +19,7 @@ _IN_ALL = 56
     "http/declared-body",
     "http/content-type",
     "http/date",
+    "http/field-once",
     "http/framing",
     "http/json-finite",
     "http/json-encoding",

@@ -25,11 +25,15 @@ def _say_lacking(api: RestInterface, media_type: str, *ids: str) -> None:
             api.run.judge.unclaimed(id_, f"the contract has no answers as {media_type}")
 
 
-@pytest.mark.requirement("rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/vary")
+@pytest.mark.requirement(
+    "rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/charset", "rest-formats/vary"
+)
 def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -> None:
     """Each resource is sent as XML and as text when that is asked for; the observers judge what is in them."""
     _say_lacking(api, _XML, "rest-formats/xml", "rest-formats/xml-root")
     _say_lacking(api, _TEXT, "rest-formats/text")
+    if not any({_XML, _TEXT} & set(operation.formats) for operation in operations_of(api.run.contract)):
+        judge.unclaimed("rest-formats/charset", "the contract has neither answers as XML nor as plain text")
     if not any(len(operation.formats) > 1 for operation in operations_of(api.run.contract)):
         judge.unclaimed("rest-formats/vary", "the contract has no answers in more than one format")
     calls = answered(api)

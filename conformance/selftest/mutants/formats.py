@@ -152,6 +152,18 @@ MUTANTS = (
     ),
     _mutant("format-no-vary", "Answers carry no Vary.", "vary", _told(header("Vary", None))),
     _mutant("format-vary-sometimes", "XML answers carry no Vary.", "vary", _told(header("Vary", None), _XML)),
+    _mutant(
+        "format-charset-wrong",
+        "XML and text in UTF-8 are said to be UTF-16.",
+        "charset",
+        _told(lambda answer: answer.put("Content-Type", f"{answer.media_type}; charset=utf-16")),
+    ),
+    _mutant(
+        "format-named-twice",
+        "Answers name two media types, each in a field of its own.",
+        "http/field-once",
+        _told(lambda answer: answer.fields.append(("Content-Type", "text/html"))),
+    ),
     _mutant("format-no-xml-input", "XML is not taken in PUT.", "xml-input", lambda: _no_xml_input),
     _mutant(
         "format-problems-in-json",

@@ -82,6 +82,7 @@ def test_what_went_elsewhere_is_nobody_s_affair():
         (200, [DATE, JSON], json.dumps(TWIST), {"rest-formats/vary"}),
         (200, [DATE, VARY], json.dumps(TWIST), {"http/content-type", "http/declared-body"}),
         (200, [DATE, VARY, ("Content-Type", "text/html")], "<p>", {"http/declared-body"}),
+        (200, [DATE, VARY, ("Content-Type", "application/json; a=b"), JSON], json.dumps(TWIST), {"http/field-once"}),
         (200, [DATE, VARY, JSON], '{"linear": {}}', {"http/declared-body"}),
         (200, [DATE, VARY, JSON], "", {"http/declared-body"}),
         (200, [DATE, VARY, JSON], json.dumps(TWIST).replace("0.0", "NaN"), {"http/json-finite", "http/declared-body"}),
@@ -100,6 +101,25 @@ def test_what_went_elsewhere_is_nobody_s_affair():
 )
 def test_bad_answers_to_get(status, headers, body, expected):
     assert seen("GET", "/robot/velocity/", status, headers, body.encode()) == expected
+
+
+@pytest.mark.parametrize(
+    ("charset", "body", "expected"),
+    [
+        ("", "<x>\u00e9</x>".encode(), set()),
+        ("; charset=UTF-8", b"\xef\xbb\xbf<x/>", set()),
+        ("; charset=iso-8859-1", b"<x/>", set()),
+        ("; charset=iso-8859-1", "<x>\u00e9</x>".encode(), {"rest-formats/charset"}),
+        ("; charset=utf-16", b"<x/>", {"rest-formats/charset"}),
+        ("; charset=no-such", b"<x/>", {"rest-formats/charset"}),
+        ("", "<x>\u00e9</x>".encode("latin-1"), {"rest-formats/charset"}),
+        ("; charset=iso-8859-1", "<x>\u00e9</x>".encode("latin-1"), set()),
+        ("; charset=utf-16", "<x/>".encode("utf-16"), set()),
+    ],
+)
+def test_the_charset_is_that_of_the_content(charset, body, expected):
+    found = seen("GET", "/robot/velocity/", 200, [DATE, VARY, ("Content-Type", f"text/plain{charset}")], body)
+    assert found & {"rest-formats/charset"} == expected
 
 
 @pytest.mark.parametrize(
