@@ -44,12 +44,12 @@ def _print_finding(requirement: dict[str, Any]) -> None:
     verdict, level = requirement["verdict"].upper(), requirement["level"]
     click.echo(f"\n{verdict} {requirement['id']} ({level}, {requirement['source']})\n  {requirement['text']}")
     for failure in requirement["failures"]:
-        click.echo(f"  expected: {_inert(failure['expected'])}")
-        click.echo(f"  found:    {_inert(failure['message'])} (seen {failure['seen']}x)")
+        click.echo(f"  expected: {inert(failure['expected'])}")
+        click.echo(f"  found:    {inert(failure['message'])} (seen {failure['seen']}x)")
         if failure["request"]:
-            click.echo(f"  replay:   {_inert(failure['request']['curl'][:_SHOWN_CURL])}")
+            click.echo(f"  replay:   {inert(failure['request']['curl'][:_SHOWN_CURL])}")
 
 
-def _inert(text: str) -> str:
+def inert(text: str) -> str:
     """Text of a robot without what a terminal would obey."""
     return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)

@@ -92,8 +92,7 @@ class ChecksPlugin:
         if not ids_of(item):
             return
         run = self._robot().run
-        run.judge.check_name = item.nodeid.rsplit("/", 1)[-1]
-        run.judge.at_risk = ()
+        run.judge.begin(item.nodeid.rsplit("/", 1)[-1])
         if run.interrupted:
             # The exception was swallowed where nobody could see it.
             raise KeyboardInterrupt

@@ -13,6 +13,7 @@ from conformance.contract.classes import CLASS_TITLES
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
 from conformance.contract.interfaces import Interface
 from conformance.contract.requirement_sets import set_of
+from conformance.engine.sequence import written
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
 from conformance.transport.exchange import Unanswered
 from conformance.verdict.verdicts import views
@@ -152,6 +153,7 @@ def _failure(finding: Finding) -> dict[str, Any]:
         "seen": finding.seen,
         "request": _request(finding.exchange) if finding.exchange else None,
         "response": _response(finding.exchange) if finding.exchange else None,
+        "sequence": written(finding.sequence),
     }
 
 

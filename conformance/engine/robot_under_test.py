@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from conformance.contract.interfaces import Interface
+from conformance.engine.sequence import Recorder
 from conformance.rest.interface import RestInterface, plain_path
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
@@ -65,6 +66,7 @@ class RobotUnderTest:
         Raises:
             OSError: the CA file cannot be used.
         """
+        self.connection.listeners.insert(0, Recorder(self.run.judge))
         self._connect_rest()
         self._connect_soap()
 

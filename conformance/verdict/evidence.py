@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 import re
+import time
+from collections import deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from conformance.transport.exchange import Attempt
+    from conformance.transport.exchange import Attempt, Request
 
 # Findings of one requirement that are shown; more causes than this are the same story.
 MAX_FINDINGS = 5
+# Requests before a finding that are kept with it.
+MAX_SEQUENCE = 40
 
 
 class RefutedError(AssertionError):
     """A property does not hold: tells Hypothesis to look for a smaller case. The judge has the evidence already."""
+
+
+class Sent(NamedTuple):
+    """A request, and when it was answered or given up, s on the monotonic clock."""
+
+    at_s: float
+    request: Request
 
 
 @dataclass
@@ -28,12 +39,14 @@ class Finding:
         expected: what the requirement asks for.
         exchange: the smallest failing request with what became of it, or None where none was sent.
         seen: how often it was found.
+        sequence: the requests of its check up to it, so that they can be sent again.
     """
 
     message: str
     expected: str
     exchange: Attempt | None
     seen: int = 1
+    sequence: tuple[Sent, ...] = ()
 
 
 @dataclass
@@ -67,6 +80,26 @@ class Judge:
         self.check_name = ""
         # What a check is about to risk: said before a hostile request, so that a robot that dies of it has failed it.
         self.at_risk: tuple[str, ...] = ()
+        self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
+
+    def begin(self, check_name: str) -> None:
+        """A check begins: what was sent before does not lead to its findings."""
+        self.check_name, self.at_risk = check_name, ()
+        self._sent.clear()
+
+    def sent(self, request: Request) -> None:
+        """A request of the check went out."""
+        self._sent.append(Sent(time.monotonic(), request))
+
+    def _led_to(self, exchange: Attempt | None) -> tuple[Sent, ...]:
+        """The requests up to that of an exchange, which may have gone over a socket that nobody listens to."""
+        sent = tuple(self._sent)
+        if exchange is None:
+            return sent
+        for index in range(len(sent) - 1, -1, -1):
+            if sent[index].request is exchange.request:
+                return sent[: index + 1]
+        return (*sent[-MAX_SEQUENCE + 1 :], Sent(time.monotonic(), exchange.request))
 
     def check(
         self,
@@ -103,13 +136,14 @@ class Judge:
         known = evidence.findings.get(key)
         if known is None:
             if len(evidence.findings) < MAX_FINDINGS:
-                evidence.findings[key] = Finding(message, expected, exchange)
+                evidence.findings[key] = Finding(message, expected, exchange, 1, self._led_to(exchange))
             else:
                 next(iter(evidence.findings.values())).seen += 1
             return False
         known.seen += 1
         if exchange and known.exchange and exchange.request.size < known.exchange.request.size:
             known.message, known.expected, known.exchange = message, expected, exchange
+            known.sequence = self._led_to(exchange)
         return False
 
     def require(

@@ -1,0 +1,115 @@
+"""``roaas replay`` sends a finding's requests again, in order, and says whether it is still there."""
+
+import json
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+from click.testing import CliRunner
+
+from conformance.engine.sequence import read_request, written
+from conformance.transport.exchange import Request
+from conformance.verdict.evidence import Sent
+from roaas import main
+
+
+class _Robot(ThreadingHTTPServer):
+    """Answers 500 to a GET that follows a PUT, until it is repaired."""
+
+    def __init__(self):
+        self.asked: list[tuple[str, str, bytes, str | None]] = []
+        self.repaired = False
+        super().__init__(("127.0.0.1", 0), _Handler)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Robot
+
+    def _answer(self):
+        body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+        broken = self.command == "GET" and not self.server.repaired and self.server.asked[-1:] != []
+        self.server.asked.append((self.command, self.path, body, self.headers.get("Authorization")))
+        self.send_response(500 if broken else 204)
+        self.end_headers()
+
+    do_GET = do_PUT = _answer  # noqa: N815 - http.server's names
+
+    def log_message(self, *_):
+        """Say nothing."""
+
+
+@pytest.fixture(name="robot")
+def _robot():
+    with _Robot() as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
+
+
+def _result(tmp_path, base, methods=("PUT", "GET")):
+    token = ("Authorization", "Bearer $ROAAS_TOKEN")
+    sent = [
+        Sent(
+            10.0 + 0.01 * index,
+            Request(method, f"{base}/a?b=%20", (("Host", "x"), token), b"\x00body" if method == "PUT" else b""),
+        )
+        for index, method in enumerate(methods)
+    ]
+    failure = {
+        "message": "status 500",
+        "response": {"status": 500, "headers": {}, "body": None},
+        "sequence": written(sent),
+    }
+    document = {
+        "format": "roaas-result/1",
+        "target": {"subscribers_endpoint": None},
+        "requirements": [{"id": "http/declared-status", "failures": [failure]}, {"id": "http/head", "failures": []}],
+    }
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    return str(tmp_path)
+
+
+def _replay(*arguments):
+    return CliRunner().invoke(main, ["replay", *arguments])
+
+
+def test_a_finding_is_still_there_until_it_is_repaired(robot, tmp_path):
+    (tmp_path / "token").write_text("sesame\n", encoding="utf-8")
+    result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}")
+    arguments = (result, "--allow-motion", "--token-file", str(tmp_path / "token"))
+    there = _replay(*arguments)
+    assert (there.exit_code, there.output.split(":")[0]) == (1, "still there")
+    assert robot.asked == [("PUT", "/a?b=%20", b"\x00body", "Bearer sesame"), ("GET", "/a?b=%20", b"", "Bearer sesame")]
+    robot.repaired = True
+    gone = _replay(*arguments, "http/declared-status")
+    assert (gone.exit_code, gone.output.split(":")[0]) == (0, "gone")
+
+
+def test_what_moves_the_robot_asks_first(robot, tmp_path):
+    refused = _replay(_result(tmp_path, f"http://127.0.0.1:{robot.server_port}"))
+    assert (refused.exit_code, robot.asked) == (2, [])
+    assert "--allow-motion" in refused.output
+
+
+@pytest.mark.parametrize("requirement", ["http/head", "http/no-such"])
+def test_a_requirement_without_findings_is_wrong_usage(tmp_path, requirement):
+    done = _replay(_result(tmp_path, "http://127.0.0.1:1"), requirement)
+    assert (done.exit_code, requirement in done.output) == (2, True)
+
+
+def test_a_robot_that_is_not_there(tmp_path):
+    assert _replay(_result(tmp_path, "http://127.0.0.1:1", ("GET",))).exit_code == 3
+
+
+def test_a_file_that_is_no_result(tmp_path):
+    (tmp_path / "result.json").write_text("{}", encoding="utf-8")
+    assert _replay(str(tmp_path)).exit_code == 2
+
+
+@pytest.mark.parametrize("body", [b"", b"\xff\x00", b" " * 10_000_000])
+def test_a_request_is_read_as_it_was_written(body):
+    request = Request("PUT", "http://r2/", (("A", "b"),), body, b"RAW" if not body else None)
+    (item,) = written([Sent(3.0, request)])
+    assert (item["at_s"], read_request(item)) == (0.0, request)
