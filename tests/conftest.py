@@ -7,6 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# How long an example takes is the machine's affair, which others may use as well.
+settings.register_profile("unhurried", deadline=None)
+settings.load_profile("unhurried")
 
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
 _DOMAIN_IDS = range(40, 102)

@@ -6,6 +6,7 @@ import pytest
 
 from conformance.rest.interface import RestInterface
 from conformance.rest.observers import Observer as RestObserver
+from conformance.robot.clock import Clock
 from conformance.robot.interfaces import Interfaces
 from conformance.robot.observer import Observer as RobotObserver
 from conformance.robot.probe.client import RosProbe
@@ -16,13 +17,19 @@ from conformance.transport.client import Connection
 from conformance.verdict.run import Run
 
 
+@pytest.fixture(scope="session")
+def clock() -> Clock:
+    """The robot's clock, read by the way in the whole of the run."""
+    return Clock()
+
+
 @pytest.fixture(scope="session", autouse=True)
-def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
+def _watched(run: Run, interfaces: Interfaces, connection: Connection, clock: Clock) -> None:
     """Have every exchange judged from the first check on. Here, and nowhere else, observers are registered."""
     services = interfaces.soap.there.values()
     if interfaces.rest is not None:
         connection.listeners.append(RestObserver(interfaces.rest, [service.endpoint for service in services]))
-        connection.listeners.append(RobotObserver(interfaces.rest))
+        connection.listeners.append(RobotObserver(interfaces.rest, clock))
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(service) for service in services}
         connection.listeners.append(SoapObserver(run.judge, answers))

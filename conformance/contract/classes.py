@@ -27,6 +27,7 @@ class Prerequisite(StrEnum):
     OBSERVER = "observer"  # a ROS probe, or the robot's list of deliveries
     LIMITS = "limits"  # that the statement declares them
     HOLD = "hold"  # that the statement declares the hold time
+    SEEN = "seen"  # what happens by itself, or does not; what was not seen is not judged, and holds no class back
     PROBE = "probe"  # a ROS probe; without one the requirement is skipped and does not hold its class back
 
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from conformance.documents.json_schema import Shape
 from conformance.rest.interface import RestInterface
+from conformance.robot.clock import Clock
 from conformance.robot.geometry import length_of
 from conformance.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
 from conformance.robot.robot import FARTHEST, LINEAR, POSE, VELOCITY
@@ -26,6 +27,8 @@ _READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
 _PLAIN_FIELDS: Final = frozenset({"host", "accept", "authorization", "connection"})
 _PLAIN_ACCEPT: Final = frozenset({"", "*/*", "application/json"})
 _UNIT: Final = 1e-3
+# Odometry that has been seen before so long ago is older than one second by all clocks, s.
+_OLD_S: Final = 1.5
 
 
 class _Samples:
@@ -55,14 +58,19 @@ class _Samples:
 class Observer(Listener):
     """Listens to the exchanges of one run."""
 
-    def __init__(self, api: RestInterface) -> None:
+    def __init__(self, api: RestInterface, clock: Clock) -> None:
         self._api = api
+        self._clock = clock
         rest = api.client
         # As HttpClient writes the URLs of its requests.
         base = f"{rest.scheme}://{rest.authority}{rest.prefix}"
         self._readings = {base + path: (path, *reading) for path, reading in _READINGS.items()}
         self._last_stamp: tuple[int, int] | None = None
         self._last_received = 0.0
+        # When the odometry had a stamp that it had not before, and what told a velocity although there was no odometry.
+        self._fresh_at = math.inf
+        self._none: bool = False
+        self._velocity_of_none: Exchange | None = None
         self._fast = {path: _Samples() for path in _READINGS}
 
     def answered(self, exchange: Exchange) -> None:
@@ -75,24 +83,35 @@ class Observer(Listener):
             return
         path, id_, shape, expected = reading
         judge = self._api.run.judge
-        if path == POSE:
-            judge.check(
-                "rest-resources/pose-unavailable",
-                response.status != HTTPStatus.SERVICE_UNAVAILABLE or bool(response.header("retry-after")),
-                exchange,
-                "Retry-After with 503",
-            )
         if response.status == HTTPStatus.SERVICE_UNAVAILABLE:
+            self._unavailable(path, exchange)
             return
         value, problem = read_as(response, shape)
         if not judge.check(id_, not problem, exchange, expected, found=problem):
             return
         if path == POSE:
+            self._none = False
             self._odometry(value, exchange, response.elapsed_ms)
             value = value["twist"]["twist"]
-        elif path == LINEAR:
-            value = {"linear": value}
+            self._velocity_of_none = None
+        else:
+            self._velocity_of_none = exchange if self._none else None
+            value = {"linear": value} if path == LINEAR else value
         self._limits(self._fast[path], value, exchange)
+
+    def _unavailable(self, path: str, exchange: Exchange) -> None:
+        """There is no odometry (any more): the answer says when to ask again, and there is no velocity either."""
+        judge = self._api.run.judge
+        name = "pose-unavailable" if path == POSE else "pose-fresh"
+        after = bool(exchange.response.header("retry-after"))
+        judge.check(f"rest-resources/{name}", after, exchange, "Retry-After with 503")
+        if path == POSE:
+            # Not at once: the velocity may have been asked for just before the odometry came, or was too old.
+            if self._none and self._velocity_of_none is not None:
+                told = self._velocity_of_none
+                expected = "503 for the velocity while the pose is 503"
+                judge.check("rest-resources/pose-fresh", holds=False, exchange=told, expected=expected)
+            self._none, self._velocity_of_none = True, None
 
     def _plain(self, exchange: Exchange) -> bool:
         """Whether a request is one that has nothing odd about it, and so has to be answered 200."""
@@ -113,9 +132,10 @@ class Observer(Listener):
             found=f"length {length:.6g}",
         )
         now = time.monotonic()
+        sent = now - elapsed_ms / 1000
         stamp = (int(odometry["header"]["stamp"]["sec"]), int(odometry["header"]["stamp"]["nanosec"]))
         # Two answers that crossed on their way say nothing of order.
-        if self._last_stamp is not None and now - elapsed_ms / 1000 >= self._last_received:
+        if self._last_stamp is not None and sent >= self._last_received:
             judge.check(
                 "rest-resources/pose-stamp",
                 stamp >= self._last_stamp,
@@ -124,6 +144,18 @@ class Observer(Listener):
                 found=f"sec, nanosec {stamp} after {self._last_stamp}",
                 cause="runs backwards",
             )
+        if stamp != self._last_stamp:
+            self._fresh_at = now
+        elif sent > self._fresh_at + _OLD_S:
+            judge.check(
+                "rest-resources/pose-fresh",
+                holds=False,
+                exchange=exchange,
+                expected="503 where the odometry is older than one second",
+                found=f"one that came {sent - self._fresh_at:.1f} s ago already",
+                cause="old",
+            )
+        self._clock.take(now - elapsed_ms / 2000, stamp[0] + stamp[1] / 1e9)
         self._last_stamp = max(stamp, self._last_stamp) if self._last_stamp else stamp
         self._last_received = now
 

@@ -15,6 +15,7 @@ from conformance.selftest.robots import Robot, running, statement_of
 from conformance.selftest.servers.fronts import Front, behind
 from conformance.selftest.servers.programs import NotInstalledError
 from conformance.selftest.variants import CertificateError, Variant, certificate
+from conformance.verdict.verdicts import NOT_SEEN
 
 # A robot that takes 300 ms for everything needs its time.
 _TIMEOUT_S = 900.0
@@ -49,9 +50,9 @@ class ControlResult:
         """Requirements that could not be judged although they are claimed, with the reason."""
         if self.outcome is None:
             return {}
-        return {
-            id_: self.outcome.reasons[id_] for id_, value in self.outcome.verdicts.items() if value in {"skip", "error"}
-        }
+        reasons = self.outcome.reasons
+        unjudged = {id_ for id_, value in self.outcome.verdicts.items() if value in {"skip", "error"}}
+        return {id_: reasons[id_] for id_ in sorted(unjudged) if reasons[id_] != NOT_SEEN}
 
     @property
     def conformant(self) -> bool:

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from conformance.verdict.evidence import Evidence
 
 
+# Why there is no verdict on what a robot does by itself, or does not.
+NOT_SEEN = "it was not seen in this run, so it is not judged"
+
+
 class Value(StrEnum):
     """What can be said of one requirement."""
 
@@ -96,6 +100,8 @@ def verdict_of(
         return verdict(Value.NOT_CLAIMED, f"class {requirement.class_} is not claimed")
     if evidence.unclaimed and not evidence.cases:
         return verdict(Value.NOT_CLAIMED, evidence.unclaimed)
+    if Prerequisite.SEEN in requirement.needs and not evidence.cases:
+        return verdict(Value.SKIP, NOT_SEEN)
     if evidence.findings:
         first = next(iter(evidence.findings.values()))
         more = f" (and {len(evidence.findings) - 1} more)" if len(evidence.findings) > 1 else ""
@@ -157,12 +163,13 @@ def views(verdicts: Iterable[Verdict]) -> dict[str, View]:
 def _holds_back(requirement: Requirement) -> bool:
     """Whether a class waits for this requirement to be judged.
 
-    What only a ROS probe can see is judged when there is one; a robot without ROS at hand is not held back by it.
+    What only a ROS probe can see is judged when there is one; a robot without ROS at hand is not held back by it, nor
+    one by what it did not happen to do.
     """
     return (
         requirement.level is Level.MUST
         and requirement.untestable is None
-        and Prerequisite.PROBE not in requirement.needs
+        and not {Prerequisite.PROBE, Prerequisite.SEEN}.intersection(requirement.needs)
     )
 
 

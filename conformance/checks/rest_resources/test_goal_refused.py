@@ -5,7 +5,7 @@ from typing import Final
 import pytest
 
 from conformance.robot.geometry import Pose
-from conformance.robot.goal import await_none, goal_body, put_goal
+from conformance.robot.goal import NEW, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import Robot
 from conformance.verdict.evidence import Judge
@@ -14,12 +14,16 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
 # A robot may look for a way before it gives up, s.
 _GIVES_UP_S: Final = 10.0
 _FAR: Final = (Pose(1e6, 1e6, 0.0), Pose(-1e6, 0.0, 1.0), Pose(1e300, -1e300, 0.0))
-_LENGTHS: Final = (0.0, 0.5, 0.99, 1.01, 2.0, 1e200)
+_LENGTHS: Final = (0.0, 0.5, 0.99, 0.9975, 1.0025, 1.005, 1.009, 1.01, 2.0, 1e200)
+_TAKEN: Final = (0.9991, 1.0009)
 _FRAMES: Final = ("no_such_frame", "map2")
 
 
 @pytest.mark.requirement(
-    "rest-resources/goal-unreachable", "rest-resources/goal-frame", "rest-resources/goal-quaternion"
+    "rest-resources/goal-unreachable",
+    "rest-resources/goal-frame",
+    "rest-resources/goal-quaternion",
+    "rest-resources/goal-quaternion-taken",
 )
 def test_goals_that_cannot_be_taken(robot: Robot, judge: Judge) -> None:
     """Outside the map, in an unknown frame, with an orientation that is none."""
@@ -27,6 +31,17 @@ def test_goals_that_cannot_be_taken(robot: Robot, judge: Judge) -> None:
     (near,) = choose_goals(robot, 1.0, 1)
     for length in _LENGTHS:
         _refused(robot, judge, "goal-quaternion", goal_body(near, frame, length=length), f"a quaternion of {length:g}")
+    for length in _TAKEN:
+        exchange = put_goal(robot, goal_body(near, frame, length=length))
+        judge.check(
+            "rest-resources/goal-quaternion-taken",
+            exchange.response.status in NEW,
+            exchange,
+            f"201 or 202 for a goal with a quaternion of {length:g}",
+            cause=exchange.came,
+        )
+    robot.delete_goal()
+    await_none(robot)
     for unknown in _FRAMES:
         if unknown != frame:
             _refused(robot, judge, "goal-frame", goal_body(near, unknown), f"the frame {unknown!r}")

@@ -18,6 +18,7 @@ _PATIENCE_S = 5.0
 @pytest.mark.requirement(
     "rest-resources/pose-type",
     "rest-resources/pose-unavailable",
+    "rest-resources/pose-fresh",
     "rest-resources/pose-quaternion",
     "rest-resources/pose-stamp",
 )

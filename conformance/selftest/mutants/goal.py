@@ -105,6 +105,19 @@ def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
     return apply
 
 
+def _off_by(least: float, most: float) -> Callable[[Request], bool]:
+    """PUTs of a goal whose quaternion's length is off by so much."""
+
+    def where(request: Request) -> bool:
+        try:
+            q = parsed(request.body)["goal"]["target_pose"]["pose"]["orientation"]
+            return _PUT(request) and least <= abs(math.hypot(*(q[axis] for axis in "xyzw")) - 1) <= most
+        except (TypeError, KeyError, OverflowError):
+            return False
+
+    return where
+
+
 _mutant = of_class("rest-resources", "rest")
 
 
@@ -245,6 +258,18 @@ MUTANTS = (
         "A goal's frame is not looked at.",
         "goal-frame",
         rewritten(_PUT, inputs(_guarded(_known_frame))),
+    ),
+    _mutant(
+        "goal-quaternion-nearly",
+        "A quaternion that is off by less than a hundredth is made a unit one.",
+        "goal-quaternion",
+        rewritten(_off_by(2e-3, 9.5e-3), inputs(_guarded(_unit))),
+    ),
+    _mutant(
+        "goal-quaternion-exact",
+        "A quaternion that is off by more than a rounding error is refused.",
+        "goal-quaternion-taken",
+        instead(_off_by(1e-5, 1.0), problem(422, "goal.target_pose.pose.orientation: no unit quaternion")),
     ),
     _mutant(
         "goal-quaternion-normalised",

@@ -2,11 +2,25 @@
 
 import copy
 import math
+import time
 from collections.abc import Callable
 from typing import Any
 
 from conformance.selftest.messages import Forward, Request, Response
-from conformance.selftest.mutants.changes import POSE, Make, altered, instead, parsed, plain, problem, rest, values
+from conformance.selftest.mutants.changes import (
+    JSON,
+    LINEAR,
+    POSE,
+    VELOCITY,
+    Make,
+    altered,
+    instead,
+    parsed,
+    plain,
+    problem,
+    rest,
+    values,
+)
 from conformance.selftest.mutants.mutant import of_class
 
 _AT = rest("GET", POSE)
@@ -67,15 +81,61 @@ class _Frozen:
         return response
 
 
+class _Lost:
+    """From the sixtieth reading on there is no new odometry, and the last one is shown for ever."""
+
+    def __init__(self) -> None:
+        self._left = 60
+        self._last: dict[str, Response] = {}
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if not rest("GET", POSE, VELOCITY, LINEAR)(request) or not _is_json(request):
+            return forward(request)
+        if not self._left and request.path in self._last:
+            return self._last[request.path].copy()
+        response = forward(request)
+        if response.status == 200:
+            self._left = max(0, self._left - 1)
+            self._last[request.path] = response.copy()
+        return response
+
+
+def _is_json(request: Request) -> bool:
+    return (request.field("Accept") or JSON) == JSON
+
+
+class _FastClock:
+    """The robot's clock goes a tenth too fast."""
+
+    def __init__(self) -> None:
+        self._begun = time.monotonic()
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if _AT(request) and response.status == 200:
+            values(self._later)(response)
+        return response
+
+    def _later(self, odometry: Any) -> None:
+        stamp = odometry["header"]["stamp"]
+        ahead = stamp["sec"] * 10**9 + stamp["nanosec"] + int((time.monotonic() - self._begun) * 1e8)
+        stamp["sec"], stamp["nanosec"] = divmod(ahead, 10**9)
+
+
+def _carried(odometry: Any) -> None:
+    odometry["header"]["stamp"]["sec"] -= 1
+    odometry["header"]["stamp"]["nanosec"] += 10**9
+
+
 def _earlier(odometry: Any) -> None:
     odometry["header"]["stamp"]["sec"] -= 1
 
 
 class _NotYet:
-    """The first ten times there is no odometry."""
+    """The first times there is no odometry: more often than anybody looks before the checks begin."""
 
     def __init__(self) -> None:
-        self._left = 10
+        self._left = 40
 
     def __call__(self, request: Request, forward: Forward) -> Response:
         if _AT(request) and self._left:
@@ -146,6 +206,16 @@ MUTANTS = (
         "The odometry's turning rate is in degrees per second.",
         "velocity-odometry",
         _told(_in_degrees),
+    ),
+    _mutant(
+        "odometry-lost", "When the odometry ceases, pose and velocity are the last ones for ever.", "pose-fresh", _Lost
+    ),
+    _mutant("pose-clock-fast", "The stamps' clock goes a tenth too fast.", "pose-clock", _FastClock),
+    _mutant(
+        "pose-nanosec-carried",
+        "The stamp has a second less, and as many nanoseconds more.",
+        "pose-type",
+        _told(_carried),
     ),
     _mutant("pose-gone", "There is no pose: 404.", "pose-type", instead(_AT, problem(404, "there is no pose"))),
     _mutant("pose-no-content", "The pose is 204.", "pose-type", instead(_AT, plain(204))),

@@ -28,6 +28,7 @@ from conformance.selftest.mutants.mutant import of_class
 
 _GET, _PUT = rest("GET", VELOCITY), rest("PUT", VELOCITY)
 _GET_LINEAR, _PUT_LINEAR = rest("GET", LINEAR), rest("PUT", LINEAR)
+_LIMITS = (0.7, 2.5)
 _STILL = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
 _CRAWL = {**_STILL, "linear": {"x": 0.123, "y": 0.0, "z": 0.0}}
 
@@ -128,6 +129,34 @@ def _driven(edit: Callable[[Any], Any]) -> Make:
     return secretly(_PUT, inputs(lambda twist: edit(twist) if _good(twist) else None))
 
 
+def _beyond(share: float) -> Callable[[Request], bool]:
+    """PUTs of a velocity beyond a share of the limits, which is within them."""
+
+    def where(request: Request) -> bool:
+        twist: Any = parsed(request.body) if _PUT(request) else None
+        try:
+            used = max(abs(twist["linear"]["x"]) / _LIMITS[0], abs(twist["angular"]["z"]) / _LIMITS[1])
+        except (TypeError, KeyError):
+            return False
+        return bool(share < used <= 1)
+
+    return where
+
+
+def _short_of(share: float) -> Callable[[Any], None]:
+    """The robot does not quite get to its limits."""
+
+    def edit(twist: Any) -> None:
+        for part, axis, limit in (("linear", "x", _LIMITS[0]), ("angular", "z", _LIMITS[1])):
+            twist[part][axis] = max(-share * limit, min(share * limit, twist[part][axis]))
+
+    return edit
+
+
+def _forwards_only(twist: Any) -> None:
+    twist["linear"]["x"] = max(0.0, twist["linear"]["x"])
+
+
 def _mirrored(twist: Any) -> None:
     twist["angular"]["z"] = -twist["angular"]["z"]
 
@@ -186,6 +215,24 @@ MUTANTS = (
     ),
     _mutant(
         "velocity-halved", "The robot drives at half of what it is told.", "velocity-converges", _driven(_times(0.5))
+    ),
+    _mutant(
+        "velocity-refused-near-limits",
+        "Above nine tenths of its limits the robot refuses a velocity.",
+        "velocity-range",
+        instead(_beyond(0.9), problem(422, "linear.x, angular.z: too fast")),
+    ),
+    _mutant(
+        "velocity-short-of-limits",
+        "The robot gets to nine tenths of its limits, and no farther.",
+        "velocity-range",
+        secretly(_beyond(0.9), inputs(_short_of(0.9))),
+    ),
+    _mutant(
+        "velocity-forwards-only",
+        "The robot takes velocities backwards, and stands still.",
+        "velocity-range",
+        secretly(_beyond(0.0), inputs(_forwards_only)),
     ),
     _mutant("velocity-reversed", "The robot turns the other way.", "velocity-converges", _driven(_mirrored)),
     _mutant(

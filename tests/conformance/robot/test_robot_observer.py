@@ -6,6 +6,7 @@ import pytest
 from conformance.contract.limits import DeclaredLimits
 from conformance.contract.statement import Statement
 from conformance.rest.interface import RestInterface
+from conformance.robot.clock import Clock
 from conformance.robot.observer import Observer
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
@@ -29,7 +30,7 @@ def odometry(second: int = 1, **orientation: float) -> dict:
 
 def opened(statement: Statement) -> RestInterface:
     api = RestInterface(Run(statement=statement), HttpClient(_BASE + "/", Connection()))
-    api.client.connection.listeners.append(Observer(api))
+    api.client.connection.listeners.append(Observer(api, Clock()))
     return api
 
 

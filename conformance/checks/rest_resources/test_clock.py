@@ -1,0 +1,37 @@
+"""The robot's clock, by all that was read of its odometry in the run."""
+
+import time
+
+import pytest
+
+from conformance.robot.clock import SPAN_S, Clock
+from conformance.robot.robot import POSE, Robot
+from conformance.verdict.evidence import Judge
+
+# Late in a run: the longer it has lasted, the better its stamps tell.
+pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest")]
+_STEP_S = 0.1
+
+
+@pytest.mark.requirement("rest-resources/pose-clock")
+def test_clock(robot: Robot, judge: Judge, clock: Clock) -> None:
+    """The stamps advance as the time on the wall does."""
+    until = time.monotonic() + SPAN_S + 1
+    for _ in range(3):
+        robot.odometry()
+        time.sleep(_STEP_S)
+    while clock.rate is None and time.monotonic() < until:
+        robot.odometry()
+        time.sleep(_STEP_S)
+    rate, scale = clock.rate, robot.limits.time_scale
+    if rate is None:
+        judge.skip("rest-resources/pose-clock", f"no odometry could be read for {SPAN_S:g} s")
+        return
+    judge.check(
+        "rest-resources/pose-clock",
+        clock.is_right(scale),
+        robot.get(POSE),
+        f"a clock that goes {scale:g} times as fast as the one on the wall, within 5 %",
+        found=f"{rate:.3f} times as fast over {clock.span_s:.1f} s",
+        cause="another rate",
+    )

@@ -1,0 +1,56 @@
+"""How fast a robot's clock goes, by the stamps of its odometry and the clock on the wall."""
+
+from statistics import median
+from typing import Final
+
+# The rate is told from readings at least so far apart, s.
+SPAN_S: Final = 2.5
+# Of all readings one in so long is kept, s; when there are too many, every other one of them.
+_EVERY_S: Final = 0.1
+_MOST: Final = 80
+# What the rate may be off, and what a stamp may be older than its reading, in comparison with the others, s.
+_SHARE: Final = 0.05
+_OLDER_S: Final = 0.05
+
+
+class Clock:
+    """Stamps and when they were read, from the whole of a run."""
+
+    def __init__(self) -> None:
+        self._readings: list[tuple[float, float]] = []
+        self._every = _EVERY_S
+
+    def take(self, at: float, stamp: float) -> None:
+        """Take a reading: the time on the wall and the robot's own, s."""
+        if self._readings and at < self._readings[-1][0] + self._every:
+            return
+        self._readings.append((at, stamp))
+        if len(self._readings) > _MOST:
+            self._readings, self._every = self._readings[::2], 2 * self._every
+
+    @property
+    def span_s(self) -> float:
+        """From the first reading to the last, s."""
+        return self._readings[-1][0] - self._readings[0][0] if self._readings else 0.0
+
+    @property
+    def rate(self) -> float | None:
+        """How fast the robot's clock goes in comparison with the one on the wall; None before enough was read.
+
+        The median over all pairs of readings that are at least half of the span apart (Theil and Sen), so that neither
+        a late answer nor a clock that was once set right counts.
+        """
+        if self.span_s < SPAN_S:
+            return None
+        apart = self.span_s / 2
+        return median(
+            (later - earlier) / (there - here)
+            for index, (here, earlier) in enumerate(self._readings)
+            for there, later in self._readings[index + 1 :]
+            if there - here >= apart
+        )
+
+    def is_right(self, time_scale: float) -> bool:
+        """Whether the rate is the declared one within 5 %, and what the odometry's age may come to."""
+        rate = self.rate
+        return rate is not None and abs(rate - time_scale) <= time_scale * (_SHARE + _OLDER_S / self.span_s)
