@@ -22,6 +22,8 @@ from conformance.selftest.robots import Robot, statement_of
 CAUGHT: Final = "caught"
 SURVIVED: Final = "survived"
 NOT_REACHED: Final = "not reached"
+# A run took too long or broke off, so that nothing is known.
+GIVEN_UP: Final = "given up"
 # What a mutant did was not what it says: its own mistake.
 BROKEN: Final = "broken"
 # Classes that are claimed, and requirements that are judged alone (all, where there are none).
@@ -35,7 +37,7 @@ class GeneratedResult:
 
     Attributes:
         mutant: which.
-        outcome: caught, survived, not reached (nothing was altered in any run), broken.
+        outcome: caught, survived, not reached (nothing was altered in any run), given up, broken.
         by: requirements that said fail (MUST) or warn (SHOULD) and do not of the good robot.
         fails: whether one of them said fail, so that the robot is not conformant.
         effort: the effort at which it was caught, else the last one tried.
@@ -106,7 +108,11 @@ class _Blamed:
                 proxy.change = unchanged
                 classes, requirements = attempt
                 job = job_for(robot, proxy, effort, self._seed, classes=classes, requirements=requirements)
-                self._known[attempt, effort] = frozenset(run_job(job).caught())
+                outcome = run_job(job)
+                if outcome.exit_code < 0:
+                    # Nothing is known of the good robot, so nothing is shown of the mutant.
+                    return frozenset(load_ledger(CONTRACT_DIR / "requirements.toml"))
+                self._known[attempt, effort] = frozenset(outcome.caught())
             return self._known[attempt, effort]
 
 
@@ -115,6 +121,7 @@ def _judge(
 ) -> GeneratedResult:
     result = GeneratedResult(mutant)
     tally = Tally()
+    given_up = False
     for effort in efforts:
         for attempt in _attempts(mutant, blamed.claimed):
             classes, requirements = attempt
@@ -123,6 +130,7 @@ def _judge(
             result.runs += 1
             result.seconds += outcome.seconds
             result.effort, result.altered = effort, tally.altered
+            given_up = given_up or outcome.exit_code < 0
             if proxy.broken:
                 result.outcome, result.reason = BROKEN, proxy.broken[0]
                 return result
@@ -130,7 +138,7 @@ def _judge(
                 _note(result, outcome, [id_ for id_ in caught if id_ not in blamed.by(attempt, robot, proxy, effort)])
             if result.outcome == CAUGHT:
                 return result
-    result.outcome = SURVIVED if tally.altered else NOT_REACHED
+    result.outcome = GIVEN_UP if given_up else SURVIVED if tally.altered else NOT_REACHED
     return result
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from conformance.selftest.generated.catalogue import every_change, generated_mutants
-from conformance.selftest.generated.judging import BROKEN, SURVIVED, GeneratedResult
+from conformance.selftest.generated.judging import BROKEN, CAUGHT, GIVEN_UP, SURVIVED, GeneratedResult
 from conformance.selftest.generated.open_places import RULES, reason_for
 from conformance.selftest.generated.sampling import Rate, rate_of, rates_by
 
@@ -52,14 +52,16 @@ def summary(results: Iterable[GeneratedResult]) -> str:
     """What a person wants to know: the rates, then every survivor."""
     results = list(results)
     lines = [f"Faulty robots by rule: {rate_of(results).words()}; {len(generated_mutants())} exist"]
+    if warned := sum(result.outcome == CAUGHT and not result.fails for result in results):
+        lines.append(f"{warned} of them by a SHOULD alone")
     for key in _KEYS:
         lines.append(f"by {key}:")
         lines += [f"  {name:20} {rate.words()}" for name, rate in rates_by(results, key).items()]
     for result in results:
         if result.outcome == SURVIVED:
             lines.append(f"SURVIVED {result.mutant.name} ({result.mutant.says}) altered {result.altered} times")
-        if result.outcome == BROKEN:
-            lines.append(f"BROKEN {result.mutant.name}: {result.reason}")
+        if result.outcome in {BROKEN, GIVEN_UP}:
+            lines.append(f"{result.outcome.upper()} {result.mutant.name}: {result.reason or 'a run came to no end'}")
     return "\n".join(lines)
 
 

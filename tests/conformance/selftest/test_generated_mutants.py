@@ -8,8 +8,10 @@ import pytest
 from conformance.contract.files import Contract
 from conformance.documents import wsdl
 from conformance.documents.openapi import operations_of
+from conformance.selftest.certifying import Outcome
+from conformance.selftest.generated import judging
 from conformance.selftest.generated.catalogue import every_change, generated_mutants
-from conformance.selftest.generated.judging import CAUGHT, NOT_REACHED, GeneratedResult, judge
+from conformance.selftest.generated.judging import CAUGHT, GIVEN_UP, NOT_REACHED, GeneratedResult, judge
 from conformance.selftest.generated.mutant import Tally
 from conformance.selftest.generated.open_places import RULES
 from conformance.selftest.generated.operators import OPERATORS
@@ -17,6 +19,7 @@ from conformance.selftest.generated.report import document, summary
 from conformance.selftest.generated.sampling import Rate, rate_of, rates_by, sample
 from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutant_run import RobotPool
+from conformance.selftest.report import Report
 
 JSON = [("Content-Type", "application/json")]
 
@@ -126,6 +129,16 @@ def test_a_mode_says_when():
     assert (seen.count(b'{"x": null}'), altered) == (2, 2)
     assert answered("null@together:getLinearVelocity:answer.x:json", request, body, body)[1] == 0
     assert answered("null@after-error:getLinearVelocity:answer.x:json", request, body, body)[1] == 0
+
+
+def test_a_run_that_comes_to_no_end_shows_nothing(monkeypatch):
+    monkeypatch.setattr(judging, "run_job", lambda job: Outcome(-1, {}, {}, 0, job.timeout_s))
+    with RobotPool("plain", 1, 0) as pool:
+        results = judge(pool, [named("status:getSensors:200-500")], efforts=("quick",), tell=lambda _: None)
+    assert [result.outcome for result in results] == [GIVEN_UP]
+    report = Report("plain", generated_results=results)
+    assert not report.holds
+    assert "GIVEN UP status:getSensors:200-500" in report.summary()
 
 
 def test_five_mutants_are_caught_and_one_that_alters_nothing_is_told_apart():
