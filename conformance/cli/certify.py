@@ -17,6 +17,7 @@ from conformance.contract.classes import CLASSES, PROFILES
 from conformance.contract.command import CommandResult, FrontDoor, ResultCommand
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.files import CONTRACT_DIR, Contract, ContractError
+from conformance.contract.requirement_sets import RequirementSetError, judged_by, names
 from conformance.contract.statement import Statement, StatementError, load_statement
 from conformance.verdict.effort import EFFORTS, Effort
 
@@ -49,6 +50,12 @@ _FILE = click.Path(exists=True, dir_okay=False)
 )
 @click.option(
     "--contract", type=click.Path(path_type=Path), default=CONTRACT_DIR, help="Judge by the contract in this folder."
+)
+@click.option(
+    "--requirements",
+    type=click.Choice(names()),
+    metavar="SET",
+    help="Score by this frozen set of requirements; what is newer is shown.  [default: all]",
 )
 @click.option("--allow-motion", is_flag=True, help="The robot may be moved: needed for most of the contract.")
 @click.option("--effort", type=click.Choice(EFFORTS), default="standard", show_default=True, help="How much to try.")
@@ -170,19 +177,21 @@ def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None)
         connection = connection_of(chosen.endpoints)
         if chosen.endpoints.ca_file:
             connection.tls()
+        requirements = judged_by(contract, options["requirements"])
         baseline = load_baseline(options["baseline"], contract.ledger) if options["baseline"] else ()
         given = Given(
             statement=file_digest(statement) if statement else None,
             baseline=file_digest(options["baseline"]) if options["baseline"] else None,
             nonce=options["nonce"],
         )
-    except (OSError, BaselineError) as error:
+    except (OSError, BaselineError, RequirementSetError) as error:
         raise StatementError(str(error)) from error
     run = Run(
         statement=chosen,
         contract=contract,
         allow_motion=options["allow_motion"],
         seed=options["seed"] if options["nonce"] is None else seed_of_nonce(options["nonce"]),
+        requirement_set=requirements,
         given=given,
         effort=Effort(options["effort"], minutes=options["minutes"]),
     )

@@ -92,6 +92,11 @@ class Contract:
         """Whether this is RoAAS's own contract, with resources that its own modules know."""
         return "/robot/pose/" in self.openapi.get("paths", {})
 
+    @property
+    def published(self) -> bool:
+        """Whether this is RoAAS's own contract as it was published, and the whole of it."""
+        return self.directory.resolve() == CONTRACT_DIR.resolve() and not self.only
+
     @cached_property
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document; empty where there is none.

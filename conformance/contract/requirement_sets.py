@@ -1,34 +1,115 @@
-"""Requirement sets: which requirements a run judged by, under a name and a digest.
+"""Frozen sets of requirements: a robot judged by one stays judged by it, whatever a later suite adds.
 
-A set's digest is over id, level and text of each of its requirements, in the order of their ids.
+``sets/NAME.toml`` holds id, level and digest of the text of each requirement of a set, and never changes once it is
+published; ``python -m conformance.contract.freeze NAME`` writes one from the ledger. A suite's ledger keeps what is in
+a set as it was; what is newer is in none until the next set is frozen.
 """
 
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION, Contract
+import msgspec
+
+from conformance.contract.classes import Level
+from conformance.contract.toml_file import Text, TomlFileError, read_toml
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Mapping
 
+    from conformance.contract.files import Contract
     from conformance.contract.ledger import Requirement
 
-
-def digest_of(requirements: Iterable[Requirement]) -> str:
-    """The digest of a set, as `sha256:…`."""
-    lines = sorted(f"{item.id}\0{item.level}\0{item.text}\n" for item in requirements)
-    return f"sha256:{hashlib.sha256(''.join(lines).encode()).hexdigest()}"
+SET_DIR = Path(__file__).parent / "sets"
+_UNFROZEN = "unfrozen"
 
 
-def set_of(contract: Contract) -> dict[str, str] | None:
-    """Name and digest of the set that a contract judges by; None where it is a contract of one's own."""
-    if contract.directory.resolve() != CONTRACT_DIR or contract.only:
+class RequirementSetError(TomlFileError):
+    """A set that there is not, or whose file cannot be used; the message names it."""
+
+
+class Frozen(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A requirement as a set has it: its level, and the digest of its text, as `sha256:…`."""
+
+    level: Level
+    text: Text
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    requirements: dict[str, Frozen]
+
+
+@dataclass(frozen=True)
+class RequirementSet:
+    """Requirements under a name.
+
+    Attributes:
+        name: as in ``--requirements NAME``.
+        requirements: level and text's digest, by id.
+    """
+
+    name: str
+    requirements: Mapping[str, Frozen]
+
+    @property
+    def digest(self) -> str:
+        """Over ids, levels and texts, as `sha256:…`."""
+        return _digest("".join(f"{id_} {item.level} {item.text}\n" for id_, item in sorted(self.requirements.items())))
+
+    @property
+    def told(self) -> dict[str, str]:
+        """Name and digest, as a result has them."""
+        return {"name": self.name, "digest": self.digest}
+
+
+def names() -> tuple[str, ...]:
+    """The names of the sets that there are."""
+    return tuple(sorted(path.stem for path in SET_DIR.glob("*.toml")))
+
+
+def load_set(name: str) -> RequirementSet:
+    """Read a set.
+
+    Raises:
+        RequirementSetError: there is none of that name, or its file cannot be used.
+    """
+    if name not in names():
+        raise RequirementSetError(f"{name!r} is no set of requirements; there are {', '.join(names()) or 'none'}")
+    return RequirementSet(name, read_toml(SET_DIR / f"{name}.toml", _File, RequirementSetError).requirements)
+
+
+def current(ledger: Mapping[str, Requirement]) -> RequirementSet:
+    """A ledger as a set: under the name of the frozen one that holds the same, where there is one."""
+    requirements = {id_: frozen(item) for id_, item in ledger.items()}
+    return next((one for one in map(load_set, names()) if one.requirements == requirements), None) or RequirementSet(
+        _UNFROZEN, requirements
+    )
+
+
+def frozen(requirement: Requirement) -> Frozen:
+    """A requirement as a set has it."""
+    return Frozen(requirement.level, _digest(requirement.text))
+
+
+def judged_by(contract: Contract, name: str | None) -> RequirementSet | None:
+    """The set that a run judges by; None where the contract is one of the user's own.
+
+    Args:
+        contract: of the run.
+        name: what was asked for; None for all that this suite has.
+
+    Raises:
+        RequirementSetError: there is none of that name, or the contract is one of the user's own.
+    """
+    if not contract.published:
+        if name is not None:
+            raise RequirementSetError(f"the set {name!r} is of RoAAS's own contract, and not of {contract.directory}")
         return None
-    return {"name": CONTRACT_VERSION, "digest": digest_of(contract.ledger.values())}
+    return current(contract.ledger) if name is None else load_set(name)
 
 
-def known_sets() -> dict[str, str]:
-    """Name and digest of each set that this suite judges by."""
-    return {CONTRACT_VERSION: digest_of(Contract.load().ledger.values())}
+def _digest(text: str) -> str:
+    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"

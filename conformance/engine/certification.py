@@ -17,7 +17,7 @@ from conformance.engine.interruption import remembered
 from conformance.engine.progress import Progress
 from conformance.engine.result import result_document, write_result
 from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
-from conformance.verdict.verdicts import Overall, class_verdicts, overall, verdict_of
+from conformance.verdict.verdicts import Overall, class_verdicts, overall, score, verdict_of
 
 if TYPE_CHECKING:
     from conformance.engine.robot_under_test import RobotUnderTest
@@ -84,6 +84,8 @@ def certify(
     if run.effort.speed.remark:
         remarks.append(run.effort.speed.remark)
     seen = draw_verdicts(run)
+    if run.requirement_set is not None:
+        seen = score(seen, run.requirement_set.requirements, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
     # A baseline makes a run green, not a robot conformant: the classes fail all the same.
     classes, accepted = class_verdicts(seen, run.claims), class_verdicts(verdicts, run.claims)

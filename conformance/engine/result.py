@@ -12,7 +12,6 @@ from conformance.contract.atomic_write import write_atomically
 from conformance.contract.classes import CLASS_TITLES
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
 from conformance.contract.interfaces import Interface
-from conformance.contract.requirement_sets import set_of
 from conformance.engine.sequence import written
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
 from conformance.transport.exchange import Unanswered
@@ -62,7 +61,7 @@ def result_document(
             "contract": _contract_name(run.contract),
             "digest": suite_digest(run.contract),
         },
-        "requirement_set": set_of(run.contract),
+        "requirement_set": run.requirement_set.told if run.requirement_set else None,
         "digests": {"statement": run.given.statement, "contract": contract_digests(run.contract)},
         "baseline": {"digest": run.given.baseline} if run.given.baseline else None,
         "nonce": run.given.nonce,
@@ -142,6 +141,7 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
         "untestable": requirement.untestable,
         "checks": sorted(verdict.evidence.checks - {""}),
         "failures": [_failure(finding) for finding in verdict.evidence.findings.values()] if shown else [],
+        **({} if verdict.scored else {"scored": False}),
         **({"expected_failure": {"reason": expected[0], "expires": expected[1]}} if expected else {}),
     }
 

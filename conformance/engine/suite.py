@@ -9,7 +9,7 @@ from typing import Any
 
 from conformance.contract.classes import PROFILES
 from conformance.contract.files import Contract
-from conformance.contract.requirement_sets import known_sets
+from conformance.contract.requirement_sets import load_set, names
 
 _PACKAGE = Path(__file__).parents[1]
 # The rooms that decide what is asked and what is said of it.
@@ -59,7 +59,7 @@ def known() -> dict[str, Any]:
     """What tells whether a certificate is of this suite: its digest, its requirement sets, its profiles' classes."""
     return {
         "suite": suite_digest(Contract.load()),
-        "requirement_sets": known_sets(),
+        "requirement_sets": {name: load_set(name).digest for name in names()},
         "profiles": {str(name): [str(class_) for class_ in classes] for name, classes in PROFILES.items()},
     }
 

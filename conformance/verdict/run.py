@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from conformance.contract.requirement_sets import RequirementSet
+
 
 def seed_of_nonce(nonce: str) -> int:
     """The seed of a run that a relying party asked for with a nonce: it could not be known before; 48 bits."""
@@ -48,6 +50,7 @@ class Run:
         claims: the classes that are judged.
         allow_motion: whether the robot may be moved.
         seed: of everything random.
+        requirement_set: what the robot is scored by, or None for all of the contract.
         given: what is told of that in the result, beside the statement.
         effort: how much is tried; lessened once it is known how slowly the robot answers.
         judge: what has been found.
@@ -62,6 +65,7 @@ class Run:
     allow_motion: bool = False
     seed: int = 0
     effort: Effort = field(default_factory=Effort)
+    requirement_set: RequirementSet | None = None
     given: Given = Given()
     judge: Judge = field(init=False)
     aborted: str = ""

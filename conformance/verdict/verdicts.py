@@ -6,7 +6,7 @@ inconclusive, never passed; so is one of which nothing was judged.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from conformance.contract.classes import Level, Prerequisite
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Container, Iterable, Mapping
 
     from conformance.contract.ledger import Requirement
     from conformance.verdict.evidence import Evidence
@@ -68,6 +68,7 @@ class Verdict:
         value: what is said of it.
         reason: why, where it is not simply passed.
         evidence: what was seen.
+        scored: whether it counts; what is newer than the set of requirements that a run is scored by does not.
         expected_failure: reason and last day of the baseline's entry that accepts the failure, or None.
     """
 
@@ -76,6 +77,7 @@ class Verdict:
     reason: str
     evidence: Evidence
     expected_failure: tuple[str, str] | None = None
+    scored: bool = True
 
 
 def verdict_of(
@@ -120,6 +122,19 @@ def verdict_of(
     return verdict(Value.PASS, "; ".join(evidence.notes))
 
 
+def score(verdicts: Iterable[Verdict], requirements: Container[str], name: str) -> list[Verdict]:
+    """Keep what is newer than a set of requirements from counting: it is shown, and no more than a warning."""
+    return [
+        verdict if verdict.requirement.id in requirements else _unscored(verdict, f"newer than {name}, and not scored")
+        for verdict in verdicts
+    ]
+
+
+def _unscored(verdict: Verdict, told: str) -> Verdict:
+    value = {Value.FAIL: Value.WARN, Value.ERROR: Value.SKIP}.get(verdict.value, verdict.value)
+    return replace(verdict, value=value, reason=": ".join(filter(None, (told, verdict.reason))), scored=False)
+
+
 def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[str, tuple[ClassValue, str]]:
     """Verdict and reason for each class that has requirements: pass, fail, inconclusive or not-claimed."""
     by_class: dict[str, list[Verdict]] = {}
@@ -129,7 +144,8 @@ def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[s
 
 
 def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, str]:  # noqa: FBT001 - private
-    if not claimed:
+    verdicts = [item for item in verdicts if item.scored]
+    if not claimed or not verdicts:
         return ClassValue.NOT_CLAIMED, ""
     failed = [item for item in verdicts if item.value is Value.FAIL]
     if failed:

@@ -44,7 +44,7 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         requirement_sets: names of sets that this suite knows, too.
         efforts: how much has to have been tried.
         motion: whether the robot has to have been moved.
-        ros: whether its ROS side has to have been watched.
+        ros: whether its ROS side has to have been watched where a class asks for it.
         baseline: whether failures may have been accepted.
         interrupted: whether a part of a run will do.
         max_age_days: since the end of the run.
@@ -131,7 +131,9 @@ def _how(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
     yield Point("efforts", run.effort in policy.efforts, run.effort)
     moved = "the robot was allowed to move" if run.motion_allowed else "the robot was not allowed to move"
     yield Point("motion", run.motion_allowed or not policy.motion, moved)
-    yield Point("ros", run.observed == "ROS" or not policy.ros, f"seen: {run.observed}")
+    black_box = [name for name in passed(run) if run.views.get(name) == "black box"]
+    told = f"seen as a black box: {', '.join(black_box)}" if black_box else "no class was a black box"
+    yield Point("ros", not (policy.ros and black_box), told)
 
 
 def _requirement_set(run: Run, policy: Policy, known: Known) -> Point:

@@ -9,7 +9,7 @@ extension field `roaas` (a consumer ignores what it does not know: in-toto attes
 import hashlib
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
@@ -73,7 +73,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
         accepted_until: until when, where a baseline is why the run ended well.
         baseline: digest of the file of accepted failures, or None.
         nonce: what the relying party asked the run to be made with, or None.
-        observed: whether the robot's ROS side was watched, too.
+        views: from where each class was seen that a look at the ROS side could have judged further.
         intermittent: ids of the requirements that failed at times.
         started: RFC 3339, UTC.
         finished: as started.
@@ -94,7 +94,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     nonce: Text
     baseline: Text
     motion_allowed: bool
-    observed: Literal["black box", "ROS"]
+    views: dict[str, str]
     started: str
     finished: str
 
@@ -196,7 +196,7 @@ def _run(result: Mapping[str, Any]) -> Run:
         nonce=result.get("nonce"),
         baseline=baseline.get("digest"),
         motion_allowed=result["statement"]["motion_allowed"],
-        observed="black box" if result["target"].get("ros_domain_id") is None else "ROS",
+        views=dict(result.get("class_views", {})),
         started=result["started"],
         finished=result["finished"] or result["started"],
     )

@@ -14,7 +14,8 @@ from urllib.request import urlopen
 import pytest
 
 from conformance import selftest
-from conformance.contract.files import CONTRACT_DIR
+from conformance.contract.files import CONTRACT_DIR, Contract
+from conformance.contract.requirement_sets import current, load_set
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, statement_in
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate
 from reports.attestation.statement import seed_of
@@ -59,7 +60,7 @@ def test_what_the_run_was_given_stands_in_the_result(tmp_path, closed_port):
     _, result = _certify(tmp_path, str(statement), "--baseline", str(baseline))
     assert result["digests"]["statement"] == f"sha256:{hashlib.sha256(statement.read_bytes()).hexdigest()}"
     assert result["baseline"] == {"digest": f"sha256:{hashlib.sha256(b'').hexdigest()}"}
-    assert result["requirement_set"]["name"] == "1.1"
+    assert result["requirement_set"] == current(Contract.load().ledger).told
     openapi = (CONTRACT_DIR / "openapi.yaml").read_bytes()
     assert result["digests"]["contract"]["openapi.yaml"] == f"sha256:{hashlib.sha256(openapi).hexdigest()}"
 
@@ -204,3 +205,11 @@ def test_the_suite_runs_in_somebody_elses_project(tmp_path):
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stdout
     assert "passed" in done.stdout
+
+
+def test_a_frozen_set_is_what_a_run_is_scored_by(tmp_path, closed_port):
+    _, result = _certify(tmp_path, "--rest", closed_port, "--requirements", "1.1")
+    assert result["requirement_set"] == load_set("1.1").told
+    done, _ = _certify(tmp_path, "--rest", closed_port, "--requirements", "0.9")
+    assert done.returncode == 2
+    assert "'0.9'" in done.stderr

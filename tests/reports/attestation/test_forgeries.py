@@ -147,7 +147,7 @@ RESULTS = [
     ("patched requirements", signed_with(requirement_set__digest="sha256:" + "0" * 64), {}, {"requirement_sets"}),
     ("quick effort", signed_with(effort="quick"), {}, {"efforts"}),
     ("no motion", signed_with(statement__motion_allowed=False), {}, {"motion"}),
-    ("ROS not seen", nothing, {"ros": True}, {"ros"}),
+    ("ROS not seen", signed_with(class_views={"http": "black box"}), {"ros": True}, {"ros"}),
     ("baseline", signed_with(baseline={"digest": "sha256:" + "3" * 64}), {}, {"baseline"}),
     ("accepted failure", accepted_failure, {}, {"baseline", "classes"}),
     ("part of a run", signed_with(interrupted=True), {}, {"interrupted"}),
@@ -175,7 +175,7 @@ WAIVERS = [
     (signed_with(baseline={"digest": "sha256:" + "3" * 64}), {"baseline": True}),
     (signed_with(interrupted=True), {"interrupted": True}),
     (signed_with(finished="2025-11-20T12:00:00Z"), {"max_age_days": 400}),
-    (signed_with(target__ros_domain_id=7), {"ros": True}),
+    (signed_with(class_views={"http": "seen on ROS"}), {"ros": True}),
     (signed_with(nonce="monday", seed=seed_of("monday")), {"nonce": "monday"}),
     (nothing, {"robot": "Courier 7", "vendor": "Example Robotics", "firmware": "2.4.1"}),
 ]

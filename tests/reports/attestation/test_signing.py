@@ -115,7 +115,8 @@ def test_a_result_that_contradicts_itself_is_not_signed(desk, lie):
 
 
 def test_a_class_whose_requirement_failed_is_not_signed_as_passed(desk):
-    failed = {**desk.result["requirements"][0], "verdict": "error"}
+    finding = {"message": "m", "expected": "e", "seen": 1, "request": None, "response": None}
+    failed = {**desk.result["requirements"][0], "verdict": "fail", "failures": [finding]}
     desk.result["classes"][failed["class"]] = "pass"
     with pytest.raises(ResultInvalidError, match=failed["id"]):
         desk.sign(requirements=[failed])

@@ -1,0 +1,56 @@
+"""Frozen sets: what is in one does not change, and what is newer does not count."""
+
+import pytest
+
+from conformance.contract.files import CONTRACT_DIR, Contract
+from conformance.contract.requirement_sets import RequirementSetError, current, frozen, judged_by, load_set, names
+from conformance.verdict.evidence import Judge
+from conformance.verdict.verdicts import ClassValue, Value, class_verdicts, score, verdict_of
+
+LEDGER = Contract.load().ledger
+
+
+@pytest.mark.parametrize("name", names())
+def test_ids_levels_and_texts_of_a_set_stay_as_they_were(name):
+    """Before a release that freezes the set: `python -m conformance.contract.freeze NAME`. After it: never."""
+    kept = load_set(name).requirements
+    assert {id_: frozen(LEDGER[id_]) for id_ in kept if id_ in LEDGER} == dict(kept)
+
+
+def test_what_a_suite_has_is_known_by_its_set_only_when_it_is_the_same():
+    ledger = dict(LEDGER)
+    newest = current(ledger)
+    ledger.pop(next(iter(ledger)))
+    assert current(ledger).name == "unfrozen"
+    assert current(ledger).digest != newest.digest
+
+
+def test_a_contract_of_ones_own_has_no_set(tmp_path):
+    (tmp_path / "openapi.yaml").write_bytes((CONTRACT_DIR / "openapi.yaml").read_bytes())
+    own = Contract.load(tmp_path)
+    assert judged_by(own, None) is None
+    with pytest.raises(RequirementSetError, match="own contract"):
+        judged_by(own, "1.1")
+
+
+def test_an_unknown_set_is_told_by_name():
+    with pytest.raises(RequirementSetError, match=r"'0\.9'"):
+        judged_by(Contract.load(), "0.9")
+
+
+@pytest.mark.parametrize("passes", [True, False])
+def test_a_newer_requirement_is_shown_and_does_not_count(passes):
+    older, newer = [item for item in LEDGER.values() if item.class_ == "http" and item.level == "MUST"][:2]
+    judge = Judge({older.id, newer.id})
+    judge.check(older.id, True, None, "it does")
+    judge.check(newer.id, passes, None, "it does")
+    drawn = [verdict_of(item, judge.evidence[item.id], ("http",)) for item in (older, newer)]
+    scored = score(drawn, {older.id}, "requirement set 1.1")
+    assert [item.value for item in scored] == [Value.PASS, Value.PASS if passes else Value.WARN]
+    assert [item.scored for item in scored] == [True, False]
+    assert "newer than requirement set 1.1, and not scored" in scored[1].reason
+    assert class_verdicts(scored, ("http",))["http"][0] is ClassValue.PASS
+    assert class_verdicts(score(drawn, {newer.id}, "x"), ("http",))["http"][0] is (
+        ClassValue.PASS if passes else ClassValue.FAIL
+    )
+    assert class_verdicts(score(drawn, set(), "x"), ("http",))["http"][0] is ClassValue.NOT_CLAIMED
