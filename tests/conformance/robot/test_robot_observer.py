@@ -1,4 +1,5 @@
 import json
+import time
 from dataclasses import replace
 
 import pytest
@@ -39,10 +40,20 @@ def api() -> RestInterface:
     return opened(Statement(declared=DeclaredLimits(linear_m_s=0.5, angular_rad_s=2.0)))
 
 
-def see(api: RestInterface, path: str, value: object, *, status: int = 200, headers=(("Accept", "*/*"),), method="GET"):
+def see(
+    api: RestInterface,
+    path: str,
+    value: object,
+    *,
+    status: int = 200,
+    headers=(("Accept", "*/*"),),
+    method="GET",
+    after="",
+):
     body = value if isinstance(value, bytes) else json.dumps(value).encode()
     request = Request(method, _BASE + path, (("Host", "robot:7003"), *headers))
-    exchange = Exchange(request, Response(status, (("Content-Type", "application/json"),), body, 0.0))
+    said = (("Content-Type", "application/json"), *((("Retry-After", after),) if after else ()))
+    exchange = Exchange(request, Response(status, said, body, 0.0))
     for listener in api.client.connection.listeners:
         listener.answered(exchange)
 
@@ -104,6 +115,30 @@ def test_an_error_is_no_reading(api):
 def test_before_the_first_odometry_retry_after_is_asked_for(api):
     see(api, "/robot/pose/", {}, status=503)
     assert found(api) == {"rest-resources/pose-unavailable"}
+
+
+def test_an_odometry_that_was_never_missed_says_nothing_of_one_that_is(api):
+    see(api, "/robot/pose/", odometry(1))
+    assert not api.run.judge.evidence["rest-resources/pose-unavailable"].cases
+    assert not api.run.judge.evidence["rest-resources/pose-fresh"].cases
+
+
+def test_an_odometry_that_was_seen_long_ago_is_old(api, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    for seconds, old in ((0.0, False), (1.2, False), (0.2, False), (0.2, True)):
+        now[0] += seconds
+        see(api, "/robot/pose/", odometry(1))
+        assert bool(found(api)) is old
+    assert found(api) == {"rest-resources/pose-fresh"}
+
+
+@pytest.mark.parametrize(("status", "found_"), [(200, {"rest-resources/pose-fresh"}), (503, set())])
+def test_without_odometry_there_is_no_velocity(api, status, found_):
+    see(api, "/robot/pose/", {}, status=503, after="1")
+    see(api, "/robot/velocity/", {"linear": _ZERO, "angular": _ZERO}, status=status, after="1")
+    see(api, "/robot/pose/", {}, status=503, after="1")
+    assert found(api) == found_
 
 
 @pytest.mark.parametrize(
