@@ -2,39 +2,33 @@
 
 from __future__ import annotations
 
-import contextlib
+import json
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Final
 
 from conformance.selftest.messages import Change, Forward, Request, Response
-from conformance.selftest.mutants.changes import TNS, Make, Where, deliveries, plain, rest, soap
+from conformance.selftest.mutants.changes import (
+    GOAL,
+    TNS,
+    VELOCITY,
+    Make,
+    Where,
+    deliveries,
+    inputs,
+    parsed,
+    plain,
+    problem,
+    rest,
+    soap,
+)
+from conformance.selftest.mutants.crowd import COMPANY_S, Crowd, when_crowded
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped
 
 # How long an answer waits for another one to be mixed up with, s.
 _MEETS_S: Final = 0.05
-_COMPANY_S: Final = 0.003
-
-
-class Crowd:
-    """Knows which requests are being answered at one moment."""
-
-    def __init__(self) -> None:
-        self._inside = 0
-        self._lock = threading.Lock()
-
-    @contextlib.contextmanager
-    def joined(self) -> Iterator[Callable[[], bool]]:
-        """Be one of them; what comes tells whether there are others."""
-        with self._lock:
-            self._inside += 1
-        try:
-            yield lambda: self._inside > 1
-        finally:
-            with self._lock:
-                self._inside -= 1
 
 
 class _Mixed:
@@ -92,32 +86,6 @@ def _mixed(mix: Callable[[Response, Response], tuple[Response, Response]], nth: 
     return make
 
 
-def when_crowded(where: Where, act: Callable[[Request, Forward], Response], nth: int = 1) -> Make:
-    """Treat requests otherwise that come while another one of them is being answered, each nth of those.
-
-    Each waits a moment for company, as it would in a robot that takes its time.
-    """
-
-    def make() -> Change:
-        crowd, lock = Crowd(), threading.Lock()
-        seen = 0
-
-        def change(request: Request, forward: Forward) -> Response:
-            nonlocal seen
-            if not where(request):
-                return forward(request)
-            with crowd.joined() as others:
-                time.sleep(_COMPANY_S)
-                with lock:
-                    seen += others()
-                    chosen = others() and seen % nth == 0
-                return act(request, forward) if chosen else forward(request)
-
-        return change
-
-    return make
-
-
 def _exchanged(one: Response, two: Response) -> tuple[Response, Response]:
     return two, one
 
@@ -146,6 +114,61 @@ def _with_another_source(request: Request, forward: Forward) -> Response:
     return forward(request.copy(target=f"{head}/1.5"))
 
 
+def _created(response: Response) -> Response:
+    response = response.copy()
+    if response.status in {200, 202, 204}:
+        response.status, response.reason = 201, ""
+    return response
+
+
+class _GoalOfTwo:
+    """A goal that came while another one did is put again, under another id, when it is cancelled."""
+
+    def __init__(self) -> None:
+        self._crowd = Crowd()
+        self._second: Request | None = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if _PUT_GOAL(request):
+            with self._crowd.joined() as others:
+                time.sleep(COMPANY_S)
+                if others():
+                    self._second = request.copy()
+                return forward(request)
+        response = forward(request)
+        second = self._second
+        if rest("DELETE", GOAL)(request) and second is not None:
+            self._second = None
+            inputs(lambda value: {**value, "goal_id": {"id": "the other one"}})(second)
+            forward(second)
+        return response
+
+
+class _Blended:
+    """Requests that come at one moment have one field in common: the one that came first."""
+
+    def __init__(self, where: Where, field: str) -> None:
+        self._where, self._field = where, field
+        self._crowd = Crowd()
+        self._last: object = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if not self._where(request):
+            return forward(request)
+        with self._crowd.joined() as others:
+            value = parsed(request.body)
+            own = value.get(self._field) if isinstance(value, dict) else None
+            other, self._last = self._last, own
+            time.sleep(COMPANY_S)
+            if others() and own is not None and other is not None:
+                request = request.copy(body=json.dumps({**value, self._field: other}).encode())
+            return forward(request)
+
+
+_PUT_GOAL, _PUT_VELOCITY = rest("PUT", GOAL), rest("PUT", VELOCITY)
+_resource = of_class("rest-resources", "rest")
 _mutant = of_class("http", "rest")
 _message = of_class("equivalence", "both", observer=True)
 _EMPTY = plain(204)
@@ -213,5 +236,41 @@ MUTANTS = (
         "A SOAP delivery that comes while another one is being answered is accepted and forgotten.",
         "delivery-concurrent",
         when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)),
+    ),
+    _resource(
+        "clients-goal-new-to-all",
+        "Each client that puts the same new goal at one moment is told that it is new.",
+        "goal-concurrent",
+        when_crowded(_PUT_GOAL, lambda request, forward: _created(forward(request))),
+    ),
+    _resource(
+        "clients-goal-conflict",
+        "A goal that is put while another client puts the same one is a conflict.",
+        "goal-concurrent",
+        when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2),
+    ),
+    _resource(
+        "clients-goal-doubled",
+        "A goal that two clients put at one moment is two goals: one goes on when the other is cancelled.",
+        "goal-concurrent",
+        _GoalOfTwo,
+    ),
+    _resource(
+        "clients-goal-of-two",
+        "Of goals that come at one moment, one has the pose of another.",
+        "concurrent-puts",
+        lambda: _Blended(_PUT_GOAL, "goal"),
+    ),
+    _resource(
+        "clients-velocity-lost",
+        "Of velocities that come at one moment, none is carried out.",
+        "concurrent-puts",
+        when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request)),
+    ),
+    _resource(
+        "clients-velocity-of-two",
+        "Of velocities that come at one moment, the robot turns by one and drives by another.",
+        "concurrent-puts",
+        lambda: _Blended(_PUT_VELOCITY, "angular"),
     ),
 )
