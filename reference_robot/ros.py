@@ -38,12 +38,12 @@ except ImportError:  # a Jazzy from before its backport
 # message, 6 %.
 
 _IDLE_WAKE_S: Final = 0.5
-_CLOSING_S: Final = 8.0  # for the executor and its thread together
+_CLOSING_S: Final = 8.0  # for the executors and their threads together
 _HIGHEST_DOMAIN_ID: Final = 101  # higher ones put DDS's ports into Linux's ephemeral range
 
 
 class RosRuntime:
-    """One rclpy context with its nodes, spun in one thread.
+    """One rclpy context with its nodes, spun in one thread but for those that are made ``apart``.
 
     Args:
         domain_id: The ROS domain, 0 to 101; None takes ROS_DOMAIN_ID from the environment.
@@ -59,35 +59,45 @@ class RosRuntime:
         self.domain_id = domain
         self.context = Context()
         rclpy.init(args=[], context=self.context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-        self._executor = RosExecutor(context=self.context)
+        self._executors = [RosExecutor(context=self.context)]
         self._nodes: list[Node] = []
-        self._thread: threading.Thread | None = None
+        self._threads: list[threading.Thread] = []
         self._closing = threading.Event()
 
-    def create_node(self, name: str) -> Node:
-        """Make a node that this runtime spins and destroys."""
+    def create_node(self, name: str, *, apart: bool = False) -> Node:
+        """Make a node that this runtime spins and destroys; ``apart``, in a thread of its own.
+
+        What comes to a node apart, however much, does not wait in one queue with what the other nodes have to do.
+        """
         # Its parameter services would stand among the robot's own services.
         node = Node(name, context=self.context, start_parameter_services=False)
         self._nodes.append(node)
-        self._executor.add_node(node)
+        if apart:
+            self._executors.append(RosExecutor(context=self.context))
+        self._executors[-1 if apart else 0].add_node(node)
         return node
 
     def start(self) -> None:
-        """Run callbacks in a thread of its own from now on; a second call does nothing."""
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._spin, name="ros", daemon=True)
-            self._thread.start()
+        """Run callbacks in threads of their own from now on; a second call does nothing."""
+        if not self._threads:
+            self._threads = [
+                threading.Thread(target=self._spin, args=(executor,), name="ros", daemon=True)
+                for executor in self._executors
+            ]
+            for thread in self._threads:
+                thread.start()
 
     def close(self) -> None:
-        """Stop the thread, then tear down nodes and context; a second call does nothing."""
+        """Stop the threads, then tear down nodes and context; a second call does nothing."""
         if self._closing.is_set():
             return
         self._closing.set()
         # In this order, or the process may end in "terminate called without an active exception".
         give_up = time.monotonic() + _CLOSING_S
-        self._executor.shutdown(timeout_sec=_CLOSING_S)
-        if self._thread is not None:
-            self._thread.join(max(0.0, give_up - time.monotonic()))
+        for executor in self._executors:
+            executor.shutdown(timeout_sec=max(0.0, give_up - time.monotonic()))
+        for thread in self._threads:
+            thread.join(max(0.0, give_up - time.monotonic()))
         for node in reversed(self._nodes):
             # destroy_node leaves actions alone, and one that is left keeps its node on the graph.
             for entity in list(node.waitables):
@@ -104,11 +114,11 @@ class RosRuntime:
     ) -> None:
         self.close()
 
-    def _spin(self) -> None:
+    def _spin(self, executor: RosExecutor) -> None:
         # Not executor.spin(): EventsExecutor's own loop takes a whole core off the main thread.
         while not self._closing.is_set() and self.context.ok():
             try:
-                self._executor.spin_once(timeout_sec=_IDLE_WAKE_S)
+                executor.spin_once(timeout_sec=_IDLE_WAKE_S)
             except (ExternalShutdownException, ShutdownException):
                 return
             except Exception:  # noqa: BLE001 - one node's failing callback must not stop the robot's others

@@ -11,6 +11,7 @@ import stat
 import sys
 import threading
 from pathlib import Path
+from typing import Final
 
 import click
 
@@ -19,6 +20,9 @@ from reference_robot.names import load_names
 from reference_robot.ros import RosRuntime
 from reference_robot.simulation.realism import Realism
 from reference_robot.simulation.runner import Simulation
+
+_ENDS: Final = (signal.SIGINT, signal.SIGTERM)
+_NICENESS: Final = 5  # the web layer answers first: a real robot's motors do not wait for this machine
 
 
 @click.command()
@@ -35,16 +39,17 @@ def main(domain_id: int | None, time_scale: float, names_file: Path | None, *, r
         names = load_names(names_file)
     except TomlFileError as error:
         raise click.UsageError(str(error)) from error
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda _number, _frame: stop.set())
+    os.nice(_NICENESS)
+    # Blocked here and in all threads to come, and waited for below: one that a handler takes just before the main
+    # thread falls asleep would not wake it.
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS)
     if _stdin_is_pipe():
-        threading.Thread(target=_await_end_of_stdin, args=(stop,), daemon=True).start()
+        threading.Thread(target=_end_with_stdin, daemon=True).start()
     with RosRuntime(domain_id) as ros:
         Simulation(ros, names, time_scale, Realism(seed) if realistic else None)
         ros.start()
         click.echo("ready")
-        stop.wait()
+        signal.sigwait(_ENDS)
 
 
 def _stdin_is_pipe() -> bool:
@@ -54,11 +59,11 @@ def _stdin_is_pipe() -> bool:
         return False
 
 
-def _await_end_of_stdin(stop: threading.Event) -> None:
+def _end_with_stdin() -> None:
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             pass
-    stop.set()
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import itertools
 import json
 import math
 import time
+from operator import attrgetter
 from typing import Any, Final
 
 from action_msgs.msg import GoalStatus
@@ -17,22 +18,22 @@ from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header, String
 
 from conformance.contract.delivery import COFFEE, COURIER
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.names import RosNames
-from reference_robot.simulation.messages import LATCHED, stamped_pose
+from reference_robot.simulation.messages import MISSION_REPORTS, stamped_pose
 from reference_robot.simulation.missions import Missions, MissionState
 
 _CODES: Final = frozenset({COURIER, COFFEE})
 _REPORT_PERIOD_S: Final = 0.05  # at least this between two reports, however fast requests come
-_RETRY_PERIOD_S: Final = 0.2  # while navigation's action server is not there
+_RETRY_PERIOD_S: Final = 0.2  # after a refused leg, and while navigation's action server is not there
 
-# Reliable, so that no request is lost in ordinary use. The short history is the bound under a flood:
-# the oldest unread request gives way, and a publisher never waits for us.
-_REQUESTS: Final = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+# No request is lost: what has not been taken yet is kept, and a publisher that keeps all as well is held back.
+_REQUESTS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+_FIELDS_OF: Final = attrgetter(*DeliveryRequest._fields)
 
 # Latched as its publisher's, but deep enough that a goal's canceling is not overwritten by its end.
 _CURRENT_GOALS: Final = QoSProfile(
@@ -51,7 +52,7 @@ class Delivery:
         self._navigation_is_busy = False
         self._reported_at = -math.inf
         self._report_is_due = False
-        self._reports = node.create_publisher(String, names.topics.missions, LATCHED)
+        self._reports = node.create_publisher(String, names.topics.missions, MISSION_REPORTS)
         self._report_later = node.create_timer(_REPORT_PERIOD_S, self._report)
         self._begin_later = node.create_timer(_RETRY_PERIOD_S, self._begin)
         self._begin_later.cancel()
@@ -65,9 +66,9 @@ class Delivery:
                 f"ignored a request with the unknown message code {message.message_code}", throttle_duration_sec=1.0
             )
             return
-        request = DeliveryRequest(*(getattr(message, field) for field in DeliveryRequest._fields))
+        request = DeliveryRequest(*_FIELDS_OF(message))
         mission = self._missions.add(request, divmod(time.time_ns(), 1_000_000_000))
-        if mission.state is MissionState.QUEUED:
+        if mission.state is MissionState.QUEUED and self._begin_later.is_canceled():
             self._begin()
         self._changed()
 
@@ -101,7 +102,9 @@ class Delivery:
 
     def _next_leg(self) -> None:
         if not self._legs:
-            self._finish(MissionState.DONE)
+            self._missions.finish(MissionState.DONE)
+            self._changed()
+            self._begin()
             return
         header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frames.map)
         goal = NavigateToPose.Goal(pose=stamped_pose(self._legs.pop(0), header))
@@ -112,7 +115,10 @@ class Delivery:
         if handle.accepted:
             handle.get_result_async().add_done_callback(self._leg_ended)
         else:
-            self._finish(MissionState.FAILED)
+            # An impossible mission is planned in vain; a queue of them is not to keep the planner busy.
+            self._missions.finish(MissionState.FAILED, "the navigation refused a leg")
+            self._changed()
+            self._begin_later.reset()
 
     def _leg_ended(self, answer: Any) -> None:
         if answer.result().status == GoalStatus.STATUS_SUCCEEDED:
@@ -121,13 +127,8 @@ class Delivery:
         self._missions.abandon()
         self._changed()
 
-    def _finish(self, state: MissionState) -> None:
-        self._missions.finish(state)
-        self._changed()
-        self._begin()
-
     def _changed(self) -> None:
-        """Report the missions: at once, or when the last report is old enough."""
+        """Report what changed: at once, or when the last report is old enough."""
         if time.monotonic() - self._reported_at >= _REPORT_PERIOD_S:
             self._report()
         elif not self._report_is_due:
@@ -138,4 +139,10 @@ class Delivery:
         self._report_later.cancel()
         self._report_is_due = False
         self._reported_at = time.monotonic()
-        self._reports.publish(String(data=json.dumps([mission.plain() for mission in self._missions])))
+        missions = self._missions
+        told = {
+            "taken": missions.taken,
+            "dropped": missions.dropped,
+            "missions": [mission.plain() for mission in missions.changes()],
+        }
+        self._reports.publish(String(data=json.dumps(told)))

@@ -23,6 +23,11 @@ LATCHED: Final = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 
+# Each report tells what changed, so late subscribers get the last hundred.
+MISSION_REPORTS: Final = QoSProfile(
+    depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+
 
 class PoseError(ValueError):
     """A pose cannot be used; the message names the offending value."""

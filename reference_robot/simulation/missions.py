@@ -4,14 +4,14 @@ Pure state, apart from ROS. Overflow rule: when ``capacity`` missions wait, a ne
 """
 
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from operator import attrgetter
 from typing import Any, Final
 
 from reference_robot.deliveries import DeliveryRequest
 
-_REMEMBERED: Final = 100
+_REMEMBERED: Final = 100  # changes between two reports
 
 
 class MissionState(StrEnum):
@@ -24,13 +24,21 @@ class MissionState(StrEnum):
     DROPPED = "dropped"
 
 
+_ALIVE: Final = frozenset({MissionState.QUEUED, MissionState.ACTIVE})
+
+
 @dataclass(slots=True)
 class Mission:
-    """A request, when it was accepted (seconds and nanoseconds of ROS time), and its state."""
+    """A request, when it was accepted (seconds and nanoseconds of ROS time), its state, and the reason of a bad end.
+
+    ``number`` counts the requests from 1.
+    """
 
     request: DeliveryRequest
     accepted: tuple[int, int]
+    number: int
     state: MissionState = MissionState.QUEUED
+    reason: str = ""
 
     def stops(self) -> tuple[tuple[float, float], ...]:
         """Where the robot goes, in order: source, destination, depot."""
@@ -44,33 +52,46 @@ class Mission:
     def plain(self) -> dict[str, Any]:
         """Return JSON-ready values, as they stand on the topic of missions."""
         return {
+            "number": self.number,
             "request": self.request._asdict(),
             "state": self.state.value,
+            "reason": self.reason,
             "accepted": {"sec": self.accepted[0], "nanosec": self.accepted[1]},
         }
 
 
 class Missions:
-    """A queue of at most ``capacity`` missions, the one that drives, and a memory of the last hundred."""
+    """A queue of at most ``capacity`` missions, the one that drives, and those that changed last.
+
+    Attributes:
+        active: The mission that drives.
+        taken: How many requests there have been.
+        dropped: How many of them were dropped.
+    """
 
     def __init__(self, capacity: int = 20) -> None:
         self._capacity = capacity
         self._queue: deque[Mission] = deque()
-        self._newest_first: deque[Mission] = deque(maxlen=_REMEMBERED)
+        self._changed: dict[int, Mission] = {}
         self.active: Mission | None = None
+        self.taken = 0
+        self.dropped = 0
 
-    def __iter__(self) -> Iterator[Mission]:
-        """Iterate over the missions remembered, newest first."""
-        return iter(self._newest_first)
+    def changes(self) -> list[Mission]:
+        """Return the missions that changed since this was asked last: the hundred newest, and all that are alive."""
+        changed = sorted(self._changed.values(), key=attrgetter("number"), reverse=True)
+        self._changed.clear()
+        return changed
 
     def add(self, request: DeliveryRequest, accepted: tuple[int, int]) -> Mission:
         """Queue a request, or drop it when the queue is full."""
-        mission = Mission(request, accepted)
+        self.taken += 1
+        mission = Mission(request, accepted, self.taken)
         if len(self._queue) < self._capacity:
             self._queue.append(mission)
+            self._set(mission, MissionState.QUEUED)
         else:
-            mission.state = MissionState.DROPPED
-        self._newest_first.appendleft(mission)
+            self._drop(mission, f"{self._capacity} missions wait already")
         return mission
 
     def begin(self) -> Mission | None:
@@ -78,17 +99,35 @@ class Missions:
         if self.active is not None or not self._queue:
             return None
         self.active = self._queue.popleft()
-        self.active.state = MissionState.ACTIVE
+        self._set(self.active, MissionState.ACTIVE)
         return self.active
 
-    def finish(self, state: MissionState) -> None:
+    def finish(self, state: MissionState, reason: str = "") -> None:
         """End the active mission, done or failed."""
         if self.active is not None:
-            self.active.state = state
+            self._set(self.active, state, reason)
             self.active = None
 
     def abandon(self) -> None:
         """End the active mission as failed and drop all that wait: somebody wants the robot elsewhere."""
-        self.finish(MissionState.FAILED)
+        self.finish(MissionState.FAILED, "its goal was cancelled or displaced")
         while self._queue:
-            self._queue.popleft().state = MissionState.DROPPED
+            self._drop(self._queue.popleft(), "another goal was cancelled or displaced")
+
+    def _drop(self, mission: Mission, reason: str) -> None:
+        self.dropped += 1
+        self._set(mission, MissionState.DROPPED, reason)
+
+    def _set(self, mission: Mission, state: MissionState, reason: str = "") -> None:
+        mission.state, mission.reason = state, reason
+        self._changed.pop(mission.number, None)
+        self._changed[mission.number] = mission
+        if len(self._changed) > _REMEMBERED:
+            self._forget_one()
+
+    def _forget_one(self) -> None:
+        """Forget the oldest change of a mission that has ended: a flood must not hide those that wait or drive."""
+        for number, mission in self._changed.items():
+            if mission.state not in _ALIVE:
+                del self._changed[number]
+                return

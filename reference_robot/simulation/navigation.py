@@ -101,7 +101,7 @@ class Navigation:
             target = pose_of(goal.pose, self._names.frames)
             self._path = self._planner.plan(self._localisation.pose(), target)
         except (PlanError, PoseError) as error:
-            self._node.get_logger().info(f"refused a goal: {error}")
+            self._node.get_logger().info(f"refused a goal: {error}", throttle_duration_sec=1.0)
             # Told before the refusal goes out, so that whoever is refused can look up why.
             told = {"pose": plain(goal.pose), "reason": str(error)}
             self._rejections.publish(String(data=json.dumps(told)))

@@ -45,7 +45,7 @@ class Planning:
             start = self._start(request.start if request.start.header.frame_id else None)
             response.plan = self._plan(start, request.goal, request.tolerance)
         except (PlanError, PoseError) as error:
-            self._node.get_logger().info(f"no plan: {error}")
+            self._node.get_logger().info(f"no plan: {error}", throttle_duration_sec=1.0)
             response.plan = Path(header=self._header(request.goal.header.frame_id))
         return response
 

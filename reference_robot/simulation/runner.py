@@ -37,4 +37,4 @@ class Simulation:
         self.planning = Planning(navigation_node, names, planner, localisation)
         tolerances = NEAR_ENOUGH if realism else EXACT
         self.navigation = Navigation(navigation_node, names, planner, localisation, time_scale, tolerances)
-        self.delivery = Delivery(ros.create_node("delivery"), names)
+        self.delivery = Delivery(ros.create_node("delivery", apart=True), names)

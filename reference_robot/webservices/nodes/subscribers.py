@@ -1,5 +1,6 @@
 """RobotSubscribersNode: everything that the web services learn from ROS."""
 
+from collections import deque
 from functools import partial
 from typing import Final
 
@@ -15,6 +16,8 @@ from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 
 _LATCHED_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_MISSION_REPORTS: Final = 200
+_MISSIONS_QOS: Final = QoSProfile(depth=_MISSION_REPORTS, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NAVIGATION_PACKAGES: Final = frozenset({"nav_msgs", "nav2_msgs", "map_msgs", "slam_toolbox"})
 
 
@@ -26,7 +29,7 @@ class RobotSubscribersNode:
 
     Attributes:
         odometry: The odometry received last, None before the first.
-        missions: The JSON list of missions received last (see ``names.toml``), empty before the first.
+        mission_reports: The JSON of what changed in the missions (see ``names.toml``), oldest first, to be taken off.
         current_goal: The JSON of the goal that the robot follows, empty when it follows none.
         last_rejection: The JSON of the goal refused last, and why; empty before the first.
     """
@@ -34,12 +37,15 @@ class RobotSubscribersNode:
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self.node = ros.create_node("robot_subscribers")
         self.odometry: Odometry | None = None
-        self.missions = ""
+        self.mission_reports: deque[str] = deque(maxlen=_MISSION_REPORTS)
         self.current_goal = ""
         self.last_rejection = ""
         topics = names.topics
         self.node.create_subscription(Odometry, topics.odom, self._keep_odometry, qos_profile_sensor_data)
-        for told in ("missions", "current_goal", "last_rejection"):
+        self.node.create_subscription(
+            String, topics.missions, lambda report: self.mission_reports.append(report.data), _MISSIONS_QOS
+        )
+        for told in ("current_goal", "last_rejection"):
             keep = partial(self._keep_text, told)
             self.node.create_subscription(String, getattr(topics, told), keep, _LATCHED_QOS)
         self._planner_service = self.node.create_client(GetPlan, names.services.get_plan)

@@ -1,6 +1,5 @@
 """The delivery application as both interfaces see it: hand a request to ROS, remember it, tell what became of it."""
 
-import json
 import math
 import time
 from collections import deque
@@ -14,10 +13,11 @@ from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem, not_yet
+from reference_robot.webservices.robot.missions import MissionTable
 
 _CODES: Final = frozenset({COURIER, COFFEE})
 _REMEMBERED: Final = 100  # the contract asks for the last 50
-_STATES: Final = frozenset({"queued", "active", "done", "failed", "dropped"})
+_REPORTS: Final = 50  # on missions, that may wait to be read
 _NANOSECONDS: Final = 10**9
 
 
@@ -45,7 +45,8 @@ class Deliveries:
 
     def __init__(self, publishers: RobotPublishersNode, subscribers: RobotSubscribersNode) -> None:
         self._publishers = publishers
-        self._subscribers = subscribers
+        self._reports = subscribers.mission_reports
+        self._missions = MissionTable()
         self._message = DeliveryRequestMsg()  # filled anew for each request: publishing copies it
         self._accepted: deque[_Accepted] = deque(maxlen=_REMEMBERED)
 
@@ -58,6 +59,8 @@ class Deliveries:
                 listen are behind by thousands.
         """
         _require_usable(request)
+        if len(self._reports) > _REPORTS:
+            self._catch_up()
         if not self._publishers.delivery_is_served():
             raise not_yet("no delivery application listens on the robot")
         message = self._message
@@ -76,17 +79,24 @@ class Deliveries:
         self._accepted.append(_Accepted(request, at, interface))
 
     def listed(self) -> list[dict[str, Any]]:
-        """Return the requests accepted last, newest first, with the state that the application reports."""
-        missions = _missions(self._subscribers.missions)
-        return [
-            {
+        """Return the requests accepted last, newest first, with the state that the application reports, and why."""
+        self._catch_up()
+        find = self._missions.finder()
+        listed = []
+        for accepted in reversed(self._accepted):
+            mission = find(accepted.request, accepted.nanoseconds)
+            entry = {
                 "request": accepted.request._asdict(),
-                "state": _state(accepted, missions),
+                "state": mission.state,
                 "accepted": dict(zip(("sec", "nanosec"), divmod(accepted.nanoseconds, _NANOSECONDS), strict=True)),
                 "interface": accepted.interface,
             }
-            for accepted in reversed(self._accepted)
-        ]
+            listed.append(entry | {"reason": mission.reason} if mission.reason else entry)
+        return listed
+
+    def _catch_up(self) -> None:
+        while self._reports:
+            self._missions.note(self._reports.popleft())
 
 
 def _require_usable(request: DeliveryRequest) -> None:
@@ -97,30 +107,3 @@ def _require_usable(request: DeliveryRequest) -> None:
         for field, value in request._asdict().items():
             if not math.isfinite(value):
                 raise UnusableFieldError(field, "must be finite")
-
-
-def _state(accepted: _Accepted, missions: dict[DeliveryRequest, list[tuple[int, str]]]) -> str:
-    """Return the state of a request, and take its mission off the list.
-
-    A message carries no identity, so equal requests are told apart by order: the newest request takes the newest
-    mission that began after it. What the application has not reported (yet) is queued.
-    """
-    same = missions.get(accepted.request)
-    if same and same[0][0] >= accepted.nanoseconds:
-        return same.pop(0)[1]
-    return "queued"
-
-
-def _missions(report: str) -> dict[DeliveryRequest, list[tuple[int, str]]]:
-    """Return start (ns) and state of the reported missions by request, newest first; a report amiss counts as none."""
-    found: dict[DeliveryRequest, list[tuple[int, str]]] = {}
-    try:
-        for mission in json.loads(report or "[]"):
-            request = DeliveryRequest(**mission["request"])
-            accepted = mission["accepted"]
-            nanoseconds = int(accepted["sec"]) * _NANOSECONDS + int(accepted["nanosec"])
-            if mission["state"] in _STATES:
-                found.setdefault(request, []).append((nanoseconds, mission["state"]))
-    except (ValueError, TypeError, KeyError):
-        return {}
-    return found

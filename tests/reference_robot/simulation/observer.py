@@ -14,7 +14,7 @@ from rclpy.action import ActionClient
 from std_msgs.msg import String
 
 from conformance.contract.delivery import COORDINATES
-from reference_robot.simulation.messages import LATCHED, quaternion_of, yaw_of
+from reference_robot.simulation.messages import LATCHED, MISSION_REPORTS, quaternion_of, yaw_of
 
 _PATIENCE_S = 30.0
 
@@ -56,12 +56,11 @@ class Observer:
         node.create_subscription(
             Odometry, topics.odom, lambda message: self.odometry.append((time.monotonic(), message)), 50
         )
-        for topic, seen in (
-            (topics.current_goal, self.goals),
-            (topics.last_rejection, self.rejections),
-            (topics.missions, self.reports),
-        ):
+        for topic, seen in ((topics.current_goal, self.goals), (topics.last_rejection, self.rejections)):
             node.create_subscription(String, topic, lambda message, seen=seen: seen.append(message.data), LATCHED)
+        node.create_subscription(
+            String, topics.missions, lambda message: self.reports.append(message.data), MISSION_REPORTS
+        )
 
     def is_connected(self):
         return (
@@ -95,7 +94,15 @@ class Observer:
     @property
     def states(self):
         """States of the missions, oldest first."""
-        return [mission["state"] for mission in reversed(json.loads(self.reports[-1]))] if self.reports else []
+        return [mission["state"] for mission in self.missions]
+
+    @property
+    def missions(self):
+        """Missions as they were told last, oldest first."""
+        latest = {}
+        for report in map(json.loads, list(self.reports)):
+            latest |= {mission["number"]: mission for mission in report["missions"]}
+        return [latest[number] for number in sorted(latest)]
 
     def command(self, linear, angular=0.0):
         twist = Twist()

@@ -20,7 +20,7 @@ def test_the_papers_coffee_goes_source_destination_depot(robot):
     goals = {goal["goal_id"]: goal["pose"]["pose"]["position"] for goal in map(json.loads, filter(None, robot.goals))}
     assert [(position["x"], position["y"]) for position in goals.values()] == [SOURCE, DESTINATION, DEPOT]
     assert robot.is_at(*DEPOT)
-    (mission,) = json.loads(robot.reports[-1])
+    (mission,) = robot.missions
     assert mission["request"] == EXAMPLE | {"message_code": 4}
     assert any('"active"' in report for report in robot.reports)
 
@@ -41,6 +41,7 @@ def test_the_queue_is_bounded(robot):
     for _ in range(22):
         robot.request(*NEAR, code=3)
     until(lambda: robot.states == ["active", *["queued"] * 20, "dropped", "dropped"])
+    assert [mission["reason"] for mission in robot.missions[-2:]] == ["20 missions wait already"] * 2
 
 
 @FAST
@@ -57,6 +58,7 @@ def test_a_stop_outside_the_map_fails_its_mission_and_the_next_one_runs(robot):
     robot.request((float("nan"), 1.0), NEAR[1], NEAR[2])
     robot.request(*NEAR)
     until(lambda: robot.states == ["failed", "failed", "done"])
+    assert [mission["reason"] for mission in robot.missions] == ["the navigation refused a leg"] * 2 + [""]
 
 
 def test_a_cancel_from_outside_fails_the_mission_and_drops_the_queue(robot):

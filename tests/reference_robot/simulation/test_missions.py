@@ -22,11 +22,12 @@ def queued(count, **options):
 
 
 def states(missions):
-    return [mission.state.value for mission in missions]
+    """States of the missions that changed since this was asked last, newest first."""
+    return [mission.state.value for mission in missions.changes()]
 
 
 def test_the_stops_are_source_destination_depot():
-    assert Mission(DeliveryRequest(4, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (0, 0)).stops() == ((5, 6), (3, 4), (1, 2))
+    assert Mission(DeliveryRequest(4, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (0, 0), 1).stops() == ((5, 6), (3, 4), (1, 2))
 
 
 def test_missions_begin_in_the_order_they_came():
@@ -53,16 +54,18 @@ def test_abandoning_fails_the_active_mission_and_drops_the_rest():
 
 
 def test_a_mission_in_plain_values_is_what_the_topic_carries():
-    assert json.loads(json.dumps(Mission(request(1), (12, 34)).plain())) == {
+    assert json.loads(json.dumps(Mission(request(1), (12, 34), 7).plain())) == {
         "request": dict(zip(MESSAGE_FIELDS, (4, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), strict=True)),
         "state": "queued",
+        "number": 7,
+        "reason": "",
         "accepted": {"sec": 12, "nanosec": 34},
     }
 
 
 @given(st.lists(st.sampled_from(["add", "begin", "done", "failed", "abandon"]), max_size=200))
 def test_whatever_happens_the_bounds_hold(events):
-    missions = Missions(capacity=3)
+    missions, now = Missions(capacity=3), {}
     for number, event in enumerate(events):
         if event == "add":
             missions.add(request(number), (number, 0))
@@ -72,9 +75,22 @@ def test_whatever_happens_the_bounds_hold(events):
             missions.abandon()
         else:
             missions.finish(MissionState(event))
-        now = states(missions)
-        assert now.count("active") <= 1
-        assert now.count("queued") <= 3
-        assert len(now) <= 100
-        numbers = [mission.accepted[0] for mission in missions]
-        assert numbers == sorted(numbers, reverse=True)
+        for mission in missions.changes():
+            now[mission.number] = mission.state.value
+        assert list(now.values()).count("active") <= 1
+        assert list(now.values()).count("queued") <= 3
+        assert list(now.values()).count("dropped") == missions.dropped
+        assert len(now) == missions.taken
+
+
+def test_a_flood_hides_no_mission_that_waits_or_drives():
+    missions = Missions(capacity=2)
+    missions.add(request(), (0, 0))
+    missions.begin()
+    for number in range(500):
+        missions.add(request(number), (number, 0))
+    told = states(missions)
+    assert len(told) == 100
+    assert told[-3:] == ["queued", "queued", "active"]
+    assert (missions.taken, missions.dropped) == (501, 498)
+    assert states(missions) == []
