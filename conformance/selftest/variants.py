@@ -1,24 +1,30 @@
 """Circumstances in which a good robot stays a good one: what stands between it and its clients in the field."""
 
+import contextlib
 import json
 import shutil
 import ssl
 import subprocess
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass, field
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
 from conformance.selftest.link import LINKS, Link
 from conformance.selftest.messages import Change, Forward, Request, Response, unchanged
-from conformance.selftest.mutants.changes import parsed, problem
+from conformance.selftest.mutants.changes import JSON, parsed, problem, soap
+from conformance.selftest.wire import IncompleteMessageError
 
 _PREFIX = "/r2d2/api"
 _TOKEN = "open-sesame"  # noqa: S105 - of a robot that lives for seconds, on loopback
 _DELAY_S = 0.3
 _CEILING = 100.0
+_MESSAGE_S, _FORGOTTEN_S = 0.05, 2.0
 
 
 @dataclass(frozen=True)
@@ -119,6 +125,45 @@ class _Ceiling:
         return forward(request)
 
 
+class _Behind:
+    """SOAP speaks of pose and velocity as they were some messages ago, as a process of its own may."""
+
+    def __init__(self) -> None:
+        self._states = soap("GetPose", "GetVelocity")
+        self._known: dict[bytes, deque[Response]] = {}
+        self._asked = 0.0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if not self._states(request) or request.media_type != "text/xml":
+            return forward(request)
+        self._asked = time.monotonic()
+        if request.body not in self._known:
+            self._known[request.body] = deque([forward(request)], maxlen=2)
+            threading.Thread(target=self._follow, args=(request, forward), daemon=True).start()
+        return deepcopy(self._known[request.body][0])
+
+    def _follow(self, request: Request, forward: Forward) -> None:
+        """Read the state again and again, as long as somebody asks for it."""
+        with contextlib.suppress(OSError, IncompleteMessageError):
+            while time.monotonic() - self._asked < _FORGOTTEN_S:
+                time.sleep(_MESSAGE_S)
+                self._known[request.body].append(forward(request))
+        del self._known[request.body]
+
+
+def _uptime(request: Request, forward: Forward) -> Response:
+    """Every JSON object tells for how many seconds the robot has been up."""
+    response = forward(request)
+    if request.side != "rest" or response.status != HTTPStatus.OK or response.media_type != JSON:
+        return response
+    value = parsed(response.body)
+    if request.method == "HEAD":
+        response.drop("Content-Length")
+    elif isinstance(value, dict) and "openapi" not in value:
+        response.body = json.dumps({**value, "uptime": int(time.monotonic())}).encode()
+    return response
+
+
 VARIANTS = (
     *(Variant(link.name, link.says, link=link) for link in LINKS),
     # Whose velocities hold long enough to be read at such a pace.
@@ -128,5 +173,7 @@ VARIANTS = (
     Variant("tls", "HTTPS with a certificate of the robot's own", tls=True),
     Variant("token", "a bearer token is wanted", lambda: _guarded, token=_TOKEN),
     Variant("ipv6", "the robot is at [::1]", host="::1"),
+    Variant("behind", "SOAP is a message or two behind REST", _Behind),
+    Variant("uptime", "JSON objects have an uptime that ticks", lambda: _uptime),
     Variant("ceiling", "100 requests a second, and no more", _Ceiling, endpoints={"request_rate": _CEILING * 0.8}),
 )

@@ -28,6 +28,8 @@ _SLACK: Final = Slack()
 _SAME: Final = Slack(0.0, 0.0)
 # More than any tolerance that is asked for here, m.
 _END_OFF: Final = 0.3
+# Odometry is no rarer than that where nothing is declared, Hz.
+_SELDOM_HZ: Final = 5.0
 _STATES: Final[dict[str, tuple[str, str, Shape]]] = {
     "pose": (POSE, "GetPose", ODOMETRY),
     "velocity": (VELOCITY, "GetVelocity", TWIST),
@@ -43,25 +45,44 @@ def _answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
 
 
 def _compare(robot: Robot, subscribers: SoapService, judge: Judge, name: str) -> None:
-    """Read a state over REST, over SOAP and over REST again: SOAP's must lie between the other two."""
+    """Compare a state as REST and SOAP give it; asked again where one may be an odometry message behind the other."""
+    path, _, _ = _STATES[name]
+    if f"equivalence/{name}" in judge.refuted():
+        return  # it costs three tries each time
+    pause_s = 1 / (robot.limits.odometry_hz or _SELDOM_HZ)
+    for apart_s in (0.0, pause_s, pause_s):
+        problem, exchange = _state_difference(robot, subscribers, name, apart_s)
+        if not problem:
+            break
+    if problem is not None:
+        judge.check(
+            f"equivalence/{name}",
+            not problem,
+            exchange,
+            f"what GET {path} gives just before and after",
+            found=problem,
+            cause=problem.split(" is ")[0].split("[")[0],
+        )
+
+
+def _state_difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float) -> tuple[str | None, Exchange]:
+    """Read a state over REST, over SOAP and over REST again, so far apart: in what SOAP's lies not between the others.
+
+    None where REST gives none: judged by those who observe it.
+    """
     path, operation, shape = _STATES[name]
     before, _ = robot.read(path, shape)
+    time.sleep(apart_s)
     exchange = ask(subscribers, operation)
     between, problem = _answered(exchange, shape)
+    time.sleep(apart_s)
     after, _ = robot.read(path, shape)
     if before is None or after is None:
-        return  # judged by those who observe REST
+        return None, exchange
     problem = problem or disagreement(before, between, after, _SLACK)
     if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
         problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"
-    judge.check(
-        f"equivalence/{name}",
-        not problem,
-        exchange,
-        f"what GET {path} gives just before and after",
-        found=problem,
-        cause=problem.split(" is ")[0].split("[")[0],
-    )
+    return problem, exchange
 
 
 @pytest.mark.phase("reading")

@@ -16,8 +16,8 @@ from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
 _TURNS = 3
-# How long a suspect is left alone to see whether it changes by itself, s.
-_ALONE_S = 0.6
+# How long a suspect is left alone to see whether it changes by itself, s: longer than an uptime's second.
+_ALONE_S = 1.3
 # How long what was put is watched, s: longer than a cancelled goal takes to end.
 _WATCHED_S = 0.15
 
