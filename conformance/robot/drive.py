@@ -165,7 +165,7 @@ class Drive:
             wanted: velocity.
             factor: how much of the tolerance it may be off.
             part: the components that count.
-            until: from then on what is seen says nothing any more, s of the monotonic clock.
+            until: from then on only that it is what was wanted says anything, s of the monotonic clock.
 
         Returns:
             Whether it is (None: it was too late to say), and what was seen.
@@ -175,7 +175,9 @@ class Drive:
         while True:
             self.look()
             turns, now = self.trace.turns[first:], time.monotonic()
-            holds = None if now > until else windows.verdict(self.robot.limits, turns, wanted, factor, part)
+            holds = windows.verdict(self.robot.limits, turns, wanted, factor, part)
+            if not holds and now > until:
+                holds = None
             if holds is not None or now > min(until, last):
                 seen = windows.velocities(windows.newest(turns))
                 return holds, str(windows.middle(seen)) if seen else ""
