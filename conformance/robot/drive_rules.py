@@ -60,19 +60,21 @@ def _other_number(command: Command, value: Any) -> str:
 def agreement(trace: Trace, limits: Limits) -> list[Judgement]:
     """Whether velocity and linear part agree with the odometry: their medians over a while in which it was steady.
 
-    Only where no command was sent from that while's beginning on.
+    Only where no command was sent from that while's beginning on. Where answers take long it is as long as several
+    turns take.
     """
-    if not trace.turns:
+    odometry = trace.turns[-SEVERAL].odometry if len(trace.turns) >= SEVERAL else None
+    if odometry is None:
         return []
-    since = trace.turns[-1].at - _STEADY_S
+    since = min(trace.turns[-1].at - _STEADY_S, odometry.sent)
     window = list(itertools.takewhile(lambda turn: turn.at >= since, reversed(trace.turns)))
-    odometry = [turn.odometry.velocity for turn in window if turn.odometry is not None]
+    steady = [turn.odometry.velocity for turn in window if turn.odometry is not None]
     count = len(newest(window[::-1], len(window)))
-    before = len(trace.turns) > len(window)
-    if trace.sent > since or not before or count < SEVERAL or len(odometry) < len(window):
+    lasted = len(trace.turns) > len(window) or since == odometry.sent
+    if trace.sent > since or not lasted or count < SEVERAL or len(steady) < len(window):
         return []
-    wanted = middle(odometry)
-    if not all(is_near(limits, one, wanted, 0.5) for one in odometry):
+    wanted = middle(steady)
+    if not all(is_near(limits, one, wanted, 0.5) for one in steady):
         return []
     found = []
     turn = window[0]

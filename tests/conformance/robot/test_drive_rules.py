@@ -49,6 +49,15 @@ def test_readings_that_agree_are_judged_and_hold():
     assert [one.holds for one in agreement(driven(), _LIMITS)] == [True, True]
 
 
+def test_where_answers_take_long_three_turns_without_a_command_are_judged():
+    trace, straight = Trace(0.0).commanded(command()), Velocity(*_AHEAD[:3])
+    for index in range(3):
+        assert agreement(trace, _LIMITS) == []
+        trace = trace.looked(turn(0.1 + 0.2 * index, _AHEAD, _AHEAD, straight))
+    assert [one.holds for one in agreement(trace, _LIMITS)] == [True, True]
+    assert agreement(trace.commanded(command(at=0.2)), _LIMITS) == []
+
+
 @pytest.mark.parametrize(
     ("velocity", "linear", "found"),
     [
