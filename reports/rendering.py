@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope, statement_in
 from reports.attestation.statement import RESULT_SUBJECT, sha256
 from reports.certificate.junit import junit
-from reports.certificate.page import Seal, certificate_html, certificate_markdown
+from reports.certificate.page import certificate_html, certificate_markdown, certificate_print
+from reports.certificate.seal import Seal
 from reports.errors import ReportError, ResultMissingError
 from reports.pages.page import write_pages
 from reports.reading import LATENCY_NAME, RESULT_NAME, read_latency, read_result
@@ -22,10 +23,10 @@ if TYPE_CHECKING:
 def render(directory: Path, notary: Notary | None = None) -> list[Path]:
     """Write what belongs to the result files in a directory, beside them.
 
-    `result.json` gives certificate.html, certificate.md and junit.xml, and with a notary the signed
-    certificate.intoto.json; `latency.json` gives latency.html and latency.md. Each file is replaced at once, so that
-    a reader never sees half of one. Where one of the two results is broken, the other's pages are written before the
-    error is raised.
+    `result.json` gives certificate.html, certificate.md and junit.xml, where it is signed certificate-print.html too,
+    and with a notary the signed certificate.intoto.json; `latency.json` gives latency.html and latency.md. Each file
+    is replaced at once, so that a reader never sees half of one. Where one of the two results is broken, the other's
+    pages are written before the error is raised.
 
     Returns:
         The files written.
@@ -61,13 +62,15 @@ def render(directory: Path, notary: Notary | None = None) -> list[Path]:
 def _conformance(path: Path, notary: Notary | None) -> dict[str, str]:
     document = read_result(path)
     digest = sha256(path.read_bytes())
-    page = certificate_html(document, Seal(digest, notary.key if notary else _signed_by(path, digest)))
+    seal = Seal(digest, notary.key if notary else _signed_by(path, digest))
     pages = {
-        "certificate.html": page,
+        "certificate.html": certificate_html(document, seal),
         "certificate.md": certificate_markdown(document),
         "junit.xml": junit(document).decode(),
     }
-    return {**pages, ENVELOPE_NAME: notary.envelope(path, document, page)} if notary else pages
+    if seal.key:
+        pages["certificate-print.html"] = certificate_print(document, seal)
+    return {**pages, ENVELOPE_NAME: notary.envelope(path, document, pages)} if notary else pages
 
 
 def _signed_by(path: Path, digest: str) -> str | None:

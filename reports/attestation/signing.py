@@ -1,4 +1,4 @@
-"""Signing: a result and the page that was written from it in, an envelope out."""
+"""Signing: a result and the pages that were written from it in, an envelope out."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,14 +22,14 @@ class Notary:
         self._signer = signer_of(path)
         self.key = self._signer.public_key.keyid
 
-    def envelope(self, path: Path, result: Mapping[str, Any], page: str) -> str:
-        """The envelope for a result file and its page.
+    def envelope(self, path: Path, result: Mapping[str, Any], pages: Mapping[str, str]) -> str:
+        """The envelope for a result file and its pages.
 
         Raises:
             ResultInvalidError: the result contradicts itself, as one that was edited may.
         """
         _agree(path, result)
-        return seal(statement_of(result, path.read_bytes(), page.encode()), self._signer)
+        return seal(statement_of(result, path.read_bytes(), pages), self._signer)
 
 
 def _agree(path: Path, result: Mapping[str, Any]) -> None:

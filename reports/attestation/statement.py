@@ -19,7 +19,7 @@ PREDICATE_TYPE = "https://in-toto.io/attestation/svr/v0.2"
 PROPERTY = "ROAAS_CLASS_"
 """What the name of a class is prefixed with among the verified properties."""
 RESULT_SUBJECT = "result.json"
-PAGE_SUBJECT = "certificate.html"
+PAGE_SUBJECTS = ("certificate.html", "certificate-print.html")
 STATEMENT_SUBJECT = "statement"
 CONTRACT_SUBJECT = "contract/"
 """What the name of a file of the contract is prefixed with among the subjects."""
@@ -128,21 +128,20 @@ class Statement(msgspec.Struct, frozen=True, rename="camel"):
         return next((item.sha256 for item in self.subject if item.name == name), None)
 
 
-def statement_of(result: Mapping[str, Any], octets: bytes, page: bytes | None) -> Statement:
+def statement_of(result: Mapping[str, Any], octets: bytes, pages: Mapping[str, str]) -> Statement:
     """Put together what is to be signed.
 
     Args:
         result: a valid `roaas-result/1` document.
         octets: the file that it was read from.
-        page: the certificate that was written from it, where there is one.
+        pages: the certificate that was written from it, by the names of its files.
     """
     digests = result.get("digests") or {}
     contract = [
         _subject(f"{CONTRACT_SUBJECT}{name}", digest) for name, digest in sorted(digests.get("contract", {}).items())
     ]
     subjects = [Subject(RESULT_SUBJECT, {"sha256": sha256(octets)})]
-    if page is not None:
-        subjects.append(Subject(PAGE_SUBJECT, {"sha256": sha256(page)}))
+    subjects += [Subject(name, {"sha256": sha256(pages[name].encode())}) for name in PAGE_SUBJECTS]
     if digests.get("statement"):
         subjects.append(_subject(STATEMENT_SUBJECT, digests["statement"]))
     run = _run(result)

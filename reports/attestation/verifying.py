@@ -9,7 +9,7 @@ from securesystemslib.signer import Key
 
 from reports.attestation.policy import Known, Point, Policy, judge
 from reports.attestation.signature import unseal
-from reports.attestation.statement import PAGE_SUBJECT, RESULT_SUBJECT, Statement, sha256
+from reports.attestation.statement import PAGE_SUBJECTS, RESULT_SUBJECT, Statement, sha256
 from reports.errors import ResultUnreadableError
 
 PROVED = (
@@ -50,10 +50,10 @@ def verify(
 
 
 def _files(statement: Statement, directory: Path) -> Iterator[Point]:
-    """Whether result.json, and the page where there is one, are those that were signed."""
-    for name in (RESULT_SUBJECT, PAGE_SUBJECT):
+    """Whether result.json, and the pages that are there, are those that were signed."""
+    for name in (RESULT_SUBJECT, *PAGE_SUBJECTS):
         path = directory / name
-        if name == PAGE_SUBJECT and not path.exists():
+        if name in PAGE_SUBJECTS and not path.exists():
             continue
         try:
             digest = sha256(path.read_bytes())

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from reports.certificate.seal import Seal
 from reports.pages.page import html_page, markdown_page
 
 SHOWN_FAILURES = 5
@@ -193,22 +194,14 @@ def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
         yield Untested(reason, tuple(requirements))
 
 
-@dataclass(frozen=True, slots=True)
-class Seal:
-    """What the page is checked by.
-
-    Attributes:
-        result: SHA-256 of result.json, in hexadecimal.
-        key: fingerprint of the key that signed it, or None where none did.
-    """
-
-    result: str
-    key: str | None = None
-
-
 def certificate_html(result: Mapping[str, Any], seal: Seal | None = None) -> str:
     """The certificate as one HTML file."""
     return html_page("certificate.html.j2", seal=seal, **_values(result))
+
+
+def certificate_print(result: Mapping[str, Any], seal: Seal) -> str:
+    """A signed certificate's first page alone, for a wall or a folder: one sheet of A4."""
+    return html_page("certificate-print.html.j2", seal=seal, **_values(result))
 
 
 def certificate_markdown(result: Mapping[str, Any]) -> str:

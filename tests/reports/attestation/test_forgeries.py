@@ -123,8 +123,9 @@ def nothing(_):
 # Signed by the vendor's key, each is genuine, and not what was asked for.
 RESULTS = [
     ("edited page", edited("certificate.html"), {}, {"certificate.html"}),
+    ("edited sheet", edited("certificate-print.html"), {}, {"certificate-print.html"}),
     ("edited result", edited("result.json"), {}, {"result.json"}),
-    ("beside another result", other_envelope, {}, {"result.json", "certificate.html"}),
+    ("beside another result", other_envelope, {}, {"result.json", "certificate.html", "certificate-print.html"}),
     ("another robot", nothing, {"robot": "Courier 8"}, {"robot"}),
     ("another vendor", nothing, {"vendor": "Somebody"}, {"vendor"}),
     ("old firmware", signed_with(statement__robot__version="1.0"), {"firmware": "2.4.1"}, {"firmware"}),

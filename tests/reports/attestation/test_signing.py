@@ -1,8 +1,11 @@
 """Keys, signatures and the commands: what is written, what openssl makes of it, what is said."""
 
 import base64
+import hashlib
 import json
+import re
 import resource
+import shutil
 import subprocess
 import sys
 
@@ -11,6 +14,7 @@ from click.testing import CliRunner
 
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key, signer_of
 from reports.attestation.policy import Known, Policy, read_policy
+from reports.certificate.seal import Seal
 from reports.cli.attestation import keygen, verify
 from reports.cli.signing import sign
 from reports.errors import KeyUnusableError, PolicyUnusableError, ResultInvalidError
@@ -91,7 +95,13 @@ def test_keys_are_not_taken_for_one_another(tmp_path):
 
 def test_subjects_are_the_files_that_the_run_was_made_with(desk):
     subjects = {item["name"]: item["digest"]["sha256"] for item in json.loads(desk.payload)["subject"]}
-    assert list(subjects) == ["result.json", "certificate.html", "statement", "contract/openapi.yaml"]
+    assert list(subjects) == [
+        "result.json",
+        "certificate.html",
+        "certificate-print.html",
+        "statement",
+        "contract/openapi.yaml",
+    ]
     assert subjects["statement"] == "1" * 64
     done = subprocess.run(["sha256sum", desk.folder / "result.json"], capture_output=True, text=True, check=True)
     assert done.stdout.split()[0] == subjects["result.json"]
@@ -130,6 +140,28 @@ def test_the_page_says_whose_signature_it_bears_and_rendering_keeps_it(desk):
     (desk.folder / "result.json").write_text(json.dumps(desk.result | {"seed": 1}))
     render(desk.folder)
     assert desk.notary.key not in (desk.folder / "certificate.html").read_text(), "signed was another result"
+
+
+def test_the_sheet_for_print_shows_both_fingerprints(desk):
+    sheet = (desk.folder / "certificate-print.html").read_text()
+    assert f"sha256:{desk.notary.key}" in sheet
+    digest = hashlib.sha256((desk.folder / "result.json").read_bytes()).hexdigest()
+    assert f"sha256:{digest}" in sheet
+    assert Seal(digest, desk.notary.key).code in sheet
+    assert not re.search(r"(src|href)=.(https?:)?//", sheet)
+
+
+def test_the_sheet_is_one_page(desk, tmp_path):
+    """Also with all classes and long names."""
+    names = {f"class-{number}": "pass" for number in range(12)}
+    desk.sign(classes=names, requirements=[], statement__robot__name="A long name of a robot " * 9)
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    assert browser, "the pages' tests need a Chromium"
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    command += ["--no-first-run", f"--user-data-dir={tmp_path / 'profile'}", "--no-pdf-header-footer"]
+    command += [f"--print-to-pdf={tmp_path / 'sheet.pdf'}", (desk.folder / "certificate-print.html").as_uri()]
+    subprocess.run(command, capture_output=True, check=True, timeout=120)
+    assert len(re.findall(rb"/Type\s*/Page\b", (tmp_path / "sheet.pdf").read_bytes())) == 1
 
 
 def test_commands_from_key_to_verdict(desk, tmp_path):
