@@ -13,6 +13,7 @@ import pytest
 
 from conformance.contract.exit_codes import OF_VERDICT, ExitCode
 from conformance.engine.checks_plugin import ChecksPlugin
+from conformance.engine.intermittent import look_again
 from conformance.engine.interruption import remembered
 from conformance.engine.progress import Progress
 from conformance.engine.result import result_document, write_result
@@ -72,6 +73,8 @@ def certify(
             reached = robot.reached
             if reached:
                 run.interrupted |= _run_checks(robot, progress, remarks)
+                if not (run.interrupted or run.aborted):
+                    look_again(run, robot.connection)
             else:
                 run.aborted = "the robot could not be reached: " + "; ".join(
                     f"{name}: {why}" for name, why in run.unreachable.items()

@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 from conformance.engine.sequence import read_request
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Unanswered
+from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Response, Unanswered
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -85,7 +85,7 @@ def replay(id_: str, failure: Mapping[str, Any], connection: Connection) -> Repl
     for item, request in zip(sequence, requests, strict=True):
         due = began + float(item["at_s"])
         time.sleep(min(max(0.0, due - time.monotonic()), _LONGEST_PAUSE_S))
-        attempt = _send(request, connection)
+        attempt = send_again(request, connection)
         if isinstance(attempt, Unanswered) and attempt.kind is NoAnswer.REFUSED:
             return Replayed(id_, message, Outcome.UNREACHABLE, attempt.problem)
         came.append(attempt)
@@ -93,7 +93,8 @@ def replay(id_: str, failure: Mapping[str, Any], connection: Connection) -> Repl
     return Replayed(id_, message, outcome, came[-1].came, len(requests))
 
 
-def _send(request: Request, connection: Connection) -> Attempt:
+def send_again(request: Request, connection: Connection) -> Attempt:
+    """Send a request as it was sent, over a connection of its own, and take what comes."""
     where = urlsplit(request.url)
     with closing(HttpClient(f"{where.scheme}://{where.netloc}", connection)) as client:
         try:
@@ -118,11 +119,15 @@ def _same(recorded: Mapping[str, Any], came: Attempt) -> bool:
     """Whether an answer is what was found: none, or one of the same status, media type and kind of content."""
     if not isinstance(came, Exchange):
         return recorded["status"] is None
-    response = came.response
-    if recorded["status"] != response.status:
+    fields = tuple((name, str(value)) for name, value in recorded["headers"].items())
+    before = Response(recorded["status"] or 0, fields, (recorded["body"] or "").encode(), 0.0)
+    return is_same(before, came)
+
+
+def is_same(before: Response, came: Attempt) -> bool:
+    """Whether an answer has the status and the media type of another one, and content where that has some."""
+    if not isinstance(came, Exchange):
         return False
-    before = {name.lower(): value for name, value in recorded["headers"].items()}
-    media_type = str(before.get("content-type", "")).split(";", 1)[0].strip().lower()
-    if media_type != response.media_type:
-        return False
-    return bool(recorded["body"]) == bool(response.body)
+    now = came.response
+    same_kind = (before.status, before.media_type) == (now.status, now.media_type)
+    return same_kind and bool(before.body) == bool(now.body)

@@ -148,11 +148,12 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
 
 def _failure(finding: Finding) -> dict[str, Any]:
     return {
-        "message": finding.message,
+        "message": finding.told,
         "expected": finding.expected,
         "seen": finding.seen,
         "request": _request(finding.exchange) if finding.exchange else None,
         "response": _response(finding.exchange) if finding.exchange else None,
+        **({"again": finding.again._asdict()} if finding.again else {}),
         "sequence": written(finding.sequence),
     }
 

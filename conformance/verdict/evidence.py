@@ -30,6 +30,13 @@ class Sent(NamedTuple):
     request: Request
 
 
+class Again(NamedTuple):
+    """How often a failure came back when its request was sent again."""
+
+    came_back: int
+    sent: int
+
+
 @dataclass
 class Finding:
     """One cause for which a requirement is not met.
@@ -40,6 +47,7 @@ class Finding:
         exchange: the smallest failing request with what became of it, or None where none was sent.
         seen: how often it was found.
         sequence: the requests of its check up to it, so that they can be sent again.
+        again: how often it came back; None: it was not tried again.
     """
 
     message: str
@@ -47,6 +55,14 @@ class Finding:
     exchange: Attempt | None
     seen: int = 1
     sequence: tuple[Sent, ...] = ()
+    again: Again | None = None
+
+    @property
+    def told(self) -> str:
+        """What was found; of what does not come back every time, also how often it does."""
+        if self.again is None or self.again.came_back == self.again.sent:
+            return self.message
+        return f"{self.message} (intermittent: it came back {self.again.came_back} of {self.again.sent} times)"
 
 
 @dataclass
@@ -70,6 +86,11 @@ class Evidence:
     notes: list[str] = field(default_factory=list)
     checks: set[str] = field(default_factory=set)
     unclaimed: str = ""
+
+    @property
+    def failures(self) -> int:
+        """How many cases failed."""
+        return sum(finding.seen for finding in self.findings.values())
 
 
 class Judge:
@@ -188,11 +209,7 @@ class Judge:
 
     def refuted(self) -> dict[str, int]:
         """How many failures each requirement that has any has seen so far."""
-        return {
-            id_: sum(finding.seen for finding in evidence.findings.values())
-            for id_, evidence in self.evidence.items()
-            if evidence.findings
-        }
+        return {id_: evidence.failures for id_, evidence in self.evidence.items() if evidence.findings}
 
     def counts(self, ids: Iterable[str]) -> dict[str, int]:
         """How many cases each of the requirements has."""

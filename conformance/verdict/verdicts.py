@@ -107,7 +107,7 @@ def verdict_of(
     if evidence.findings:
         first = next(iter(evidence.findings.values()))
         more = f" (and {len(evidence.findings) - 1} more)" if len(evidence.findings) > 1 else ""
-        reason = f"{first.expected}; found: {first.message}{more}"
+        reason = f"{first.expected}; found: {first.told}{more}"
         value = {Level.MUST: Value.FAIL, Level.SHOULD: Value.WARN}.get(requirement.level)
         return verdict(value, reason) if value else verdict(Value.PASS, f"not so, as it may be: {reason}")
     for value, reasons in (
