@@ -11,6 +11,7 @@ from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
 from conformance.documents.writing import json_text, text_of, xml_bytes
 from conformance.rest.interface import RestInterface
+from conformance.rest.validity import require_valid
 from conformance.transport.exchange import Exchange
 
 JSON = "application/json"
@@ -88,7 +89,16 @@ def example_call(api: RestInterface, operation: Operation, media_type: str = JSO
         api: the robot's REST interface.
         operation: which.
         media_type: of the body, where the operation takes one.
+
+    Raises:
+        HarnessError: what was made is not valid by the contract.
     """
+    call = _example(api, operation, media_type)
+    require_valid(api.run.contract, operation.method, call.path, call.media_type, call.body)
+    return call
+
+
+def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
     given: dict[str, Any] = {}
     for item in operation.parameters:
         if item.where in {"path", "query"} and (item.required or item.examples):

@@ -10,6 +10,7 @@ from conformance.documents.json_schema import Schema, kind_of, shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, Parameter, is_json, is_normal, is_xml, matching
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
+from conformance.verdict.evidence import HarnessError
 
 VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
 # The contract's grammar of numbers in paths and queries (fine print).
@@ -64,6 +65,17 @@ def validity(contract: Contract, method: str, target: str, media_type: str, body
             if verdict == wanted:
                 return Validity(verdict, operation, requirement, why)
     return Validity(VALID, operation)
+
+
+def require_valid(contract: Contract, method: str, target: str, media_type: str = "", body: bytes = b"") -> None:
+    """See that a request which is to be sent as a valid one is not invalid by the contract.
+
+    Raises:
+        HarnessError: it is; the message says why.
+    """
+    said = validity(contract, method, target, media_type, body)
+    if said.verdict == INVALID:
+        raise HarnessError(f"{method} {target[:200]} was made as a valid request, and is none: {said.why}")
 
 
 _Said = tuple[str, str, str]

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 from conformance.documents.wsdl import Operation
+from conformance.documents.xml import parse
 from conformance.documents.xml_names import XSD, XSI, clark, namespace
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS, bounds
@@ -15,6 +16,7 @@ from conformance.documents.xsd_shapes import Element
 from conformance.soap.calls import call
 from conformance.soap.messages import ordinary, simple_leaves, with_text
 from conformance.soap.service import SoapService
+from conformance.verdict.evidence import HarnessError
 
 # Whole numbers tried where a contract takes only some, such as codes.
 _NUMBERS: Final = (0, 1, 2, 3, 4, 5)
@@ -26,6 +28,7 @@ def example(service: SoapService, operation: Operation) -> Node | None:
     Raises:
         NoAnswerError: no HTTP response came.
         DescriptionError: the contract cannot be used.
+        HarnessError: none of those made is valid by the contract.
     """
     if operation.name not in service.examples:
         service.examples[operation.name] = _found(service, operation)
@@ -37,11 +40,19 @@ def _found(service: SoapService, operation: Operation) -> Node | None:
     if declared is None:
         return None
     tried: set[bytes] = set()
+    faults: list[str] = []
     for candidate in candidates(service, operation, declared):
         document = candidate.written()
-        if document not in tried and call(service, candidate).accepted:
-            return candidate
+        if document in tried:
+            continue
         tried.add(document)
+        fault = service.contract.types.invalid(parse(document))
+        if fault:
+            faults.append(fault)
+        elif call(service, candidate).accepted:
+            return candidate
+    if len(faults) == len(tried):
+        raise HarnessError(f"no message made for {operation.name} is valid: {faults[-1]}")
     return None
 
 

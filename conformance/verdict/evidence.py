@@ -23,6 +23,13 @@ class RefutedError(AssertionError):
     """A property does not hold: tells Hypothesis to look for a smaller case. The judge has the evidence already."""
 
 
+class HarnessError(Exception):
+    """The suite made what the contract does not allow, and was about to send it as valid: never the robot's failure.
+
+    What a check was to judge is in error then, and the run ends with 4 unless something else failed.
+    """
+
+
 class Sent(NamedTuple):
     """A request, and when it was answered or given up, s on the monotonic clock."""
 

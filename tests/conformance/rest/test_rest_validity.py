@@ -1,7 +1,13 @@
 import pytest
 
 from conformance.contract.files import Contract
+from conformance.documents.openapi import operations_of
+from conformance.rest.calls import example_call
+from conformance.rest.interface import RestInterface
 from conformance.rest.validity import validity
+from conformance.transport.client import Connection, HttpClient
+from conformance.verdict.evidence import HarnessError
+from conformance.verdict.run import Run
 
 CONTRACT = Contract.load()
 TWIST = b'{"linear": {"x": 0.1, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0}}'
@@ -46,3 +52,19 @@ DELIVERY = "/robot/app/delivery/{}/depot_x/{}/depot_y/1/dest_x/1/dest_y/1/source
 def test_requests_are_judged_by_what_they_are_on_the_wire(method, target, media_type, body, verdict, requirement):
     found = validity(CONTRACT, method, target, media_type, body)
     assert (found.verdict, found.requirement) == (verdict, requirement)
+
+
+class _Careless:
+    """A domain that fits a value to a robot by breaking it."""
+
+    def fit(self, _id, value):
+        return {**value, "w": 1} if "linear" in value else value
+
+
+def test_a_mistake_of_a_generator_is_the_suite_s():
+    api = RestInterface(Run(), HttpClient("http://r2", Connection()))
+    (operation,) = (item for item in operations_of(CONTRACT) if item.id == "putVelocity")
+    assert example_call(api, operation).body
+    api.domain = _Careless()
+    with pytest.raises(HarnessError, match="was made as a valid request, and is none"):
+        example_call(api, operation)
