@@ -28,6 +28,12 @@ class Rule:
 
 RULES = (
     Rule(
+        r"(freeze|delay|scale|ulp|swap):[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?\.header\.stamp(\.\w+)?:\w+"
+        r"|negate:[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?\.header\.stamp\.sec:\w+",
+        "When a plan was made is the planner's affair: the contract asks for its frame and its poses "
+        "(contract.md#plans), and each question makes a new one, so that no two formats have to agree on it.",
+    ),
+    Rule(
         r"body-bom:\w+:body:xml",
         "A document of XML may begin with a byte order mark (XML 1.0 4.3.3), and every receiver has to take it "
         "(BP R4001); what forbids one is RFC 8259 8.1, of JSON.",
