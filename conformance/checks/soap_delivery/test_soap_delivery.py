@@ -6,20 +6,23 @@ from hypothesis import strategies as st
 from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import ADDRESSING, clark, local
 from conformance.documents.xml_node import Node
-from conformance.robot import delivery_messages
+from conformance.robot import delivery_messages, soap_services
 from conformance.soap.callable_services import repetitions
-from conformance.soap.calls import SoapResponse, call, judge_answer, send
+from conformance.soap.calls import SoapResponse, call, judge_answer, read_exchange, send
 from conformance.soap.envelope import envelope
 from conformance.soap.forms import written_integer
 from conformance.soap.messages import variants, with_text
 from conformance.soap.service import SoapService
 from conformance.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
+from conformance.transport.exchange import Exchange
+from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
 pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("publishers"), pytest.mark.motion]
 _BOTH = ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest")
+_TAKEN = 64 * 1024
 _VALID = "soap-delivery/response-valid"
 
 
@@ -161,3 +164,26 @@ def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
                 answer,
                 "a fault with status 500",
             )
+
+
+@pytest.mark.requirement("soap-delivery/size")
+def test_64_kib(publishers: SoapService, judge: Judge) -> None:
+    """A valid message of 64 KiB is taken: blanks between the elements are no part of what it says."""
+    message = envelope((delivery_messages.delivery(),)).written()
+    start = message.rindex(b"</")
+    answer = send(publishers, message[:start] + b" " * (_TAKEN - len(message)) + message[start:])
+    judge_answer(judge, "soap-delivery/size", answer.accepted, answer, f"2xx for a message of {_TAKEN:,} octets")
+
+
+@pytest.mark.requirement("soap-delivery/concurrent-answers")
+def test_answers_do_not_cross(publishers: SoapService, judge: Judge, effort: Effort) -> None:
+    """Clients that order at one moment by both operations are each answered by their own."""
+    operations = [_BOTH[client % 2] for client in range(MOST_CLIENTS)]
+    outgoing = [soap_services.outgoing(publishers, delivery_messages.delivery(name)) for name in operations]
+    for came in send_together([outgoing] * effort.cases(20)):
+        for operation, attempt in zip(operations, came, strict=True):
+            if isinstance(attempt, Exchange) and not is_busy(attempt):
+                answer = read_exchange(attempt)
+                expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
+                own = not answer.accepted or answer.payload == expected
+                judge_answer(judge, "soap-delivery/concurrent-answers", own, answer, f"the answer to {operation}")

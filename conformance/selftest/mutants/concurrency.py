@@ -17,8 +17,10 @@ from conformance.selftest.mutants.changes import (
     Where,
     deliveries,
     inputs,
+    instead,
     parsed,
     plain,
+    posted,
     problem,
     rest,
     soap,
@@ -168,6 +170,8 @@ class _Blended:
 
 
 _PUT_GOAL, _PUT_VELOCITY = rest("PUT", GOAL), rest("PUT", VELOCITY)
+_SMALL: Final = 32 * 1024
+_order = of_class("soap-delivery", "soap")
 _resource = of_class("rest-resources", "rest")
 _mutant = of_class("http", "rest")
 _message = of_class("equivalence", "both", observer=True)
@@ -272,5 +276,17 @@ MUTANTS = (
         "Of velocities that come at one moment, the robot turns by one and drives by another.",
         "concurrent-puts",
         lambda: _Blended(_PUT_VELOCITY, "angular"),
+    ),
+    _order(
+        "clients-soap-crossed",
+        "Two clients that order at one moment get each other's answers.",
+        "concurrent-answers",
+        lambda: _Mixed(posted, _exchanged, 1),
+    ),
+    _order(
+        "soap-small-messages",
+        "A message over 32 KiB is 413.",
+        "size",
+        instead(lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")),
     ),
 )
