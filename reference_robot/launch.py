@@ -12,6 +12,7 @@ from types import FrameType
 from typing import Final
 
 import click
+from rclpy.logging import get_logging_directory
 
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.toml_file import TomlFileError
@@ -103,4 +104,6 @@ def _simulation(options: Options) -> contextlib.AbstractContextManager[None]:
     # A simulated robot is no affair of other machines on the network, unless the environment says so.
     os.environ.setdefault(_DISCOVERY_RANGE, "LOCALHOST")
     seed = options.seed if options.realistic else None
-    return SimulatedRobot(options.domain_id, options.time_scale, options.config, seed).running()
+    log = get_logging_directory() / f"robot-{os.getpid()}.log"
+    click.echo(f"The simulated robot's log is {log}", err=True)
+    return SimulatedRobot(options.domain_id, options.time_scale, options.config, seed, log).running()

@@ -21,9 +21,15 @@ class SimulationError(RuntimeError):
 
 
 class SimulatedRobot:
-    """The simulation in a process of its own, with a watch on its end; like a real robot where a seed says which."""
+    """The simulation in a process of its own, with a watch on its end; like a real robot where a seed says which.
 
-    def __init__(self, domain_id: int, time_scale: float, config: Path | None, realistic_seed: int | None) -> None:
+    What it has to say of goals and missions goes to the file ``log``.
+    """
+
+    def __init__(
+        self, domain_id: int, time_scale: float, config: Path | None, realistic_seed: int | None, log: Path
+    ) -> None:
+        self._log = log
         self._command = [
             sys.executable,
             "-m",
@@ -42,12 +48,17 @@ class SimulatedRobot:
         Raises:
             SimulationError: It did not become ready, or ended by itself.
         """
-        with subprocess.Popen(  # noqa: S603 - our own program, and arguments that click has checked
-            self._command,
-            stdin=subprocess.PIPE,  # its end tells the child that the parent is gone, even if that was killed
-            stdout=subprocess.PIPE,
-            start_new_session=True,  # so that Ctrl-C reaches the parent alone, which stops the child in order
-        ) as process:
+        self._log.parent.mkdir(parents=True, exist_ok=True)
+        with (
+            self._log.open("w", encoding="utf-8") as log,
+            subprocess.Popen(  # noqa: S603 - our own program, and arguments that click has checked
+                self._command,
+                stdin=subprocess.PIPE,  # its end tells the child that the parent is gone, even if that was killed
+                stdout=subprocess.PIPE,
+                stderr=log,
+                start_new_session=True,  # so that Ctrl-C reaches the parent alone, which stops the child in order
+            ) as process,
+        ):
             try:
                 assert process.stdout is not None  # noqa: S101 - tells mypy what PIPE means
                 self._await_ready(process.stdout)
@@ -59,7 +70,9 @@ class SimulatedRobot:
                 self._ending.set()
                 _end(process)
         if lost:
-            raise SimulationError(f"the simulation ended by itself with exit code {process.returncode}")
+            raise SimulationError(
+                f"the simulation ended by itself with exit code {process.returncode}; its log is {self._log}"
+            )
 
     def _await_ready(self, stdout: IO[bytes]) -> None:
         give_up = time.monotonic() + _START
@@ -69,7 +82,7 @@ class SimulatedRobot:
             octets = os.read(stdout.fileno(), 4096) if readable else b""
             if not octets:
                 why = "ended" if readable else f"was not ready within {_START:g} s"
-                raise SimulationError(f"the simulation {why}: {' '.join(self._command)}")
+                raise SimulationError(f"the simulation {why}: {' '.join(self._command)}; its log is {self._log}")
             told += octets
 
     def _watch(self, process: subprocess.Popen[bytes], stdout: IO[bytes]) -> None:

@@ -5,11 +5,14 @@ No entity is resolved, nothing is fetched, no DTD is loaded, the tree stays with
 The size is bounded before a body comes here.
 
 libxml2 keeps every name that it has met for as long as the thread lives that met it. So documents with new names are
-parsed in a thread of their own once there have been many: strangers cannot fill the robot's memory with names.
+parsed in a thread of their own once there have been many: strangers cannot fill the robot's memory with names. A few
+names are learnt again and again, so that after such strangers a client with a prefix of its own is soon known.
 """
 
 import codecs
 import re
+import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
@@ -31,9 +34,49 @@ _UTF16: Final = frozenset({"utf-16", "utf-16-le", "utf-16-be"})
 _MOST_ATTRIBUTES: Final = 1000
 
 _ELEMENT_NAME: Final = re.compile(rb"<([^\s/>!?]++)")
-_MOST_NAMES: Final = 2000
 _LONGEST_NAME: Final = 100  # octets
-_known_names: Final[set[bytes]] = set()
+_NEW_NAMES: Final = 32  # that one document may teach; a client's own messages have fewer
+
+
+class KnownNames:
+    """The names that the main thread's parser has met, and what it may still learn.
+
+    Args:
+        at_once: How many may be learnt at once.
+        interval: Seconds after which one more may be learnt: some 0.9 MB a day, should strangers take them all.
+        clock: Where the time comes from, in seconds.
+    """
+
+    def __init__(
+        self, at_once: int = 2000, interval: float = 10.0, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._known: set[bytes] = set()
+        self._at_once = at_once
+        self._interval = interval
+        self._clock = clock
+        self._left = float(at_once)
+        self._counted_at = clock()
+
+    def has_all(self, text: bytes) -> bool:
+        """Tell whether a document brings no new names, or few enough to learn them."""
+        names = _ELEMENT_NAME.findall(text)
+        # What precedes an equals sign names an attribute; words of a text may be among it, which does no harm.
+        for before in text.split(b"=")[:-1]:
+            names += before.rsplit(None, 1)[-1:]
+        return self._known.issuperset(names) or self._learns(set(names) - self._known)
+
+    def _learns(self, new: set[bytes]) -> bool:
+        now = self._clock()
+        self._left = min(self._at_once, self._left + (now - self._counted_at) / self._interval)
+        self._counted_at = now
+        if len(new) > min(_NEW_NAMES, self._left) or max(map(len, new)) > _LONGEST_NAME:
+            return False
+        self._left -= len(new)
+        self._known.update(new)
+        return True
+
+
+_known_names: Final = KnownNames()
 
 
 def _new_parser() -> etree.XMLParser:
@@ -63,7 +106,7 @@ def parsed(body: bytes, charset: str | None = None) -> etree._Element:
     if text.count(b"=") > _MOST_ATTRIBUTES:
         raise Problem(400, f"the document has more than {_MOST_ATTRIBUTES} attributes")
     try:
-        root = etree.fromstring(text, _PARSER) if _has_known_names(text) else _parsed_apart(text)
+        root = etree.fromstring(text, _PARSER) if _known_names.has_all(text) else _parsed_apart(text)
     except (etree.XMLSyntaxError, ValueError) as error:
         raise Problem(400, f"the body is not well-formed XML: {ascii(str(error))[1:-1]}") from error
     if root.getroottree().docinfo.internalDTD is not None:
@@ -71,21 +114,6 @@ def parsed(body: bytes, charset: str | None = None) -> etree._Element:
     if text.find(b"<?", len(b"<?") if _DECLARED.match(text) else 0) >= 0:
         _refuse_instructions(root)
     return root
-
-
-def _has_known_names(text: bytes) -> bool:
-    """Tell whether a document brings no new names, or few enough to remember them."""
-    names = _ELEMENT_NAME.findall(text)
-    # What precedes an equals sign names an attribute; words of a text may be among it, which does no harm.
-    for before in text.split(b"=")[:-1]:
-        names += before.rsplit(None, 1)[-1:]
-    if _known_names.issuperset(names):
-        return True
-    new = set(names) - _known_names
-    if len(_known_names) + len(new) > _MOST_NAMES or max(map(len, new)) > _LONGEST_NAME:
-        return False
-    _known_names.update(new)
-    return True
 
 
 def _parsed_apart(text: bytes) -> etree._Element:

@@ -14,7 +14,7 @@ from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.robot.velocity import Velocity
 from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import SoapService
+from reference_robot.webservices.soap.service import Operation, SoapService
 
 PATH: Final = "/turtlesim_subscriber_ws"
 
@@ -31,18 +31,31 @@ class SubscribersWebService(SoapService):
         planner: Planner,
     ) -> None:
         returned: dict[str, Callable[[], list[Any]]] = {
-            "GetPose": lambda: [odometry.plain()],
             "GetVelocity": lambda: [velocity.measured()],
             "GetSensors": subscribers.sensors,
             "GetNavigationServices": subscribers.navigation_services,
             "GetGoal": lambda: [goal] if (goal := goals.current()) else [],
         }
-        operations = {name: partial(self._tell, name, values) for name, values in returned.items()}
-        super().__init__("subscribers", PATH, operations | {"GetPlan": self._get_plan})
+        operations: dict[str, Operation] = {
+            name: partial(self._tell, name, values) for name, values in returned.items()
+        }
+        operations |= {"GetPose": self._get_pose, "GetPlan": self._get_plan}
+        super().__init__("subscribers", PATH, operations)
+        self._odometry = odometry
+        self._pose_from: Any = None
+        self._pose = b""
         self._planner = planner
 
     def _tell(self, operation: str, values: Callable[[], list[Any]], _wrapper: etree._Element) -> bytes:
         return self._response(operation, values())
+
+    def _get_pose(self, _wrapper: etree._Element) -> bytes:
+        """Return the odometry, written once for each message as REST's is."""
+        message = self._odometry.message()
+        if message is not self._pose_from:
+            self._pose = self._response("GetPose", [self._odometry.plain()])
+            self._pose_from = message
+        return self._pose
 
     async def _get_plan(self, wrapper: etree._Element) -> bytes:
         given: dict[str, Any] = {}

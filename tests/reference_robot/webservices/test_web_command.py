@@ -78,7 +78,10 @@ def test_the_robot_ends_with_its_simulation(domain_id):
         (child,) = children(served.process.pid)
         os.kill(child, signal.SIGKILL)
         assert served.process.wait(30) == 1
-        assert "ended by itself" in served.process.stderr.read()
+        said = served.process.stderr.read()
+        assert "ended by itself" in said
+        (log,) = set(re.findall(r"log is (\S+)", said))
+        assert Path(log).is_file()
 
 
 @pytest.mark.parametrize("package", ["rclpy", "mybot_delivery_app", "nav2_msgs", "httptools"])

@@ -18,7 +18,7 @@ from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import read
 from reference_robot.webservices.representation.shapes import Record, Series, shape_of
 from reference_robot.webservices.representation.writing import write_json, write_text, write_xml
-from reference_robot.webservices.representation.xml_input import parsed
+from reference_robot.webservices.representation.xml_input import KnownNames, parsed
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -97,6 +97,36 @@ def test_names_of_strangers_do_not_fill_the_memory():
     for number in range(10, 30):
         parsed(document(number))
     assert resident_megabytes() - before < 15
+
+
+def named(*names: str) -> bytes:
+    return "".join(f"<{name}/>" for name in names).encode()
+
+
+def test_one_document_of_many_unknown_names_does_not_make_the_next_client_a_stranger():
+    names = KnownNames(at_once=100)
+    assert not names.has_all(named(*(f"n{number}" for number in range(1990))))
+    assert names.has_all(b'<S:Envelope xmlns:S="urn:a"><ns2:Execute xmlns:ns2="urn:b"/></S:Envelope>')
+
+
+def test_names_are_learnt_again_some_time_after_many_documents_of_strangers():
+    now = 0.0
+    names = KnownNames(at_once=100, interval=10.0, clock=lambda: now)
+    document = 0
+    while names.has_all(named(*(f"d{document}n{number}" for number in range(10)))):
+        document += 1
+    assert document == 10
+    assert not names.has_all(named("ours"))
+    now = 9.0
+    assert not names.has_all(named("ours"))
+    now = 11.0
+    assert names.has_all(named("ours"))
+    assert not names.has_all(named("theirs"))
+    assert names.has_all(named("ours", "d0n0"))
+
+
+def test_a_name_without_end_is_not_learnt():
+    assert not KnownNames().has_all(named("n" * 101))
 
 
 @pytest.mark.parametrize("text", [b"", b"=", b"   = ", b"<", b"<=", b"\t=\n=", b"<a ="])
