@@ -22,8 +22,9 @@ _LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
 _SUMMARY = """
 done = function(summary, latency, requests)
   local errors = summary.errors
-  io.write(string.format('{"requests": %d, "seconds": %f, "median_us": %f, "errors": %d}\\n', summary.requests,
-    summary.duration / 1e6, latency:percentile(50),
+  local shape = '{"requests": %d, "seconds": %f, "median_us": %f, "p99_us": %f, "errors": %d}\\n'
+  io.write(string.format(shape, summary.requests, summary.duration / 1e6,
+    latency:percentile(50), latency:percentile(99),
     errors.connect + errors.read + errors.write + errors.status + errors.timeout))
 end
 """
@@ -50,11 +51,12 @@ class Call:
 
 @dataclass(frozen=True)
 class Load:
-    """What a load measured: requests answered, failures among them, and the median response time in µs."""
+    """What a load measured: requests answered, failures among them, and the response time in µs."""
 
     requests: int
     seconds: float
     median_us: float
+    p99_us: float
     errors: int
 
     @property
@@ -141,7 +143,8 @@ def _main(host: str, port: str, connections: str, seconds: str) -> None:
                 errors += not outcome[1]
                 by_number[number].send()
     measured = {"requests": len(times), "seconds": time.perf_counter() - started}
-    print(json.dumps(measured | {"median_us": statistics.median(times) * 1e6, "errors": errors}))
+    found = {"median_us": statistics.median(times) * 1e6, "p99_us": statistics.quantiles(times, n=100)[-1] * 1e6}
+    print(json.dumps(measured | found | {"errors": errors}))
 
 
 if __name__ == "__main__":
