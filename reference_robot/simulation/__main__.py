@@ -21,7 +21,6 @@ from reference_robot.ros import RosRuntime
 from reference_robot.simulation.realism import Realism
 from reference_robot.simulation.runner import Simulation
 
-_ENDS: Final = (signal.SIGINT, signal.SIGTERM)
 _NICENESS: Final = 5  # the web layer answers first: a real robot's motors do not wait for this machine
 
 
@@ -40,16 +39,20 @@ def main(domain_id: int | None, time_scale: float, names_file: Path | None, *, r
     except TomlFileError as error:
         raise click.UsageError(str(error)) from error
     os.nice(_NICENESS)
-    # Blocked here and in all threads to come, and waited for below: one that a handler takes just before the main
-    # thread falls asleep would not wake it.
-    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS)
+    # A handler in Python runs when the main thread runs again, which an event that it waits for does not bring about;
+    # the octet that the interpreter writes for each signal, in whatever thread it arrives, does.
+    told, tell = os.pipe()
+    os.set_blocking(tell, False)
+    signal.set_wakeup_fd(tell)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda _number, _frame: None)
     if _stdin_is_pipe():
-        threading.Thread(target=_end_with_stdin, daemon=True).start()
+        threading.Thread(target=_tell_end_of_stdin, args=(tell,), daemon=True).start()
     with RosRuntime(domain_id) as ros:
         Simulation(ros, names, time_scale, Realism(seed) if realistic else None)
         ros.start()
         click.echo("ready")
-        signal.sigwait(_ENDS)
+        os.read(told, 1)
 
 
 def _stdin_is_pipe() -> bool:
@@ -59,11 +62,11 @@ def _stdin_is_pipe() -> bool:
         return False
 
 
-def _end_with_stdin() -> None:
+def _tell_end_of_stdin(tell: int) -> None:
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             pass
-    os.kill(os.getpid(), signal.SIGTERM)
+    os.write(tell, b"\0")
 
 
 if __name__ == "__main__":
