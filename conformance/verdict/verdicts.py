@@ -102,7 +102,7 @@ def verdict_of(
         return verdict(Value.NOT_CLAIMED, f"class {requirement.class_} is not claimed")
     if evidence.unclaimed and not evidence.cases:
         return verdict(Value.NOT_CLAIMED, evidence.unclaimed)
-    if Prerequisite.SEEN in requirement.needs and not evidence.cases:
+    if Prerequisite.SEEN in requirement.needs and not evidence.cases and not evidence.errors:
         return verdict(Value.SKIP, NOT_SEEN)
     if evidence.findings:
         first = next(iter(evidence.findings.values()))
