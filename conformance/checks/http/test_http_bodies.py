@@ -150,6 +150,9 @@ def test_case_of_media_types(api: RestInterface, judge: Judge) -> None:
     """Media types are the same in upper case, of what is sent and of what is asked for."""
     for call in answered(api):
         for media_type in call.operation.formats:
+            # A robot need not have every format; what it sends for the usual spelling, it sends for the other.
+            if call.send(api, ("Accept", media_type)).response.media_type != media_type:
+                continue
             exchange = call.send(api, ("Accept", media_type.upper()))
             judge.check(
                 "http/media-type-case",
