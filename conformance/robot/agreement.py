@@ -2,13 +2,10 @@
 
 import json
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from conformance.documents.json_schema import is_number
 from conformance.documents.json_text import shown
-
-# Two writings of one double.
-_EXACT: Final = 1e-9
 
 
 @dataclass(frozen=True)
@@ -22,7 +19,7 @@ class Slack:
 def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str = "") -> str:
     """In what ``between`` contradicts both its neighbours; empty where it does not.
 
-    Compared are the fields that all three have; stamps are left to the caller, as they go on.
+    Compared are the fields that all three have. A stamp that goes on is left to the caller.
     """
     if isinstance(before, dict) and isinstance(after, dict):
         return _in_fields(before, between, after, slack, where)
@@ -30,7 +27,8 @@ def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str
         return _in_lists(before, between, after, slack, where)
     if is_number(before) and is_number(after):
         low, high = sorted((float(before), float(after)))
-        room = _EXACT * (1 + abs(low)) if low == high else slack.absolute + slack.relative * max(abs(low), abs(high))
+        # What did not change is the same double in every interface, to the last place (contract.md#equivalence).
+        room = 0.0 if low == high else slack.absolute + slack.relative * max(abs(low), abs(high))
         if not is_number(between) or not low - room <= float(between) <= high + room:
             wanted = f"{low!r}" if low == high else f"{low!r} to {high!r}"
             return f"{where} is {shown(between)} for {wanted}"
@@ -40,7 +38,7 @@ def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str
 
 def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slack: Slack, where: str) -> str:
     for name, first in before.items():
-        if name == "stamp" or name not in after:
+        if name not in after or (name == "stamp" and first != after[name]):
             continue
         path = f"{where}.{name}" if where else name
         if not isinstance(between, dict) or name not in between:

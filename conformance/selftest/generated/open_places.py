@@ -40,6 +40,10 @@ RULES = (
     ),
     Rule(r"status:putDelivery:2\d\d-2\d\d", "A delivery answers 2xx, and 204 is only preferred (contract.md#rest)."),
     Rule(
+        r"header-charset:[a-z]\w+:Content-Type-of-errors",
+        "An error is JSON, whose media type has no charset parameter: one that is added has no effect (RFC 8259 11).",
+    ),
+    Rule(
         r"status:\w+:(400|422)-4\d\d",
         "Input that is no JSON is 400 and of the wrong shape 422, and other 4xx conform too (contract.md#input-json).",
     ),
