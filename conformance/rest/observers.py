@@ -14,6 +14,7 @@ from conformance.documents.traceback import inside_shown
 from conformance.rest import declared, problem
 from conformance.rest.interface import RestInterface
 from conformance.rest.request_context import RequestContext
+from conformance.rest.statuses import is_cut_off
 from conformance.rest.validity import INVALID, VALID, validity
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, Request, Response, Unanswered
 
@@ -60,7 +61,7 @@ class Observer(Listener):
             )
             problem.judge(api, exchange, answer, context)
         if context.operation is not None:
-            if answer.status >= HTTPStatus.BAD_REQUEST and context.usual:
+            if answer.status >= HTTPStatus.BAD_REQUEST and context.usual and not is_cut_off(exchange):
                 self._judge_input(exchange, answer, context)
             declared.judge(api, exchange, answer, context)
 

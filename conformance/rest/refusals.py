@@ -5,7 +5,7 @@ from collections.abc import Callable
 from conformance.documents.openapi import operations_of
 from conformance.rest import problem
 from conformance.rest.interface import RestInterface
-from conformance.rest.statuses import is_refusal, judge_status
+from conformance.rest.statuses import is_cut_off, is_refusal, judge_status
 from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
 
 _MALFORMED, _INVALID = 400, 422
@@ -46,7 +46,7 @@ def judge_refusal(
     try:
         exchange = send()
     except NoAnswerError as none:
-        if closing and none.kind is NoAnswer.CLOSED:
+        if (closing and none.kind is NoAnswer.CLOSED) or is_cut_off(none.unanswered):
             return judge.check(
                 requirement, holds=True, exchange=none.unanswered, expected="4xx, or a closed connection"
             )
@@ -60,6 +60,8 @@ def judge_refusal(
             found=str(none),
             cause=f"{what.split(' at ', 1)[0]} {none.kind}",
         )
+    if is_cut_off(exchange):
+        return judge.check(requirement, holds=True, exchange=exchange, expected="4xx, or a closed connection")
     status = exchange.response.status
     cause = f"{what.split(' at ', 1)[0]} {status}"
     if not judge_status(judge, requirement, is_refusal(exchange), exchange, f"4xx for {what}", cause=cause):

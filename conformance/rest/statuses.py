@@ -2,9 +2,11 @@
 
 from http import HTTPStatus
 
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered
 from conformance.verdict.evidence import Judge
 
+#: Octets of content that every robot takes (contract, fine print).
+TAKEN = 64 * 1024
 # These refuse the request for another reason than its content.
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
 
@@ -18,6 +20,18 @@ def is_refusal(exchange: Exchange) -> bool:
 def is_taken(exchange: Exchange) -> bool:
     """Whether a valid request was taken, or only put off: a goal of the robot's own may be active."""
     return exchange.response.ok or exchange.response.status == HTTPStatus.CONFLICT
+
+
+def is_cut_off(attempt: Attempt) -> bool:
+    """Whether the robot closed the connection on content that it need not take (contract, fine print).
+
+    A gateway in front of it, which finds it closed, answers 502 in its place (RFC 9110 15.6.3).
+    """
+    if len(attempt.request.body) <= TAKEN:
+        return False
+    if isinstance(attempt, Unanswered):
+        return attempt.kind is NoAnswer.CLOSED
+    return attempt.response.status == HTTPStatus.BAD_GATEWAY
 
 
 def judge_status(

@@ -9,11 +9,11 @@ from conformance.rest.applicable import answered, applicable_operations
 from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.interface import RestInterface
 from conformance.rest.number_forms import at_integer_ends, with_numbers
-from conformance.rest.statuses import is_taken, judge_status
+from conformance.rest.statuses import TAKEN, is_cut_off, is_taken, judge_status
 from conformance.robot.stopping import stop_robot
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
+from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
@@ -34,7 +34,6 @@ _FORMS: tuple[Callable[[float], str], ...] = (
     lambda value: repr(value) if value else "-0",
     lambda value: repr(value) if value else "-0.0e-5",
 )
-_TAKEN = 64 * 1024
 _TOO_LARGE = 10 * 1024 * 1024 + 1
 
 
@@ -91,7 +90,7 @@ def test_sizes(api: RestInterface, judge: Judge) -> None:
     """64 KiB are taken; more than 10 MiB are answered 413, or the connection is closed."""
     judge.at_risk = ("http/content-too-large",)
     for call in _valid(api, judge, ("http/content-too-large",)):
-        padded = call.carrying(call.body[:1] + b" " * (_TAKEN - len(call.body)) + call.body[1:])
+        padded = call.carrying(call.body[:1] + b" " * (TAKEN - len(call.body)) + call.body[1:])
         exchange = padded.send(api)
         judge.check("http/content-too-large", is_taken(exchange), exchange, "a body of 64 KiB taken")
         huge = call.carrying(call.body[:1] + b" " * (_TOO_LARGE - len(call.body)) + call.body[1:])
@@ -105,7 +104,7 @@ def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple
     try:
         exchange = call.send(api, *fields, fresh=True)
     except NoAnswerError as none:
-        if none.kind is not NoAnswer.CLOSED:
+        if not is_cut_off(none.unanswered):
             raise
         judge.check("http/content-too-large", True, none.unanswered, "413, or a closed connection")
         return
@@ -114,7 +113,7 @@ def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple
     refused = {413, 411, 400, 501} if fields else {413}
     judge.check(
         "http/content-too-large",
-        status in refused,
+        status in refused or is_cut_off(exchange),
         exchange,
         "413, or a closed connection",
         found=f"status {status} for a body of {_TOO_LARGE:,} octets",
@@ -126,8 +125,8 @@ def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple
 def test_chunked_content(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Content in chunks of one octet, of a few, and of all is what it is in one piece; also 64 KiB of it."""
     for call in _valid(api, judge, ("http/chunked",)):
-        large = call.body[:1] + b" " * (_TAKEN - len(call.body)) + call.body[1:]
-        for body, size in ((call.body, 1), (call.body, 7), (call.body, len(call.body)), (large, 1000), (large, _TAKEN)):
+        large = call.body[:1] + b" " * (TAKEN - len(call.body)) + call.body[1:]
+        for body, size in ((call.body, 1), (call.body, 7), (call.body, len(call.body)), (large, 1000), (large, TAKEN)):
             fields = (f"Content-Type: {call.media_type}", "Transfer-Encoding: chunked")
             octets = raw.head(rest, call.operation.method, call.path, *fields) + raw.chunked(body, size)
             attempt, _ = raw.read_one(rest, octets, raw.talk(rest, octets, answers=1), call.operation.method)

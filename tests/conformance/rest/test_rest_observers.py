@@ -69,6 +69,12 @@ def test_a_crash_is_judged_by_what_was_sent(content, expected):
     assert seen("PUT", "/robot/velocity/", 500, [PROBLEM], b"{}", sent=sent, content=content) == expected
 
 
+@pytest.mark.parametrize(("octets", "expected"), [(64 * 1024, {"http/no-server-error"}), (64 * 1024 + 1, set())])
+def test_a_gateway_may_say_that_the_robot_closed_the_connection_on_too_much(octets, expected):
+    sent = (("Accept", "*/*"), ("Content-Type", "application/json"))
+    assert seen("PUT", "/robot/velocity/", 502, sent=sent, content=b"{" * octets) == expected
+
+
 def test_what_went_elsewhere_is_nobody_s_affair():
     api = RestInterface(Run(), HttpClient(BASE, Connection()))
     Observer(api).answered(Exchange(Request("GET", "http://robot:7003/r2d2/x"), Response(500, (), b"", 1.0)))
