@@ -54,6 +54,7 @@ _SHORT = (
 )
 @click.option("--seeds", type=click.IntRange(min=0), default=20, show_default=True, help="Seeds for each good robot.")
 @click.option("--short", is_flag=True, help="A dozen faults and one seed, in less than a minute.")
+@click.option("--controls-only", is_flag=True, help="Only the good robots, and no faults.")
 @click.option(
     "--effort",
     type=click.Choice(["quick", "standard"]),
@@ -109,6 +110,8 @@ def selftest(context: click.Context, /, **options: Any) -> None:
         chosen.sort(key=lambda mutant: _SHORT.index(mutant.name))
     if not chosen:
         raise click.UsageError(f"no fault has a name like {', '.join(patterns)}; --list shows them")
+    if options["controls_only"]:
+        chosen = []
     if options["listed"]:
         for mutant in chosen:
             click.echo(f"{mutant.name:34} {mutant.says} [{', '.join(mutant.catches)}]")
@@ -192,11 +195,11 @@ def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) 
     from conformance.selftest.servers.fronts import FRONTS  # noqa: PLC0415 - see selftest()
     from conformance.selftest.variants import VARIANTS  # noqa: PLC0415 - see selftest()
 
-    kinds = [*robots.INDEPENDENT_ROBOTS, robots.REFERENCE]
+    kinds = list(robots.INDEPENDENT_ROBOTS)
     try:
         robots.check_available(robots.REFERENCE)
+        kinds += (robots.REFERENCE,) if options["short"] else robots.ON_ROS
     except robots.RobotError as error:
-        kinds.remove(robots.REFERENCE)
         report.notes.append(f"Not among the good robots: {error}")
     cases: list[Case] = []
     if options["variants"]:

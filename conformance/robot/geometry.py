@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from statistics import median
 from typing import Any, NamedTuple
 
 
@@ -29,6 +30,11 @@ class Pose(NamedTuple):
         return Pose(
             frame.x + cos * self.x - sin * self.y, frame.y + sin * self.x + cos * self.y, wrapped(self.yaw + frame.yaw)
         )
+
+
+def middle_of(poses: Sequence[Pose]) -> Pose:
+    """The medians of x and y, with the last heading: of several readings, at least one, a few may be out."""
+    return Pose(median(one.x for one in poses), median(one.y for one in poses), poses[-1].yaw)
 
 
 def wrapped(angle: float) -> float:

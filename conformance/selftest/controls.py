@@ -103,7 +103,7 @@ def _try(case: Case, effort: str, domain: int, requirements: tuple[str, ...]) ->
     name = case.variant.name if case.variant else ""
     try:
         with contextlib.ExitStack() as stack:
-            robot = stack.enter_context(running(case.robot, domain))
+            robot = stack.enter_context(running(case.robot, domain, case.seed))
             if isinstance(case.variant, Front):
                 robot = stack.enter_context(behind(case.variant, robot))
             job = Job(

@@ -27,6 +27,9 @@ INDEPENDENT_ROBOTS = ("plain", "baroque", "legacy")
 _FRAMEWORKS = {"flask": ("flask", "gunicorn"), "aiohttp": ("aiohttp",), "hypercorn": ("hypercorn", "starlette")}
 ON_SERVERS = ("node", "golang", *_FRAMEWORKS)
 REFERENCE = "reference"
+#: The reference robot with odometry, wheels and delays like those of a real one; each seed is another robot.
+REALISTIC = "realistic"
+ON_ROS = (REFERENCE, REALISTIC)
 
 
 class RobotError(Exception):
@@ -38,7 +41,7 @@ class Robot:
     """A robot that runs.
 
     Attributes:
-        kind: "reference" or an independent robot's name.
+        kind: "reference", "realistic" or an independent robot's name.
         rest: REST's base URL.
         soap: the publishers' WSDL, or empty.
         domain_id: its ROS domain, or None.
@@ -52,6 +55,8 @@ class Robot:
 
 def statement_of(kind: str) -> Path:
     """The implementation conformance statement of a robot."""
+    if kind == REALISTIC:
+        return _HERE.parents[1] / "reference_robot" / "realistic.toml"
     return _HERE / "reference.toml" if kind == REFERENCE else _HERE / "independent_robots" / kind / f"{kind}.toml"
 
 
@@ -61,7 +66,7 @@ def check_available(kind: str) -> None:
     Raises:
         RobotError: it cannot.
     """
-    if kind == REFERENCE and find_spec("rclpy") is None:
+    if kind in ON_ROS and find_spec("rclpy") is None:
         raise RobotError(
             "the reference robot needs ROS 2 (pip install 'roaas[robot,ros]', or source /opt/ros/jazzy/setup.bash); "
             "without it, take an independent robot in its place: roaas selftest --target baroque"
@@ -69,23 +74,24 @@ def check_available(kind: str) -> None:
 
 
 @contextlib.contextmanager
-def running(kind: str, domain_id: int) -> Iterator[Robot]:
+def running(kind: str, domain_id: int, seed: int = 0) -> Iterator[Robot]:
     """Start a robot on free ports, and stop it in the end.
 
     Args:
-        kind: "reference" or an independent robot's name.
-        domain_id: first ROS domain to try for the reference robot.
+        kind: "reference", "realistic" or an independent robot's name.
+        domain_id: first ROS domain to try for a robot on ROS.
+        seed: which realistic robot.
 
     Raises:
         RobotError: it does not start.
         NotInstalledError: what it runs on is not there.
     """
     check_available(kind)
-    if kind == REFERENCE:
-        with _own_domain(domain_id) as own, _started(kind, own) as robot:
+    if kind in ON_ROS:
+        with _own_domain(domain_id) as own, _started(kind, own, seed) as robot:
             yield robot
     else:
-        with _started(kind, domain_id) as robot:
+        with _started(kind, domain_id, seed) as robot:
             yield robot
 
 
@@ -111,8 +117,8 @@ def _own_domain(first: int) -> Iterator[int]:
 
 
 @contextlib.contextmanager
-def _started(kind: str, domain_id: int) -> Iterator[Robot]:
-    command = _command(kind, domain_id)
+def _started(kind: str, domain_id: int, seed: int) -> Iterator[Robot]:
+    command = _command(kind, domain_id, seed)
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     # The command is this interpreter with arguments made above.
     process = subprocess.Popen(  # noqa: S603
@@ -120,7 +126,7 @@ def _started(kind: str, domain_id: int) -> Iterator[Robot]:
     )
     try:
         rest, soap = _ready(process, kind)
-        yield Robot(kind, rest, soap, domain_id if kind == REFERENCE else None)
+        yield Robot(kind, rest, soap, domain_id if kind in ON_ROS else None)
     finally:
         process.terminate()
         try:
@@ -132,15 +138,16 @@ def _started(kind: str, domain_id: int) -> Iterator[Robot]:
             process.stdout.close()
 
 
-def _command(kind: str, domain_id: int) -> list[str]:
+def _command(kind: str, domain_id: int, seed: int) -> list[str]:
     """What starts a robot on free ports.
 
     Raises:
         NotInstalledError: what it runs on is not there.
     """
     ports = ["--rest-port", "0", "--soap-port", "0"]
-    if kind == REFERENCE:
-        return [sys.executable, "-m", "roaas", "robot", *ports, "--domain-id", str(domain_id)]
+    if kind in ON_ROS:
+        realistic = ["--realistic", "--seed", str(seed)] if kind == REALISTIC else []
+        return [sys.executable, "-m", "roaas", "robot", *ports, "--domain-id", str(domain_id), *realistic]
     folder = _HERE / "independent_robots" / kind
     if kind == "node":
         return [program("node", "nodejs"), str(folder / "robot.js")]

@@ -3,6 +3,7 @@
 import time
 from typing import Any, Final
 
+import msgspec
 import pytest
 
 from conformance.documents.json_schema import Shape
@@ -16,7 +17,7 @@ from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.robot.plan import plan_of, query, reachable
-from conformance.robot.robot import POSE, SENSORS, SERVICES, STILL, VELOCITY, Robot
+from conformance.robot.robot import FARTHEST, POSE, SENSORS, SERVICES, STILL, VELOCITY, Robot
 from conformance.robot.soap_services import ask, returned
 from conformance.soap.service import SoapService
 from conformance.transport.exchange import Exchange
@@ -65,6 +66,12 @@ def _compare(robot: Robot, subscribers: SoapService, judge: Judge, name: str) ->
         )
 
 
+def _slack(robot: Robot) -> Slack:
+    """What a sample may lie outside those before and after it: with the noise, of which each sample has its own."""
+    noise = robot.limits.noise
+    return Slack(_SLACK.absolute + FARTHEST * max(msgspec.structs.astuple(noise)), _SLACK.relative)
+
+
 def _state_difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float) -> tuple[str | None, Exchange]:
     """Read a state over REST, over SOAP and over REST again, so far apart: in what SOAP's lies not between the others.
 
@@ -79,7 +86,7 @@ def _state_difference(robot: Robot, subscribers: SoapService, name: str, apart_s
     after, _ = robot.read(path, shape)
     if before is None or after is None:
         return None, exchange
-    problem = problem or disagreement(before, between, after, _SLACK)
+    problem = problem or disagreement(before, between, after, _slack(robot))
     if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
         problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"
     return problem, exchange

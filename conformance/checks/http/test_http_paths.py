@@ -163,7 +163,7 @@ def test_large_field(api: RestInterface, judge: Judge) -> None:
 
 @pytest.mark.requirement("http/target-length")
 def test_targets_of_8000_octets(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """A target of 8,000 octets is taken by whoever takes the same with a short query."""
+    """A target of 8,000 octets is taken by whoever takes the same with a short query: RECOMMENDED (RFC 9110 4.1)."""
     for call in [call for call in reads(api) if not call.operation.optional]:
         path = f"{call.path}{'&' if '?' in call.path else '?'}roaas="
         usual = rest.send("GET", f"{path}a").response.status

@@ -95,7 +95,7 @@ def test_plans_from_the_robot(robot: Robot, here: Pose, judge: Judge, explore: E
         judge.check("rest-resources/plan-type", not problem, exchange, _EXPECTED, found=problem)
         if plan is not None and before is not None:
             _judge_plan(judge, plan, goal, tolerance, exchange, frame)
-            judge_start(robot, plan, before, exchange)
+            judge_start(robot, plan, before, exchange, lambda: ask(robot, goal, tolerance=tolerance)[1])
 
     for goal in found:
         turn = wrapped(math.atan2(goal.y - here.y, goal.x - here.x) - here.yaw)
