@@ -15,7 +15,7 @@ import click
 
 from conformance.contract.command import CommandResult, ResultCommand
 from conformance.contract.exit_codes import ExitCode
-from conformance.contract.statement import Statement, load_statement
+from conformance.contract.statement import Endpoints, Statement, load_statement
 from conformance.contract.thresholds import load_thresholds
 from conformance.contract.toml_file import TomlFileError
 from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
@@ -30,6 +30,7 @@ DEFAULT_OUT = "out"  # as `roaas certify` does
 #: NumPy's linear algebra: its threads wait for one another by spinning, ten times as long on a busy machine.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _FILE = click.Path(path_type=Path)
+_DESCRIPTIONS = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint")
 
 
 def _run_load(settings: Settings, written: Path) -> CommandResult:
@@ -69,6 +70,29 @@ def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[fl
         return tuple(float(part) for part in value.split(","))
     except ValueError:
         raise click.BadParameter(f"{value!r} is no list of rates such as 100,200,400") from None
+
+
+def _share(_: click.Context, __: click.Parameter, value: str) -> float:
+    try:
+        return float(value.removesuffix("%")) / 100
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is no percentage such as 5%") from None
+
+
+def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
+    """What the options say of the robot to compare with; without a statement it takes this robot's credentials.
+
+    Raises:
+        TomlFileError: its statement cannot be used.
+    """
+    where = given.pop("against")
+    described = {name: given.pop(f"against_{name}") for name in _DESCRIPTIONS}
+    if where is not None and "://" not in where:
+        return load_statement(Path(where))
+    if where is None and not any(described.values()):
+        return None
+    shared = {name: given[name] or getattr(own.endpoints, name) for name in ("token_file", "ca_file", "timeout_s")}
+    return Statement(endpoints=Endpoints(rest=where, **described, **shared))
 
 
 @click.command(cls=ResultCommand)
@@ -114,18 +138,30 @@ def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[fl
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
 @click.option("--token-file", metavar="FILE", help="Holds the robot's bearer token.")
 @click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")
+@click.option("--against", metavar="URL|STATEMENT", help="Another robot, or version, to take turns with and compare.")
+@click.option("--against-publishers-wsdl", metavar="URL|FILE", help="That robot's WSDLs.")
+@click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="Likewise.")
+@click.option("--against-publishers-endpoint", metavar="URL", help="Where its services are, when no WSDL says.")
+@click.option("--against-subscribers-endpoint", metavar="URL", help="Likewise.")
+@click.option(
+    "--tolerance", callback=_share, default="5%", show_default=True, help="By how much it may be slower than that."
+)
 @click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
 @click.option("--out", metavar="DIR", default=DEFAULT_OUT, show_default=True, help="Where the result goes.")
 def load(statement: Path | None, **options: Any) -> CommandResult:
     """Measure how fast a robot answers, SOAP against REST.
 
-    Exit codes: 0 thresholds met, 1 missed, 2 usage, 3 robot not reachable, 4 measurement not valid, 130 interrupted.
+    With --against two robots take turns, and what counts is whether this one is slower than that.
+
+    Exit codes: 0 thresholds met, not slower; 1 missed, slower; 2 usage; 3 robot not reachable; 4 measurement not valid,
+    or it cannot be told; 130 interrupted.
     """
     try:
         said = load_statement(statement) if statement is not None else Statement()
         limits = load_thresholds(options.pop("thresholds")) if options["thresholds"] else ()
         options.pop("thresholds", None)
-        settings = settle(CliOptions.of(**options, thresholds=limits, command=_command_line()), said)
+        other = _other_robot(options, said)
+        settings = settle(CliOptions.of(**options, against=other, thresholds=limits, command=_command_line()), said)
         _check_folder(Path(settings.output.folder))
     except (TomlFileError, SettingsError) as error:
         click.echo(f"roaas load: {error}", err=True)

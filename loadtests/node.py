@@ -42,7 +42,7 @@ def _work(words: list[str]) -> None:
     token = Path(token_file).read_text("utf-8").strip() if token_file else None
     from loadtests.measuring.worker import serve  # noqa: PLC0415 -- imports Locust, which patches the process
 
-    serve(host, int(_value(words, "--master-port") or PORT), token)
+    serve(host, int(_value(words, "--master-port") or PORT), [token, token])  # one for both robots of --against
 
 
 def _value(words: list[str], option: str) -> str | None:

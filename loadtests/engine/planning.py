@@ -14,15 +14,20 @@ _LEAST_USERS, _MOST_USERS = 32, 512
 _STALL_S = 3.0  # the stall that the users of an open model outlast before arrivals queue for one
 
 
-def duel_plan(settings: Settings, robot: Robot) -> tuple[Plan, list[str]]:
-    """The plan of the duel between the interfaces, and notes on what cannot be measured."""
+def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
+    """The plan of the duel, between interfaces or two robots, and notes on what cannot be measured."""
     wanted = settings.selection
     interfaces, offers, missing = [], {}, set()
+    both = " on both robots" if len(robots) > 1 else ""
     for interface in wanted.interfaces:
         for client in wanted.clients:
-            numbers = [number for number, name in enumerate(wanted.operations) if robot.offers(interface, client, name)]
+            numbers = [
+                number
+                for number, name in enumerate(wanted.operations)
+                if all(robot.offers(interface, client, name) for robot in robots)
+            ]
             missing |= {
-                f"{name} is not measured over {interface} ({client}): no endpoint or WSDL for it"
+                f"{name} is not measured over {interface} ({client}): no endpoint or WSDL for it{both}"
                 for number, name in enumerate(wanted.operations)
                 if number not in numbers
             }
@@ -38,10 +43,11 @@ def duel_plan(settings: Settings, robot: Robot) -> tuple[Plan, list[str]]:
         interfaces=tuple(interfaces),
         clients=clients,
         load=settings.load,
-        timeout_s=robot.timeout_s,
+        timeout_s=max(robot.timeout_s for robot in robots),
         workers=workers,
         connections=users(settings, workers),
         offers=offers,
+        robots=len(robots),
     )
     return plan, sorted(missing)
 

@@ -33,6 +33,7 @@ from loadtests.result.outcome import Outcome, RunAborted
 from loadtests.result.terminal import summary
 
 if TYPE_CHECKING:
+    from loadtests.clients.robot import Robot
     from loadtests.schedule.plan import Plan
     from loadtests.settings.settings import Settings
     from loadtests.statistics.recorder import Recorder
@@ -49,9 +50,10 @@ class Run:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        self.robot = settings.robot
-        self.outcome = Outcome(settings, self.robot, datetime.now(UTC))
-        self.plan, _ = duel_plan(settings, self.robot)  # as far as can be said before the WSDLs are read
+        other = () if settings.against is None else (settings.against.robot,)
+        self.robots: tuple[Robot, ...] = (settings.robot, *other)
+        self.outcome = Outcome(settings, self.robots, datetime.now(UTC))
+        self.plan, _ = duel_plan(settings, *self.robots)  # as far as can be said before the WSDLs are read
         self.collector: Collector | None = None
         self._liveness = Liveness(REPORT_S if settings.generator.expect else 0.0)
         self._told = 0.0
@@ -72,12 +74,12 @@ class Run:
             RunAborted: a WSDL is wrong, or nobody answers.
         """
         try:
-            self.robot = self.outcome.robot = with_addresses(self.robot)
+            self.robots = self.outcome.robots = tuple(map(with_addresses, self.robots))
         except WsdlError as error:
             raise RunAborted(ExitCode.USAGE, str(error)) from None
         except CallError as error:
             raise RunAborted(ExitCode.UNREACHABLE, f"the robot cannot be reached: {error}") from None
-        self.plan, notes = duel_plan(self.settings, self.robot)
+        self.plan, notes = duel_plan(self.settings, *self.robots)
         self.outcome.notes += notes
 
     def check(self) -> None:
@@ -89,19 +91,21 @@ class Run:
         names = self.plan.series_names()
         if not names:
             raise RunAborted(ExitCode.USAGE, "no operation can be measured with these endpoints")
-        findings = self.outcome.findings = preflight(self.robot, names, self.settings.load.seed)
-        self.outcome.notes += findings.notes
-        if self.outcome.interrupted:
-            raise RunAborted(ExitCode.INTERRUPTED, "interrupted before the measurement began")
-        if findings.unreachable:
-            raise RunAborted(ExitCode.UNREACHABLE, "the robot cannot be reached: " + "; ".join(findings.messages()))
-        if findings.failures:
-            raise RunAborted(
-                ExitCode.INCONCLUSIVE, "the robot does not answer as it should: " + "; ".join(findings.messages())
-            )
-        self.outcome.invalid += [
-            f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
-        ]
+        for robot, whose in zip(self.robots, ("the robot", "the robot of --against"), strict=False):
+            findings = preflight(robot, names, self.settings.load.seed)
+            if whose == "the robot":
+                self.outcome.findings = findings
+            self.outcome.notes += [note for note in findings.notes if note not in self.outcome.notes]
+            told = "; ".join(findings.messages())
+            if self.outcome.interrupted:
+                raise RunAborted(ExitCode.INTERRUPTED, "interrupted before the measurement began")
+            if findings.unreachable:
+                raise RunAborted(ExitCode.UNREACHABLE, f"{whose} cannot be reached: {told}")
+            if findings.failures:
+                raise RunAborted(ExitCode.INCONCLUSIVE, f"{whose} does not answer as it should: {told}")
+            self.outcome.invalid += [
+                f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
+            ]
 
     # The measurement.
 
@@ -121,7 +125,7 @@ class Run:
                     stack.callback(serve(self.collector, generator.web_host, generator.metrics_port).stop)
                 if generator.web_port is not None:
                     self._web(executor, generator.web_host, generator.web_port)
-                executor.prepare(self.robot, plan)
+                executor.prepare(self.robots, plan)
             except GeneratorError as error:
                 raise RunAborted(
                     ExitCode.INTERRUPTED if self.outcome.interrupted else ExitCode.USAGE, str(error)

@@ -19,7 +19,7 @@ from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, boot_id,
 from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from loadtests.clients.robot import Robot
     from loadtests.schedule.plan import Plan
@@ -68,7 +68,7 @@ class DistributedExecutor:
         self.runner.register_message("roaas_done", self._on_done)
         self.environment.events.worker_report.add_listener(self._on_report)
 
-    def prepare(self, robot: Robot, plan: Plan) -> None:
+    def prepare(self, robots: Sequence[Robot], plan: Plan) -> None:
         """Start the workers of this machine, wait for all, and have their users come up.
 
         Raises:
@@ -81,7 +81,7 @@ class DistributedExecutor:
             )
             self._children[child.pid] = child
             if child.stdin is not None:
-                child.stdin.write(json.dumps({"token": robot.token}).encode() + b"\n")
+                child.stdin.write(json.dumps({"tokens": [robot.token for robot in robots]}).encode() + b"\n")
                 child.stdin.close()
         if self._expected > self._processes:
             self.tell(
@@ -89,7 +89,8 @@ class DistributedExecutor:
             )
         self._wait(lambda: sum(map(self._is_there, self._listening)) >= self._expected, "workers connected")
         job = {
-            "robot": asdict(replace(robot, token=None)),  # a token does not travel: each worker has its own
+            # A token does not travel: each worker has its own.
+            "robots": [asdict(replace(robot, token=None)) for robot in robots],
             "operations": list(plan.operations),
             "seed": plan.load.seed,
             "library": LIBRARY in plan.clients,

@@ -23,7 +23,7 @@ from loadtests.measuring.user_session import Session
 from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from loadtests.clients.robot import Robot
     from loadtests.schedule.plan import Plan
@@ -92,9 +92,9 @@ class LocalExecutor:
         self.pacing = ""
         self._session: Session | None = None
 
-    def prepare(self, robot: Robot, plan: Plan) -> None:
+    def prepare(self, robots: Sequence[Robot], plan: Plan) -> None:
         """Get ready: clients built, users waiting."""
-        session = Session(self.environment, robot, plan.operations, plan.load.seed, library=LIBRARY in plan.clients)
+        session = Session(self.environment, robots, plan.operations, plan.load.seed, library=LIBRARY in plan.clients)
         self._session = self.environment.roaas_session = session
         self.recorder, self.pacing = session.recorder, session.pacer.pacing
         users = plan.connections

@@ -17,7 +17,7 @@ from loadtests.schedule.pacer import Arrival, Pacer
 from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from loadtests.clients.failures import CallError
     from loadtests.clients.robot import Robot
@@ -42,12 +42,15 @@ class _Sink:
 
 
 class Session:
-    """A process's part in a run: operations by their plans' numbers, and whether plans may use the library client."""
+    """A process's part in a run: operations by their plans' numbers, and whether plans may use the library client.
+
+    `robots` are those that segments name by their place: the one under load, and the one that it is compared with.
+    """
 
     def __init__(
-        self, environment: Any, robot: Robot, operations: tuple[str, ...], seed: int, *, library: bool
+        self, environment: Any, robots: Sequence[Robot], operations: tuple[str, ...], seed: int, *, library: bool
     ) -> None:
-        self.robot = robot
+        self._timeout_s = max(robot.timeout_s for robot in robots)
         self.series_of: dict[int, int] = {}
         self.segments: dict[int, Segment] = {}
         self.feed = LocustFeed(environment, operations)
@@ -57,22 +60,16 @@ class Session:
         self._first = 0
         self._busy = 0
         self._cpu: list[tuple[float, float]] = []
-        documents: dict[str, Any] = {}
-        if library:
-            parsed: dict[str, Any] = {}
-            for name in operations:
-                wsdl = robot.wsdl(name)
-                if wsdl is not None and robot.offers("soap", LIBRARY, name):
-                    parsed[wsdl] = parsed.get(wsdl) or read_document(wsdl, robot)
-                    documents[name] = parsed[wsdl]
-        self.workload = Workload(robot, operations, seed, documents)
-        self.pacer = Pacer(int(robot.timeout_s * _NS), self._between, self._dropped)
+        self._workloads = [
+            Workload(robot, operations, seed, _documents(robot, operations) if library else {}) for robot in robots
+        ]
+        self.pacer = Pacer(int(self._timeout_s * _NS), self._between, self._dropped)
         self.after_segment: Callable[[], None] | None = None
 
     def work(self) -> None:
         """What a user does until it is killed: take a request, make it, take the next."""
-        caller = Caller(self.workload, _Sink(self))
-        perform, take, segments = caller.perform, self.pacer.take, self.segments
+        callers = [Caller(workload, _Sink(self)) for workload in self._workloads]
+        performs, take, segments = [caller.perform for caller in callers], self.pacer.take, self.segments
         try:
             while True:
                 arrival = take()
@@ -80,7 +77,7 @@ class Session:
                 segment = segments[number]
                 self._busy += 1
                 try:
-                    succeeded = perform(
+                    succeeded = performs[segment.robot](
                         number,
                         segment.interface,
                         segment.client,
@@ -94,7 +91,8 @@ class Session:
                 if not succeeded and not self.pacer.open_model:
                     gevent.sleep(_AFTER_ERROR_S)
         finally:
-            caller.close()
+            for caller in callers:
+                caller.close()
 
     def run(self, plan: Plan, worker: int, origin_ns: int, ceiling: float | None = None) -> None:
         """Carry out a worker's share of a plan, whose times count from `origin_ns` (monotonic).
@@ -115,7 +113,7 @@ class Session:
             schedule, origin_ns, open_model=plan.open_model, interval_ns=int(_NS / ceiling) if ceiling else 0
         )
         self.pacer.done.wait()
-        with gevent.Timeout(self.robot.timeout_s + 1, exception=False):
+        with gevent.Timeout(self._timeout_s + 1, exception=False):
             while self._busy:
                 gevent.sleep(0.01)
         self.recorder.flush()
@@ -143,3 +141,15 @@ class Session:
             self._cpu = [now]
         if self.after_segment is not None:
             self.after_segment()
+
+
+def _documents(robot: Robot, operations: tuple[str, ...]) -> dict[str, Any]:
+    """The parsed WSDL of each operation that zeep can call; a WSDL of several operations is read once."""
+    parsed: dict[str, Any] = {}
+    documents: dict[str, Any] = {}
+    for name in operations:
+        wsdl = robot.wsdl(name)
+        if wsdl is not None and robot.offers("soap", LIBRARY, name):
+            parsed[wsdl] = parsed.get(wsdl) or read_document(wsdl, robot)
+            documents[name] = parsed[wsdl]
+    return documents

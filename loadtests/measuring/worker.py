@@ -1,6 +1,6 @@
 """A worker process: `python -m loadtests.measuring.worker HOST PORT`, with a JSON object on its standard input.
 
-The object holds the robot's bearer token, `{"token": …}`, which does not travel over the network with the rest.
+The object holds the robots' bearer tokens, `{"tokens": […]}`, which do not travel over the network with the rest.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import platform
 import signal
 import sys
 import time
+from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 import gevent
@@ -28,10 +30,10 @@ _NS = 1_000_000_000
 class Worker:
     """Carries out what the master says."""
 
-    def __init__(self, environment: Any, host: str, port: int, token: str | None) -> None:
+    def __init__(self, environment: Any, host: str, port: int, tokens: Sequence[str | None]) -> None:
         locust.runners.WORKER_REPORT_INTERVAL = REPORT_S
         self.environment = environment
-        self.token = token
+        self.tokens = tokens
         self.session: Session | None = None
         self._report: dict[str, Any] | None = None
         self._reported = 0.0
@@ -46,8 +48,11 @@ class Worker:
         job = msg.data
         error = ""
         try:
-            robot = Robot(**job["robot"] | {"token": self.token})
-            self.session = Session(environment, robot, tuple(job["operations"]), job["seed"], library=job["library"])
+            robots = [
+                Robot(**robot | {"token": token})
+                for robot, token in zip_longest(job["robots"], self.tokens[: len(job["robots"])])
+            ]
+            self.session = Session(environment, robots, tuple(job["operations"]), job["seed"], library=job["library"])
             self.session.after_segment = self._pack
             environment.roaas_session = self.session
         except Exception as trouble:  # noqa: BLE001 -- whatever it is, the master has to hear of it
@@ -93,10 +98,10 @@ class Worker:
             self._reported = time.monotonic()
 
 
-def serve(host: str, port: int, token: str | None) -> None:
-    """Work until the master says quit, or is gone."""
+def serve(host: str, port: int, tokens: Sequence[str | None]) -> None:
+    """Work until the master says quit, or is gone; a token for each robot."""
     logging.getLogger("locust").setLevel(logging.ERROR)
-    Worker(new_environment(), host, port, token).runner.greenlet.join()
+    Worker(new_environment(), host, port, tokens).runner.greenlet.join()
 
 
 def _follow(parent: int) -> None:
@@ -111,7 +116,7 @@ def main() -> None:
     told = json.loads(sys.stdin.readline() or "{}")
     gevent.signal_handler(signal.SIGINT, lambda: None)  # the master says when to stop
     gevent.spawn(_follow, os.getppid())
-    serve(sys.argv[1], int(sys.argv[2]), told.get("token"))
+    serve(sys.argv[1], int(sys.argv[2]), told.get("tokens", []))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from loadtests.measuring.environment import describe
 from loadtests.result.files import FORMAT
 from loadtests.schedule.arrivals import Schedule, arrivals_due
 from loadtests.schedule.plan import GAP_S, step_operation
-from loadtests.statistics import figures, steps, verdict
+from loadtests.statistics import against, figures, steps, verdict
 from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
@@ -39,7 +39,9 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
     workers, losses = _workers(outcome, plan)
     judged = [] if aborted else verdict.judge(measured, settings.thresholds)
-    code = _code(outcome, aborted, reasons, judged)
+    noise_floor = figures.noise_floor(measured)
+    compared = _against(outcome, measured, noise_floor)
+    code = _code(outcome, aborted, reasons, judged, compared)
     document = {
         "format": FORMAT,
         "valid": not reasons,
@@ -49,13 +51,14 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "exit_code": code,
         "started": _stamp(outcome.started),
         "finished": _stamp(datetime.now(UTC)),
-        "environment": describe(outcome.robot, settings.output, outcome.findings.servers),
+        "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers),
         "plan": _plan_words(settings, plan, pacing),
         "generator": generator,
         "workers": workers,
         "series": figures.series(measured, outcome.findings.sizes),
         "comparisons": figures.comparisons(measured),
-        "noise_floor": figures.noise_floor(measured),
+        "noise_floor": noise_floor,
+        **({"against": compared} if compared else {}),
         "time_series": figures.time_series(measured),
         "steps": outcome.steps,
         "knee": _knee(outcome, plan),
@@ -67,7 +70,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
 
 def _generator(outcome: Outcome, measured: figures.Measured) -> dict[str, Any]:
     plan = measured.plan
-    asked = sum(arrivals_due(plan, outcome.elapsed_s, phase=phase) for phase in ("duel", "aa"))
+    asked = sum(arrivals_due(plan, outcome.elapsed_s, phase=phase) for phase in ("duel", "aa", "against"))
     elapsed_s = max(0.0, outcome.elapsed_s - plan.load.warmup_s)
     return verdict.generator_figures(measured, asked, elapsed_s, outcome.cpu_share)
 
@@ -82,7 +85,24 @@ def _endings(outcome: Outcome, plan: Plan) -> list[str]:
     return found
 
 
-def _code(outcome: Outcome, aborted: RunAborted | None, reasons: list[str], judged: list[dict[str, Any]]) -> int:
+def _against(outcome: Outcome, measured: figures.Measured, noise_floor: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """What became of the comparison with another robot, where there is one."""
+    settings = outcome.settings.against
+    if settings is None:
+        return None
+    other = outcome.robots[1]
+    return {
+        "robot": {"rest": other.rest, "publishers": other.publishers, "subscribers": other.subscribers}
+    } | against.against(measured, noise_floor, settings.tolerance)
+
+
+def _code(
+    outcome: Outcome,
+    aborted: RunAborted | None,
+    reasons: list[str],
+    judged: list[dict[str, Any]],
+    compared: dict[str, Any] | None,
+) -> int:
     if aborted is not None:
         return aborted.code
     if outcome.interrupted:
@@ -90,9 +110,10 @@ def _code(outcome: Outcome, aborted: RunAborted | None, reasons: list[str], judg
     if reasons:
         return ExitCode.INCONCLUSIVE
     outcomes = {entry["outcome"] for entry in judged}
-    if "missed" in outcomes:
+    following = against.code_of(compared)
+    if "missed" in outcomes or following == ExitCode.FAILED:
         return ExitCode.FAILED
-    return ExitCode.INCONCLUSIVE if "inconclusive" in outcomes else ExitCode.PASSED
+    return ExitCode.INCONCLUSIVE if "inconclusive" in outcomes else following
 
 
 def _early_errors(findings: Findings) -> list[dict[str, Any]]:

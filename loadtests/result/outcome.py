@@ -28,7 +28,8 @@ class Outcome:
     """What became of a run so far.
 
     Attributes:
-        findings: of the calls before the run.
+        robots: the one under load, and the one that it is compared with, if any.
+        findings: of the calls to the first before the run.
         notes: worth knowing; invalid: makes the run worthless.
         interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
         elapsed_s: how much of the plan was carried out.
@@ -37,7 +38,7 @@ class Outcome:
     """
 
     settings: Settings
-    robot: Robot
+    robots: tuple[Robot, ...]
     started: datetime
     findings: Findings = field(default_factory=Findings)
     notes: list[str] = field(default_factory=list)

@@ -27,6 +27,7 @@ def summary(document: dict[str, Any]) -> str:
                 f"{entry['operation']} ({entry['client']}): SOAP takes {entry['ratio']:.3f}{between} times as long "
                 f"as REST at the median, {entry['soap_minus_rest_ms']:+.3f} ms"
             )
+    lines += _against(document.get("against"))
     for entry in document["knee"]:
         highest = entry["highest_rate"]
         reached = (
@@ -40,3 +41,22 @@ def summary(document: dict[str, Any]) -> str:
     lines += [f"note: {note}" for note in document["notes"]]
     lines += [f"not valid: {reason}" for reason in document["invalid_because"]]
     return "\n".join(lines) + "\n"
+
+
+def _against(compared: dict[str, Any] | None) -> list[str]:
+    """What the comparison with another robot found, a line for each figure that is judged, and the verdict."""
+    if compared is None:
+        return []
+    lines = []
+    for entry in compared["changes"]:
+        if entry["verdict"] is None or entry["ratio"] is None:
+            continue
+        interval = entry["ci95"]
+        between = f" (95 %: {interval[0]:.3f} to {interval[1]:.3f})" if interval else ""
+        lines.append(
+            f"{entry['operation']} over {entry['interface']} ({entry['client']}): {entry['ratio']:.3f}{between} times "
+            f"as long as the other robot at {entry['quantile']}, {entry['difference_ms']:+.3f} ms: {entry['verdict']}"
+        )
+    told = {"slower": "slower", "not slower": "shown not to be slower", "unclear": "it cannot be told: measure longer"}
+    tolerance = f"{compared['tolerance']:.3g}"
+    return [*lines, f"against the other robot, tolerance {float(tolerance):.1%}: {told[compared['verdict']]}"]

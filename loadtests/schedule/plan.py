@@ -4,12 +4,15 @@ A fair duel: REST and SOAP take turns in blocks of a tenth of a second or more, 
 or the reverse by lot (ABBA), so that a drift of the machine or the robot meets both alike. In every fifth
 quartet one interface meets itself under two names (A/A): what difference that shows is noise. The library
 clients get quartets of their own, for their CPU time would delay the wire client's starts.
+
+Two robots take turns likewise, over one interface in each quartet.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import msgspec
@@ -44,10 +47,11 @@ class Segment:
 
     Attributes:
         start_ns, end_ns: offsets from the run's start.
-        phase: `warmup`, `duel`, `aa` or `step`.
+        phase: `warmup`, `duel`, `aa`, `against` (the duel's blocks of the other robot) or `step`.
         label: in phase `aa` the name that the interface goes by, `a` or `b`.
         pair: neighbours that are compared share a number.
         rate: arrivals per second over all workers; 0 in the closed model.
+        robot: which robot is called: 0, or 1 for the one that it is compared with.
     """
 
     start_ns: int
@@ -58,6 +62,7 @@ class Segment:
     label: str
     pair: int
     rate: float
+    robot: int = 0
 
 
 @dataclass(frozen=True)
@@ -85,6 +90,7 @@ class Plan:
 
     Attributes:
         offers: operation numbers by `interface/client`, where not all are offered.
+        robots: 2 where two robots meet in place of two interfaces.
         first_segment: numbers the segments on from those of the plan before it.
         step_rate: a step of the stepped load instead of a duel: arrivals per second.
     """
@@ -100,6 +106,7 @@ class Plan:
     step_rate: float | None = None
     first_segment: int = 0
     settle_s: float = field(default=0.5)
+    robots: int = 1
 
     def as_message(self) -> dict[str, Any]:
         """A form that msgpack carries."""
@@ -160,15 +167,15 @@ class Plan:
         return self.segments[-1].end_ns / _NS if self.segments else 0.0
 
     def _warmup(self) -> list[Segment]:
-        turns = [(client, interface) for client in self.clients for interface in self.interfaces]
+        turns = list(product(self.clients, self.interfaces, range(self.robots)))
         if self.load.warmup_s <= 0:
             return []
         count = max(len(turns), round(self.load.warmup_s / _BLOCK_S))
         made = []
         for index in range(count):
-            client, interface = turns[index % len(turns)]
+            client, interface, robot = turns[index % len(turns)]
             start, end = (int(self.load.warmup_s * edge / count * _NS) for edge in (index, index + 1))
-            made.append(Segment(start, end, "warmup", interface, client, "", -1, self.rate_of(client)))
+            made.append(Segment(start, end, "warmup", interface, client, "", -1, self.rate_of(client), robot))
         return made
 
     def _duel(self) -> list[Segment]:
@@ -189,16 +196,20 @@ class Plan:
         client = self.clients[-1] if turn == _LIBRARY_TURN else self.clients[0]
         if turn == _AA_TURN:
             interface = self.interfaces[(number // _TURNS) % len(self.interfaces)]
-            sides = [("aa", interface, "a"), ("aa", interface, "b")]
+            sides = [("aa", interface, "a", 0), ("aa", interface, "b", 0)]
+        elif self.robots > 1:
+            earlier = number - (number + _TURNS - 1 - _AA_TURN) // _TURNS  # duels before it: interfaces take turns
+            interface = self.interfaces[earlier % len(self.interfaces)]
+            sides = [("duel", interface, "", 0), ("against", interface, "", 1)]
         else:
-            sides = [("duel", interface, "") for interface in self.interfaces]
+            sides = [("duel", interface, "", 0) for interface in self.interfaces]
         if swapped:
             sides.reverse()
         first, second = sides[0], sides[-1]
         rate = self.rate_of(client)
         return [
-            Segment(0, 0, phase, interface, client, label, 0, rate)
-            for phase, interface, label in (first, second, second, first)
+            Segment(0, 0, phase, interface, client, label, 0, rate, robot)
+            for phase, interface, label, robot in (first, second, second, first)
         ]
 
     def _steps(self) -> list[Segment]:
@@ -224,7 +235,7 @@ class Plan:
 #: Every series that there can be: (phase, interface, client). Their numbers are the same in all plans and workers.
 SERIES = [
     (phase, interface, client)
-    for phase in ("warmup", "duel", "aa", "step")
+    for phase in ("warmup", "duel", "aa", "step", "against")
     for interface in INTERFACES
     for client in CLIENTS
 ]

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.statement import Endpoints
+from conformance.contract.statement import Endpoints, Statement
 from loadtests.settings.settings import STEP_S, Generator, Selection
+
+TOLERANCE = 0.05
 
 if TYPE_CHECKING:
     from conformance.contract.thresholds import Threshold
@@ -18,6 +20,8 @@ class CliOptions:
 
     Attributes:
         endpoints: those that were given of the statement's [endpoints], which they override.
+        against: what is said of the other robot.
+        tolerance: by which share the robot may be slower than that.
     """
 
     endpoints: dict[str, Any] = field(default_factory=dict)
@@ -34,6 +38,8 @@ class CliOptions:
     step_s: float = STEP_S
     allow_motion: bool = False
     thresholds: tuple[Threshold, ...] = ()
+    against: Statement | None = None
+    tolerance: float = TOLERANCE
     out: str = ""
     command: str = ""
 

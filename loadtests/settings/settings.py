@@ -67,12 +67,26 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Against:
+    """The robot that the one under load is compared with.
+
+    Attributes:
+        robot: its addresses.
+        tolerance: by which share the robot under load may be slower.
+    """
+
+    robot: Robot
+    tolerance: float
+
+
+@dataclass(frozen=True)
 class Settings:
     """A run. Whatever was not asked for is filled in.
 
     Attributes:
         robot: addresses of the selected interfaces only; a SOAP address that only the WSDL knows is None.
         load: rate is None in the closed model.
+        against: None where no other robot takes part.
     """
 
     robot: Robot
@@ -83,6 +97,7 @@ class Settings:
     generator: Generator
     output: Output
     thresholds: tuple[Threshold, ...]
+    against: Against | None = None
 
     def to_json(self) -> str:
         """For the process that measures."""

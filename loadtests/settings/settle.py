@@ -11,7 +11,7 @@ import msgspec
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.robot import Robot
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS, Load
-from loadtests.settings.settings import Limits, Output, Selection, Settings, Steps
+from loadtests.settings.settings import Against, Limits, Output, Selection, Settings, Steps
 
 if TYPE_CHECKING:
     from conformance.contract.statement import Endpoints, Statement
@@ -26,6 +26,7 @@ MOTION_RATE = 500.0
 MOTION_DURATION_S = 120.0
 _MOST_RATE = 1_000_000.0
 _MOST_USERS = 10_000
+_MOST_TOLERANCE = 10.0
 _MOST_DURATION_S = 24 * 3600.0
 
 
@@ -46,13 +47,12 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
     _check_numbers(options)
     rate, duration_s = _bounded(options, statement, operations)
     generator = options.generator
-    return Settings(
+    clients = tuple(name for name in CLIENTS if name in (options.selection.clients or CLIENTS))
+    if options.against is not None:
+        interfaces, clients = _shared(options.against.endpoints, interfaces), clients[:1]
+    settings = Settings(
         robot=_robot(endpoints, interfaces),
-        selection=Selection(
-            operations=operations,
-            interfaces=interfaces,
-            clients=tuple(name for name in CLIENTS if name in (options.selection.clients or CLIENTS)),
-        ),
+        selection=Selection(operations=operations, interfaces=interfaces, clients=clients),
         load=Load(
             rate=rate,
             users=options.users,
@@ -68,6 +68,41 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
         ),
         output=Output(options.out, options.command, statement.robot),
         thresholds=options.thresholds or statement.load.thresholds,
+    )
+    return settings if options.against is None else _compared(settings, options.against, options.tolerance)
+
+
+def _shared(other: Endpoints, interfaces: tuple[str, ...]) -> tuple[str, ...]:
+    """The interfaces that the robot of --against has too."""
+    there = {"rest": bool(other.rest), "soap": other.publishers or other.subscribers}
+    shared = tuple(name for name in interfaces if there[name])
+    if not shared:
+        raise SettingsError(
+            f"--against names a robot without {' or '.join(interfaces)}: nothing can be compared (its SOAP services "
+            "are named by --against-publishers-wsdl and --against-subscribers-wsdl)"
+        )
+    return shared
+
+
+def _compared(settings: Settings, other: Statement, tolerance: float) -> Settings:
+    """The settings of a run against another robot, whose own limits hold as well."""
+    _check_endpoints(other.endpoints)
+    if settings.steps.rates:
+        raise SettingsError("--against compares two robots, and --steps loads one: run them one after the other")
+    if not 0 < tolerance <= _MOST_TOLERANCE:
+        raise SettingsError(f"--tolerance {tolerance:.3%} is out of range: above 0, at most {_MOST_TOLERANCE:.0%}")
+    operations, load = settings.selection.operations, settings.load
+    most, why = _ceiling(other, operations)
+    longest, reason = _longest(other, operations)
+    if most is not None and load.rate is not None and load.rate > most:
+        raise SettingsError(f"--rate {load.rate:g} exceeds {most:g} requests/s ({why}; of the robot of --against)")
+    if longest is not None and load.duration_s > longest:
+        raise SettingsError(f"--duration {load.duration_s:g} exceeds {longest:g} s ({reason}; of that of --against)")
+    ceilings = [rate for rate in (settings.limits.max_rate, most) if rate is not None]
+    return replace(
+        settings,
+        limits=replace(settings.limits, max_rate=min(ceilings, default=None)),
+        against=Against(_robot(other.endpoints, settings.selection.interfaces), tolerance),
     )
 
 

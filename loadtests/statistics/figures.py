@@ -89,9 +89,11 @@ class Measured:
             whole.merge(cell)
         return whole
 
-    def interval(self, name: SeriesName, time: str, quantile: str) -> tuple[list[float] | None, str | None]:
-        """The 95 % interval in ms of a series' service or response time in the duel; or None, and why."""
-        histograms = [getattr(cell, time) for _, cell in self.blocks("duel", name)]
+    def interval(
+        self, name: SeriesName, time: str, quantile: str, phase: str = "duel"
+    ) -> tuple[list[float] | None, str | None]:
+        """The 95 % interval in ms of a series' service or response time in a phase; or None, and why."""
+        histograms = [getattr(cell, time) for _, cell in self.blocks(phase, name)]
         interval, reason = quantile_interval_ms(histograms, quantile, self.plan.load.seed)
         return rounded_interval(interval), reason
 
@@ -144,6 +146,8 @@ def series(measured: Measured, sizes: dict[SeriesName, tuple[int, int]]) -> list
 def comparisons(measured: Measured) -> list[dict[str, Any]]:
     """SOAP against REST, by operation, client and quantile, over the service time."""
     found: list[dict[str, Any]] = []
+    if measured.plan.robots > 1:
+        return found  # robots took turns, not interfaces
     names = set(measured.plan.series_names())
     for operation in measured.plan.operations:
         for client in measured.plan.clients:
@@ -154,7 +158,7 @@ def comparisons(measured: Measured) -> list[dict[str, Any]]:
             pairs = [(first[pair], second[pair]) for pair in sorted(set(first) & set(second))]
             found += [
                 {"operation": operation, "client": client}
-                | _compared(pairs, quantile, measured.plan.load.seed, "soap_minus_rest_ms")
+                | compared(pairs, quantile, measured.plan.load.seed, "soap_minus_rest_ms")
                 for quantile in COMPARED
             ]
     return found
@@ -170,7 +174,7 @@ def noise_floor(measured: Measured) -> list[dict[str, Any]]:
             first, second = (dict(_services(measured.blocks("aa", name, label))) for label in ("a", "b"))
             pairs = [(first[pair], second[pair]) for pair in sorted(set(first) & set(second))]
             found += [
-                named(name) | _compared(pairs, quantile, measured.plan.load.seed, "difference_ms")
+                named(name) | compared(pairs, quantile, measured.plan.load.seed, "difference_ms")
                 for quantile in COMPARED
             ]
     return found
@@ -180,7 +184,8 @@ def _services(blocks: list[tuple[int, Cell]]) -> list[tuple[int, Histogram]]:
     return [(pair, cell.service) for pair, cell in blocks]
 
 
-def _compared(pairs: list[tuple[Histogram, Histogram]], quantile: str, seed: int, difference: str) -> dict[str, Any]:
+def compared(pairs: list[tuple[Histogram, Histogram]], quantile: str, seed: int, difference: str) -> dict[str, Any]:
+    """Two sides by their pairs of blocks, at one quantile: what latency.json says, `difference` being its key."""
     fewest = min((sum(pair[side].total for pair in pairs) for side in (0, 1)), default=0)
     needed = 2 if quantile == "mean" else samples_for_point(SHARES[quantile])
     result = compare(pairs, quantile, seed) if fewest >= needed else None
@@ -207,7 +212,7 @@ def time_series(measured: Measured) -> dict[str, Any]:
         number = measured.plan.operations.index(operation)
         seconds: dict[int, Cell] = defaultdict(Cell)
         for index, segment in enumerate(measured.plan.segments):
-            if segment.phase == "warmup" or (segment.interface, segment.client) != (interface, client):
+            if segment.phase not in {"duel", "aa"} or (segment.interface, segment.client) != (interface, client):
                 continue
             cell = measured.recorder.cells.get((measured.plan.first_segment + index, number))
             if cell is not None:

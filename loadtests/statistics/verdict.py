@@ -34,7 +34,7 @@ def generator_figures(measured: Measured, asked: int, elapsed_s: float, cpu_shar
     lag, wire = Histogram(), "wire" in plan.clients
     total = Cell()
     for name in measured.plan.series_names():
-        for phase in ("duel", "aa"):
+        for phase in ("duel", "aa", "against"):
             cell = measured.total(phase, name)
             total.merge(cell)
             if name[2] == "wire" or not wire:

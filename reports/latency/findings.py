@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from reports.latency import against
 from reports.latency.distributions import Series
 from reports.latency.figures.spans import means
 from reports.latency.figures.timeline import Stall, stalls
@@ -41,14 +42,23 @@ def verdict(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         return Verdict("warning", "?", f"{unsure} of {_count(len(outcomes), 'threshold')} undecided", found)
     if not any(one.data["count"] for one in series.values()):
         return Verdict("warning", "?", "Nothing was measured", found)
-    if outcomes:
-        words = "The threshold is met" if len(outcomes) == 1 else f"All {len(outcomes)} thresholds are met"
-        return Verdict("good", "✓", words, found)
-    return Verdict("quiet", "✓", _in_short(result), found)
+    return Verdict(*_good_news(result, len(outcomes)), found)
+
+
+def _good_news(result: Mapping[str, Any], met: int) -> tuple[str, str, str]:
+    """Tone, sign and words of a valid result that missed none of its thresholds, of which it `met` so many."""
+    compared = against.short(result)
+    if compared is not None:
+        return compared
+    if met:
+        return "good", "✓", "The threshold is met" if met == 1 else f"All {met} thresholds are met"
+    return "quiet", "✓", _in_short(result)
 
 
 def headline(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> str:
-    """How SOAP compares with REST at the median, for the operation and client that tell most."""
+    """How SOAP compares with REST at the median, for the operation and client that tell most; or robot with robot."""
+    if result.get("against"):
+        return against.sentence(result)
     leading = _leading(result)
     if leading is None:
         return _alone(series)

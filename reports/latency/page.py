@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from reports.latency import against
 from reports.latency.distributions import Series, all_series
 from reports.latency.figures.canvas import COLOUR, INK, Picture
 from reports.latency.figures.load import load
@@ -76,6 +77,7 @@ def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         "share": share,
         "interval": interval,
         "none": NONE,
+        "tag": against.tag,
     }
 
 
@@ -101,6 +103,7 @@ def paper_rows(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], 
 
 def _pictures(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> dict[str, Picture | None]:
     return {
+        "against": against.picture(result),
         "ratios": _ratio_picture(result),
         "spectrum": spectrum(series),
         "density": density(series),

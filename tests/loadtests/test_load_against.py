@@ -1,0 +1,84 @@
+"""Two robots in one duel: which of them is slower, or whether that can be told at all."""
+
+import re
+
+import pytest
+from click.testing import CliRunner
+
+from conformance.contract.exit_codes import ExitCode
+from loadtests.cli import load as command
+
+FAST = "--rate 150 --duration 3.2 --warmup 0.2 --client wire"
+
+
+def against(other):
+    """Options that name the other robot's interfaces."""
+    words = other.both()
+    words[0] = "--against"
+    return [re.sub("^--(publishers|subscribers)", r"--against-\1", word) for word in words]
+
+
+def change(result, interface, quantile="p50"):
+    return next(
+        entry
+        for entry in result["against"]["changes"]
+        if (entry["interface"], entry["quantile"]) == (interface, quantile)
+    )
+
+
+def test_a_robot_that_is_slower_than_another_is_told_from_it(toy, load):
+    quick, slow = toy(), toy("--delay", "0.004")
+    run = load(*slow.both(), *against(quick), FAST, "--tolerance 50%")
+    assert run.code == ExitCode.FAILED, run.out + run.err
+    result = run.result
+    assert result["against"]["verdict"] == "slower"
+    for interface in ("rest", "soap"):
+        found = change(result, interface)
+        assert found["difference_ms"] == pytest.approx(4, abs=1.5)
+        assert found["ci95"][0] > 1.5
+        assert found["verdict"] == "slower"
+    assert result["comparisons"] == [], "no interface met another one: robots did"
+    assert "slower" in run.out
+    assert all(entry["count"] for entry in (*result["series"], *result["against"]["series"]))
+
+
+def test_what_cannot_be_told_is_not_said(toy, load):
+    robot = toy()
+    run = load(*robot.both(), *against(robot), "--rate 60 --duration 0.6 --warmup 0.1 --client wire --tolerance 0.001%")
+    assert run.code == ExitCode.INCONCLUSIVE
+    assert run.result["against"]["verdict"] == "unclear"
+
+
+def test_a_quicker_robot_is_cleared_by_workers_that_share_the_load_on_both(toy, load, tmp_path):
+    other = tmp_path / "other.toml"
+    other.write_text(f'[endpoints]\nrest = "{toy("--delay", "0.004").url}"\n')
+    run = load("--rest", toy().url, "--against", other, FAST, "--processes 2 --tolerance 50%")
+    assert run.code == ExitCode.PASSED, run.out + run.err
+    assert [entry["interface"] for entry in run.result["against"]["series"]] == ["rest"]
+    assert change(run.result, "rest")["ci95"][1] < 1
+    assert run.result["generator"]["scheduled"] == run.result["generator"]["started"] == 480
+
+
+def test_the_other_robot_has_to_be_there_as_well(toy, load, free_port):
+    run = load("--rest", toy().url, f"--against http://127.0.0.1:{free_port}", FAST)
+    assert run.code == ExitCode.UNREACHABLE
+    assert "the robot of --against cannot be reached" in run.err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--against http://b:2 --interface soap --publishers-wsdl a.wsdl", "without soap"),
+        ("--against b:2", "b:2"),
+        ("--against http://b:2 --tolerance much", "'much' is no percentage"),
+        ("--against http://b:2 --tolerance 0", "--tolerance 0.000% is out of range"),
+        ("--against http://b:2 --steps", "one after the other"),
+        ("--against slow.toml --rate 90", "--rate 90 exceeds 80 requests/s (the statement's [endpoints] request_rate"),
+    ],
+)
+def test_comparisons_that_cannot_be(options, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "slow.toml").write_text('[endpoints]\nrest = "http://b:2"\nrequest_rate = 80\n')
+    ended = CliRunner().invoke(command, ["--rest", "http://a:1", *options.split()])
+    assert ended.exit_code == ExitCode.USAGE
+    assert message in ended.output
