@@ -34,7 +34,8 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
         angular_rad_s: greatest turning rate, rad/s.
         settle_s: time within which a commanded velocity is reached, s.
         hold_s: time for which a velocity holds unless renewed, s; None: not declared, not judged.
-        tolerance: relative tolerance of a reached velocity; tolerance_abs: the absolute one, m/s or rad/s.
+        tolerance: relative tolerance of a reached velocity; tolerance_linear_m_s: the absolute one of its linear part,
+            m/s; tolerance_angular_rad_s: of its angular part, rad/s.
         noise: of the odometry.
         odometry_hz: how often there is a new odometry, Hz; None: not declared, and seen by its stamps.
         time_scale: by how much the robot's clock is faster than the one on the wall.
@@ -47,7 +48,8 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
     settle_s: float = 2.0
     hold_s: float | None = None
     tolerance: float = 0.05
-    tolerance_abs: float = 0.02
+    tolerance_linear_m_s: float = 0.02
+    tolerance_angular_rad_s: float = 0.02
     noise: Noise = Noise()
     odometry_hz: float | None = None
     time_scale: float = 1.0
@@ -64,11 +66,16 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
     def tolerances(self) -> dict[str, float]:
         """The tolerances by name, as a result shows them, and the noise where there is any."""
         noise = {f"noise_{name}": figure for name, figure in msgspec.structs.asdict(self.noise).items() if figure}
-        return {"tolerance": self.tolerance, "tolerance_abs": self.tolerance_abs, **noise}
+        linear, angular = self.tolerance_linear_m_s, self.tolerance_angular_rad_s
+        absolute = {"tolerance_linear_m_s": linear, "tolerance_angular_rad_s": angular}
+        same = {"tolerance_abs": linear} if linear == angular else {}
+        return {"tolerance": self.tolerance, **same, **absolute, **noise}
 
 
 class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The table ``[limits]`` of a statement: fields as in Limits; None: not declared.
+
+    ``tolerance_abs`` is one figure for both absolute tolerances, where they are not named themselves.
 
     The bounds are the contract's (contract.md#statement): by a wider tolerance a robot would be judged by nothing.
     """
@@ -78,8 +85,9 @@ class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     settle_s: Annotated[float, Meta(ge=0, le=5)] | None = None
     hold_s: Annotated[float, Meta(ge=0.2, le=10)] | None = None
     tolerance: Annotated[float, Meta(ge=0, le=0.25)] | None = None
-    # One figure for both: what is allowed in rad/s (0.2) is twice what is in m/s.
     tolerance_abs: Annotated[float, Meta(ge=0, le=0.1)] | None = None
+    tolerance_linear_m_s: Annotated[float, Meta(ge=0, le=0.1)] | None = None
+    tolerance_angular_rad_s: Annotated[float, Meta(ge=0, le=0.2)] | None = None
     noise: Noise | None = None
     odometry_hz: Positive | None = None
     time_scale: Positive | None = None
@@ -87,6 +95,9 @@ class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def resolved(self) -> Limits:
         """What the robot is judged by."""
         declared = {name: figure for name, figure in msgspec.structs.asdict(self).items() if figure is not None}
+        both = declared.pop("tolerance_abs", None)
+        if both is not None:
+            declared = {"tolerance_linear_m_s": both, "tolerance_angular_rad_s": both} | declared
         return Limits(
             **declared, linear_declared="linear_m_s" in declared, angular_declared="angular_rad_s" in declared
         )

@@ -46,7 +46,8 @@ classes = [
 # settle_s = 0.6             # a commanded velocity is reached within
 # hold_s = 1.0               # a velocity holds for, unless renewed
 # tolerance = 0.05           # of a reached velocity, relative
-# tolerance_abs = 0.02       # and absolute, m/s or rad/s
+# tolerance_linear_m_s = 0.02     # and absolute
+# tolerance_angular_rad_s = 0.02
 
 [motion]
 # Where the robot may be driven. Without an arena, goals stay within radius_m of where it is.

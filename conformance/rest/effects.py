@@ -47,7 +47,7 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
         other = [
             f"{place} is {shown.get(place, 'nothing')!r} for {value!r}"
             for place, value in wanted.items()
-            if not place.endswith("[]") and not _near(api, shown.get(place), value)
+            if not place.endswith("[]") and not _near(api, place, shown.get(place), value)
         ]
         if not other:
             return ""
@@ -59,8 +59,9 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
         time.sleep(_PAUSE_S)
 
 
-def _near(api: RestInterface, shown: Any, wanted: Any) -> bool:
+def _near(api: RestInterface, place: str, shown: Any, wanted: Any) -> bool:
     if not (isinstance(shown, float) and isinstance(wanted, float)):
         return bool(shown == wanted)
     limits = api.run.statement.limits
-    return abs(shown - wanted) <= limits.tolerance_abs + limits.tolerance * abs(wanted)
+    room = limits.tolerance_angular_rad_s if "angular" in place else limits.tolerance_linear_m_s
+    return abs(shown - wanted) <= room + limits.tolerance * abs(wanted)

@@ -163,14 +163,16 @@ class Observer(Listener):
         """The measured speed is within the declared limits at any time, also on the robot's own missions."""
         limits = self._api.run.statement.limits
         samples.add(twist, self._last_stamp)
-        for part, limit, declared, noise in (
-            ("linear", limits.linear_m_s, limits.linear_declared, limits.noise.linear_m_s),
-            ("angular", limits.angular_rad_s, limits.angular_declared, limits.noise.angular_rad_s),
+        linear, angular = limits.tolerance_linear_m_s, limits.tolerance_angular_rad_s
+        for part, limit, absolute, noise in (
+            ("linear", limits.linear_m_s, linear, limits.noise.linear_m_s),
+            ("angular", limits.angular_rad_s, angular, limits.noise.angular_rad_s),
         ):
+            declared = limits.linear_declared if part == "linear" else limits.angular_declared
             if part not in twist or not declared:
                 continue
             fastest = samples.fastest(part)
-            room = limits.tolerance_abs + FARTHEST * noise / math.sqrt(SEVERAL)
+            room = absolute + FARTHEST * noise / math.sqrt(SEVERAL)
             self._api.run.judge.check(
                 "safety/limits-hold",
                 fastest <= limit * (1 + limits.tolerance) + room,

@@ -1,8 +1,9 @@
 """Whether a pose moves by what its velocity says: the velocity is summed up and compared with the way that was made.
 
-Not from the first reading to the last, each of which may be out: windows of a quarter of the way begin at each reading,
-and the median window counts, as far as it would lead on the whole way. A jump of the localisation is in fewer than half
-of them; another unit is in all.
+Not only from the first reading to the last, each of which may be out: windows of a quarter of the way begin at each
+reading, and the median window counts, as far as it would lead on the whole way. A jump of the localisation is in fewer
+than half of them, and readings that are far apart, over a slow link, make windows coarse; what is wrong with the
+robot, as another unit, is in most windows and in the whole.
 """
 
 import itertools
@@ -76,6 +77,13 @@ class _Sums(NamedTuple):
             found.append((times * way, times * abs(two.turn_error - one.turn_error)))
         return found
 
+    @property
+    def whole_miss(self) -> tuple[float, float]:
+        """By how far the way from the first reading to the last misses the pose and the heading."""
+        (first, *_, last), whole = self.trace, self.each[-1]
+        way = math.hypot(last.pose.x - first.pose.x - whole.x, last.pose.y - first.pose.y - whole.y)
+        return way, abs(whole.turn_error)
+
 
 def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sums:
     steps = [_Sum()]
@@ -129,7 +137,7 @@ def _judge_way(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
         whole = one.each[-1]
         windows = one.misses([each.length for each in one.each])
         room = _SHARE * whole.length + _OFF + whole.off + _NOISES * noise.position_m
-        misses.append(median(way for way, _ in windows) - room if windows else 0.0)
+        misses.append(min(median(way for way, _ in windows), one.whole_miss[0]) - room if windows else 0.0)
     (first, *_, last), whole = sums[0].trace, sums[0].each[-1]
     judge.check(
         "rest-resources/pose-motion",
@@ -149,7 +157,7 @@ def _judge_turn(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
         whole = one.each[-1]
         windows = one.misses([each.turned for each in one.each])
         room = _SHARE * whole.turned + _OFF_TURN + whole.off_turn + _NOISES * noise.heading_rad
-        misses.append(median(turn for _, turn in windows) - room if windows else 0.0)
+        misses.append(min(median(turn for _, turn in windows), one.whole_miss[1]) - room if windows else 0.0)
     whole = sums[0].each[-1]
     judge.check(
         "rest-resources/pose-rotation",

@@ -78,10 +78,11 @@ def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float 
     """
     noise = limits.noise
     off = FARTHEST / math.sqrt(samples)
-    rooms = (*[off * noise.linear_m_s] * 3, *[off * noise.angular_rad_s] * 3)
+    linear = factor * limits.tolerance_linear_m_s + off * noise.linear_m_s
+    angular = factor * limits.tolerance_angular_rad_s + off * noise.angular_rad_s
     return all(
-        abs(one - other) <= factor * (limits.tolerance_abs + limits.tolerance * abs(other)) + room
-        for one, other, room in zip(measured, wanted, rooms, strict=True)
+        abs(one - other) <= factor * limits.tolerance * abs(other) + room
+        for one, other, room in zip(measured, wanted, (linear,) * 3 + (angular,) * 3, strict=True)
     )
 
 

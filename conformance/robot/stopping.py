@@ -66,10 +66,12 @@ def leave_at_rest(api: RestInterface) -> None:
         return
 
 
-def _slowest(api: RestInterface) -> float:
-    """The greatest speed, m/s or rad/s, that counts as rest: two noisy samples of which may follow each other."""
+def _slowest(api: RestInterface) -> Velocity:
+    """The greatest velocity that counts as rest: two noisy samples of which may follow each other."""
     limits = api.run.statement.limits
-    return limits.tolerance_abs + 3 * max(limits.noise.linear_m_s, limits.noise.angular_rad_s)
+    linear = limits.tolerance_linear_m_s + 3 * limits.noise.linear_m_s
+    angular = limits.tolerance_angular_rad_s + 3 * limits.noise.angular_rad_s
+    return Velocity(linear, linear, linear, angular, angular, angular)
 
 
 def _shows(answer: Response) -> bool:
@@ -83,12 +85,12 @@ class _Stiller:
 
     Args:
         client: its REST interface.
-        tolerance: the greatest speed, m/s or rad/s, that counts as rest.
+        slowest: the greatest velocity that counts as rest.
     """
 
-    def __init__(self, client: HttpClient, tolerance: float) -> None:
+    def __init__(self, client: HttpClient, slowest: Velocity) -> None:
         self._client = client
-        self._tolerance = tolerance
+        self._slowest = slowest
         self._silent = ""
 
     def bring(self, cancel_s: float, settle_s: float) -> str:
@@ -119,21 +121,22 @@ class _Stiller:
     def _wait(self, patience: Patience) -> str:
         calm = 0
         while True:
-            speed, problem = self._speed()
+            velocity, problem = self._velocity()
             if problem:
                 return problem
-            calm = calm + 1 if speed <= self._tolerance else 0
+            rests = all(abs(one) <= most for one, most in zip(velocity, self._slowest, strict=True))
+            calm = calm + 1 if rests else 0
             if calm > 1:
                 return ""
             if patience.over:
-                return f"it still moves with {speed:.3g} m/s or rad/s"
+                return f"it still moves: {velocity}"
             time.sleep(_STEP_S if calm == 0 else 0.002)
 
-    def _speed(self) -> tuple[float, str]:
-        """The greatest component of the measured velocity, and why it cannot be told."""
+    def _velocity(self) -> tuple[Velocity, str]:
+        """The measured velocity, and why it cannot be told."""
         read = self._ask("GET", VELOCITY, ACCEPT_JSON)
         if read is not None and read.response.status == HTTPStatus.NOT_FOUND:
-            return 0.0, ""  # a robot without this resource: nothing says that it moves
+            return STILL, ""  # a robot without this resource: nothing says that it moves
         twist: Any
         odometry: Any
         twist, problem = read_as(read.response, TWIST) if read else (None, self._silent)
@@ -142,9 +145,9 @@ class _Stiller:
             read = self._ask("GET", POSE, ACCEPT_JSON)
             odometry, unread = read_as(read.response, ODOMETRY) if read else (None, self._silent)
             if unread:
-                return 0.0, f"its velocity cannot be read: {problem}"
+                return STILL, f"its velocity cannot be read: {problem}"
             twist = odometry["twist"]["twist"]
-        return max(map(abs, Velocity.of(twist))), ""
+        return Velocity.of(twist), ""
 
     def _ask(
         self, method: str, path: str, headers: tuple[tuple[str, str], ...] = (), body: bytes = b""

@@ -9,6 +9,7 @@ from conformance.contract.interfaces import Interface
 from conformance.contract.limits import Noise
 from conformance.contract.statement import Endpoints, Statement, StatementError, load_statement
 from conformance.contract.thresholds import ApiStyle, Operation, Quantile, Threshold
+from conformance.robot.robot import STILL, Velocity, is_near
 
 
 def _load(tmp_path, text):
@@ -121,10 +122,22 @@ def test_noise_rate_and_clock_are_declared_among_the_limits(tmp_path):
     assert limits.tolerances == {
         "tolerance": 0.05,
         "tolerance_abs": 0.02,
+        "tolerance_linear_m_s": 0.02,
+        "tolerance_angular_rad_s": 0.02,
         "noise_position_m": 0.01,
         "noise_linear_m_s": 0.02,
     }
     assert Statement().limits.odometry_hz is None
+
+
+def test_absolute_tolerances_are_declared_apart_or_by_one_figure(tmp_path):
+    both = _load(tmp_path, "[limits]\ntolerance_abs = 0.1").limits
+    assert (both.tolerance_linear_m_s, both.tolerance_angular_rad_s) == (0.1, 0.1)
+    apart = _load(tmp_path, "[limits]\ntolerance_abs = 0.05\ntolerance_angular_rad_s = 0.2").limits
+    assert (apart.tolerance_linear_m_s, apart.tolerance_angular_rad_s) == (0.05, 0.2)
+    assert is_near(apart, Velocity(0.04, angular_z=0.19), STILL)
+    assert not is_near(apart, Velocity(0.06), STILL)
+    assert not is_near(apart, Velocity(angular_z=0.21), STILL)
 
 
 def test_without_claims_the_classes_follow_from_the_addresses():
@@ -146,6 +159,8 @@ def test_without_claims_the_classes_follow_from_the_addresses():
         ("hold_s = 11", "hold_s = 11 must be a number from 0.2 to 10"),
         ("tolerance = 1000", "tolerance = 1000 must be a number from 0 to 0.25"),
         ("tolerance_abs = 0.11", "tolerance_abs = 0.11 must be a number from 0 to 0.1"),
+        ("tolerance_linear_m_s = 0.11", "tolerance_linear_m_s = 0.11 must be a number from 0 to 0.1"),
+        ("tolerance_angular_rad_s = 0.21", "tolerance_angular_rad_s = 0.21 must be a number from 0 to 0.2"),
         ("noise.position_m = 0.06", "position_m = 0.06 must be a number from 0 to 0.05"),
     ],
 )

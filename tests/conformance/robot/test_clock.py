@@ -25,12 +25,12 @@ def clock(rate: float, seconds: float, seed: int, hz: float = 5.0, *, jump: floa
     return told
 
 
-@given(seeds, st.floats(2.7, 60.0), st.sampled_from((5.0, 20.0, 50.0)))
+@given(seeds, st.floats(5.4, 60.0), st.sampled_from((5.0, 20.0, 50.0)))
 def test_a_clock_that_goes_right_is_not_blamed(seed, seconds, hz):
     assert clock(1.0, seconds, seed, hz).is_right(1.0)
 
 
-@given(seeds, st.floats(5.0, 60.0), st.sampled_from((0.9, 1.1, 2.0, 0.0, -1.0)))
+@given(seeds, st.floats(5.4, 60.0), st.sampled_from((0.9, 1.1, 2.0, 0.0, -1.0)))
 def test_a_clock_that_goes_wrong_is_seen(seed, seconds, rate):
     told = clock(rate, seconds, seed)
     assert not told.is_right(1.0)
@@ -44,4 +44,4 @@ def test_a_simulation_may_declare_another_scale():
 
 def test_too_short_a_time_says_nothing():
     assert Clock().rate is None
-    assert clock(1.0, 2.0, 1).rate is None
+    assert clock(1.0, 4.5, 1).rate is None

@@ -97,7 +97,7 @@ def test_a_robot_that_does_not_cancel_is_not_at_rest():
 def test_a_robot_that_does_not_stop_is_not_at_rest():
     with serving(Body(0, 0.3, obeys=False)) as url:
         made = api(url)
-        assert bring_to_rest(made) == "it still moves with 0.3 m/s or rad/s"
+        assert bring_to_rest(made) == "it still moves: linear.x 0.3"
 
 
 def test_a_robot_that_is_not_there_raises_nothing(closed_port):

@@ -87,6 +87,13 @@ def test_it_promises_no_more_than_it_can(result):
 
 
 @pytest.mark.parametrize("render", [certificate_html, certificate_markdown])
+def test_what_the_statement_declares_is_shown(result, render):
+    declared = {"settle_s": 0.6, "tolerance_angular_rad_s": 0.2}
+    shown = render({**result, "statement": {**result["statement"], "declared": declared}})
+    assert "settle_s = 0.6, tolerance_angular_rad_s = 0.2" in shown.replace("\\_", "_")
+
+
+@pytest.mark.parametrize("render", [certificate_html, certificate_markdown])
 def test_same_result_same_octets(result, render):
     assert render(result) == render(result)
 
