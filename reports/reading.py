@@ -20,17 +20,20 @@ from reports.pages.untrusted import excerpt
 SCHEMA_DIR = Path(__file__).parent / "schemas"
 RESULT_FORMAT = "roaas-result/1"
 LATENCY_FORMAT = "roaas-latency/1"
+FLEET_FORMAT = "roaas-fleet/1"
 SCHEMA_FILES = {
     RESULT_FORMAT: SCHEMA_DIR / "roaas-result-1.schema.json",
     LATENCY_FORMAT: SCHEMA_DIR / "roaas-latency-1.schema.json",
+    FLEET_FORMAT: SCHEMA_DIR / "roaas-fleet-1.schema.json",
 }
 RESULT_NAME = "result.json"
 LATENCY_NAME = "latency.json"
+FLEET_NAME = "fleet.json"
 
 
 @cache
 def validator(result_format: str) -> Draft202012Validator:
-    """The validator of one of the two formats; kept, because building one costs more than using it."""
+    """The validator of one of the formats; kept, because building one costs more than using it."""
     schema = json.loads(SCHEMA_FILES[result_format].read_text(encoding="utf-8"))
     return Draft202012Validator(schema)
 
@@ -43,6 +46,11 @@ def read_result(path: Path) -> dict[str, Any]:
 def read_latency(path: Path) -> dict[str, Any]:
     """Read a latency result; errors as in `reports.errors`."""
     return _read(path, LATENCY_FORMAT)
+
+
+def read_fleet(path: Path) -> dict[str, Any]:
+    """Read what came of a fleet; errors as in `reports.errors`."""
+    return _read(path, FLEET_FORMAT)
 
 
 def _read(path: Path, expected: str) -> dict[str, Any]:

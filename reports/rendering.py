@@ -11,10 +11,12 @@ from reports.certificate.junit import junit
 from reports.certificate.page import certificate_html, certificate_markdown, certificate_print
 from reports.certificate.seal import Seal
 from reports.errors import ReportError, ResultMissingError
+from reports.fleet.page import fleet_html, fleet_markdown
 from reports.pages.page import write_pages
-from reports.reading import LATENCY_NAME, RESULT_NAME, read_latency, read_result
+from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_fleet, read_latency, read_result
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from reports.attestation.signing import Notary
@@ -24,15 +26,15 @@ def render(directory: Path, notary: Notary | None = None) -> list[Path]:
     """Write what belongs to the result files in a directory, beside them.
 
     `result.json` gives certificate.html, certificate.md and junit.xml, where it is signed certificate-print.html too,
-    and with a notary the signed certificate.intoto.json; `latency.json` gives latency.html and latency.md. Each file
-    is replaced at once, so that a reader never sees half of one. Where one of the two results is broken, the other's
-    pages are written before the error is raised.
+    and with a notary the signed certificate.intoto.json; `latency.json` gives latency.html and latency.md;
+    `fleet.json` gives fleet.html and fleet.md. Each file is replaced at once, so that a reader never sees half of one.
+    Where one of the results is broken, the others' pages are written before the error is raised.
 
     Returns:
         The files written.
 
     Raises:
-        ResultMissingError: there is no such directory, or neither result file in it.
+        ResultMissingError: there is no such directory, or no result file in it.
         ResultUnreadableError: a file cannot be read, or the directory not be written to.
         ResultGarbledError: a file is no JSON.
         ResultFormatError: a file is of another format or version.
@@ -41,14 +43,17 @@ def render(directory: Path, notary: Notary | None = None) -> list[Path]:
     """
     if not directory.is_dir():
         raise ResultMissingError(f"{directory}: there is no such directory")
-    result, latency = directory / RESULT_NAME, directory / LATENCY_NAME
-    if not result.exists() and not latency.exists():
-        raise ResultMissingError(f"{directory}: it holds neither {RESULT_NAME} nor {LATENCY_NAME}")
+    pages: dict[str, Callable[[Path], dict[str, str]]] = {
+        RESULT_NAME: partial(_conformance, notary=notary),
+        LATENCY_NAME: _latency,
+        FLEET_NAME: _fleet,
+    }
+    there = {directory / name: pages_of for name, pages_of in pages.items() if (directory / name).exists()}
+    if not there:
+        raise ResultMissingError(f"{directory}: it holds no {', '.join(pages)}")
     written: list[Path] = []
     problems: list[ReportError] = []
-    for path, pages_of in ((result, partial(_conformance, notary=notary)), (latency, _latency)):
-        if not path.exists():
-            continue
+    for path, pages_of in there.items():
         try:
             written += write_pages(directory, pages_of(path))
         except ReportError as error:
@@ -80,6 +85,11 @@ def _signed_by(path: Path, digest: str) -> str | None:
         return opened.keyid if statement_in(opened).digest_of(RESULT_SUBJECT) == digest else None
     except ReportError:
         return None
+
+
+def _fleet(path: Path) -> dict[str, str]:
+    document = read_fleet(path)
+    return {"fleet.html": fleet_html(document), "fleet.md": fleet_markdown(document)}
 
 
 def _latency(path: Path) -> dict[str, str]:

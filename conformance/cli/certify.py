@@ -91,19 +91,29 @@ _FILE = click.Path(exists=True, dir_okay=False)
     show_default=True,
     help="Folder for the results.",
 )
+@click.option("--fleet", type=_FILE, metavar="FILE", help="Judge many robots, each in a process of its own (TOML).")
+@click.option(
+    "--parallel", type=click.IntRange(min=1), metavar="N", help="With --fleet: at most N robots at once.  [default: 4]"
+)
 @click.option("--sign", "key", type=_FILE, metavar="KEY", help="Sign the result with this private key.")
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
 @click.pass_obj
 def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> CommandResult:
     """Judge a robot by its contract, requirement by requirement.
 
-    STATEMENT is the robot's implementation conformance statement (TOML); options win over it.
+    STATEMENT is the robot's implementation conformance statement (TOML); options win over it. --fleet names many.
     Without claimed classes (statement, --profile, --class), those are judged whose interfaces have an address.
 
     Exit code: 0 conformant, 1 not conformant, 2 usage, 3 robot not reached, 4 inconclusive, 130 interrupted.
     """
     # A terminated run still stops the robot and writes what it has.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if options["fleet"]:
+        from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
+
+        return certify_fleet(Path(options["fleet"]), options)
+    if options["parallel"] is not None:
+        raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
     try:
         declared = load_statement(statement) if statement and not options["init"] else Statement()
         chosen = _apply(declared, options)

@@ -20,7 +20,8 @@ def print_summary(outcome: Certification) -> None:
     """Print a certification to stdout; that the robot was not reached, to stderr."""
     document = outcome.document
     if outcome.exit_code == ExitCode.UNREACHABLE:
-        click.echo(f"error: {document['requirements'][0]['reason']}", err=True)
+        reasons = (item["reason"] for item in document["requirements"] if item["verdict"] == "error")
+        click.echo(f"error: {next(reasons, 'the robot could not be reached')}", err=True)
         click.echo(f"result: {outcome.path}")
         return
     click.echo()

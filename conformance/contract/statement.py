@@ -194,7 +194,7 @@ def load_statement(path: Path) -> Statement:
     robot = msgspec.structs.asdict(file.robot)
     return Statement(
         robot={key: str(value) for key, value in robot.items() if value is not None},
-        endpoints=_beside(path.parent, file.endpoints),
+        endpoints=beside(path.parent, file.endpoints),
         claims=file.claims.named(),
         declared=file.limits,
         motion=file.motion,
@@ -203,7 +203,8 @@ def load_statement(path: Path) -> Statement:
     )
 
 
-def _beside(folder: Path, where: Endpoints) -> Endpoints:
+def beside(folder: Path, where: Endpoints) -> Endpoints:
+    """Endpoints whose files are looked for in a folder; URLs stay as they are."""
     named = {key: getattr(where, key) for key in ("ca_file", "token_file", "publishers_wsdl", "subscribers_wsdl")}
     files = {key: str(folder / name) for key, name in named.items() if name is not None and "://" not in name}
     return msgspec.structs.replace(where, **files)

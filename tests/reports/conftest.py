@@ -9,6 +9,7 @@ import pytest
 
 DATA = Path(__file__).parent / "data"
 _RESULT = json.loads((DATA / "result-example.json").read_text(encoding="utf-8"))
+_FLEET = json.loads((DATA / "fleet-example.json").read_text(encoding="utf-8"))
 _LATENCY = json.loads((DATA / "latency-example.json").read_text(encoding="utf-8"))
 
 
@@ -16,6 +17,12 @@ _LATENCY = json.loads((DATA / "latency-example.json").read_text(encoding="utf-8"
 def result() -> dict[str, Any]:
     """Return a conformance result with every kind of verdict in it."""
     return copy.deepcopy(_RESULT)
+
+
+@pytest.fixture
+def fleet() -> dict[str, Any]:
+    """Return a fleet: one robot conforms, one fails with an accepted failure, one is given up, one is not reached."""
+    return copy.deepcopy(_FLEET)
 
 
 @pytest.fixture
@@ -28,6 +35,12 @@ HOSTILE = (
     "</pre></script><script>alert(1)</script><img src=x onerror=alert(2)>"
     "\"'`{{7*7}}{% raw %}]]>-->&amp;\x00\x1b[2J\x7f\u202e\u2066\u200b\ufeff\ufffe\ud800|\r\n@octocat #1"
 )
+
+
+@pytest.fixture
+def hostile_text() -> str:
+    """Return text that attacks whoever shows it."""
+    return HOSTILE
 
 
 @pytest.fixture

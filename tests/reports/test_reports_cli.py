@@ -46,7 +46,7 @@ def test_rendering_again_replaces(tmp_path, result):
 
 
 def test_no_results(tmp_path):
-    with pytest.raises(ResultMissingError, match=r"neither result\.json nor latency\.json"):
+    with pytest.raises(ResultMissingError, match=r"holds no result\.json, latency\.json, fleet\.json"):
         render(tmp_path)
     assert run(report, tmp_path).exit_code == 2
     done = run(report, tmp_path / "nowhere")

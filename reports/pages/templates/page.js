@@ -26,11 +26,11 @@ const filter = document.querySelector(".filter");
 if (filter) {
   const box = document.createElement("input");
   box.type = "search";
-  box.placeholder = "Search requirements";
-  box.setAttribute("aria-label", "Search requirements");
+  box.placeholder = filter.dataset.search || "Search requirements";
+  box.setAttribute("aria-label", box.placeholder);
   box.addEventListener("input", () => {
     const wanted = box.value.toLowerCase();
-    for (const item of document.querySelectorAll("details[data-verdict]")) item.classList.toggle("unmatched", !item.textContent.toLowerCase().includes(wanted));
+    for (const item of document.querySelectorAll("details[data-verdict], [data-found]")) item.classList.toggle("unmatched", !item.textContent.toLowerCase().includes(wanted));
   });
   filter.append(box);
 }

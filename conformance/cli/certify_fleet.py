@@ -1,0 +1,117 @@
+"""``roaas certify --fleet``: the command's options to many runs, what came of them to a page and an exit code."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import datetime as dt
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from conformance.cli.summary import inert
+from conformance.contract.command import CommandResult
+from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet
+from conformance.fleet.member_run import Outcome
+
+if TYPE_CHECKING:
+    from conformance.fleet.member_run import MemberResult
+
+PARALLEL = 4
+# Options that hold for each robot of a fleet; what else there is belongs to one robot, and into the file.
+_FOR_ALL = (
+    "profile", "classes", "contract", "requirements", "effort", "minutes", "seed", "nonce", "timeout_s", "request_rate",
+    "key",
+)  # fmt: skip
+_OWN = ("fleet", "parallel", "out", "allow_motion")
+
+
+def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
+    """Judge the robots of a fleet's file.
+
+    Raises:
+        click.UsageError: the file cannot be used, or an option is given that belongs to one robot.
+    """
+    from conformance.fleet.member_run import MemberRun  # noqa: PLC0415 - --help needs no asyncio
+    from conformance.fleet.result import ROBOTS_FOLDER, exit_code, fleet_document, write_fleet  # noqa: PLC0415
+    from conformance.fleet.running import FleetRun  # noqa: PLC0415
+
+    shared = _shared()
+    try:
+        members = load_fleet(path)
+    except FleetError as error:
+        raise click.UsageError(str(error)) from error
+    limit_s = TIME_LIMIT_S + (options["minutes"] * 60 if options["effort"] == "deep" else 0)
+    runs = [
+        MemberRun(
+            member,
+            options["out"] / ROBOTS_FOLDER / member.name,
+            [*shared, *(["--allow-motion"] if options["allow_motion"] and member.movable else [])],
+            member.time_limit_s or limit_s,
+        )
+        for member in members
+    ]
+    started = dt.datetime.now(dt.UTC)
+    parallel = options["parallel"] or PARALLEL
+
+    def write(results: list[MemberResult], *, interrupted: bool) -> Path:
+        document = fleet_document(
+            results, started=started, finished=dt.datetime.now(dt.UTC), parallel=parallel, interrupted=interrupted
+        )
+        return write_fleet(document, options["out"])
+
+    def keep(results: list[MemberResult]) -> None:
+        with contextlib.suppress(OSError):  # told in the end: no robot is to wait for a full disk
+            write(results, interrupted=True)
+
+    async def judge() -> tuple[list[MemberResult], bool]:
+        fleet = FleetRun(runs, parallel, sys.stderr, keep)
+        return await fleet.judge(), fleet.interrupted
+
+    results, interrupted = asyncio.run(judge())
+    try:
+        written = write(results, interrupted=interrupted)
+    except OSError as error:
+        raise click.UsageError(f"--out {options['out']}: {error}") from error
+    _print_summary(results)
+    click.echo(f"result: {written}")
+    return CommandResult(exit_code(results, interrupted=interrupted), written)
+
+
+def _shared() -> list[str]:
+    """The options as given that hold for each robot.
+
+    Raises:
+        click.UsageError: one is given that belongs to one robot.
+    """
+    context = click.get_current_context()
+    shared: list[str] = []
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE or name in _OWN:
+            continue
+        if name not in _FOR_ALL:
+            told = parameter.opts[0] if isinstance(parameter, click.Option) else parameter.make_metavar(context)
+            raise click.UsageError(f"{told} belongs to one robot, and there is --fleet: write it into the fleet's file")
+        values = context.params[name] if parameter.multiple else [context.params[name]]
+        shared += [word for value in values for word in (parameter.opts[0], str(value))]
+    return shared
+
+
+def _print_summary(results: list[MemberResult]) -> None:
+    """Who may do what, a line for each robot."""
+    width = max(len(result.member.name) for result in results)
+    click.echo()
+    for result in results:
+        trusted = ", ".join(result.trusted)
+        told = f"may be trusted with {trusted}" if trusted else f"may be trusted with nothing{_because(result)}"
+        click.echo(f"  {result.member.name:<{width}}  {result.outcome:<14}  {inert(told)}")
+    count = sum(result.outcome is Outcome.CONFORMANT for result in results)
+    click.echo(f"\n{count} of {len(results)} robots conformant")
+
+
+def _because(result: MemberResult) -> str:
+    return f": {result.reason}" if result.reason else ""

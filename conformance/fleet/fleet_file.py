@@ -1,0 +1,122 @@
+"""FLEET.toml: which robots there are, and how each of them is judged."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import msgspec
+
+from conformance.contract.statement import Endpoints, StatementError, beside, load_statement
+from conformance.contract.toml_file import Positive, Text, TomlFileError, read_toml
+
+TIME_LIMIT_S = 3600.0
+"""How long one robot may take where the file does not say, s."""
+# A name is a folder's name on every file system, and of no other meaning in a path.
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+
+
+class FleetError(TomlFileError):
+    """A fleet that cannot be judged; the message names the file, the robot and the offending value."""
+
+
+class Member(msgspec.Struct, frozen=True):
+    """One robot of a fleet.
+
+    Attributes:
+        name: unique in the fleet, and its folder's name.
+        statement: file of its implementation conformance statement, or None where the fleet's file has the addresses.
+        endpoints: where its interfaces are.
+        baseline: file of its accepted failures, or None.
+        movable: whether it may be moved, where the command allows motion at all.
+        time_limit_s: after which it is given up, s; None where nothing is said.
+    """
+
+    name: str
+    statement: Path | None
+    endpoints: Endpoints
+    baseline: Path | None
+    movable: bool
+    time_limit_s: float | None
+
+
+class _Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    name: Text | None = None
+    statement: Text | None = None
+    endpoints: Endpoints | None = None
+    baseline: Text | None = None
+    allow_motion: bool = True
+    time_limit_s: Positive | None = None
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The tables of the file, as they are written."""
+
+    time_limit_s: Positive | None = None
+    robot: tuple[_Robot, ...] = ()
+
+
+def load_fleet(path: Path) -> tuple[Member, ...]:
+    """Read a fleet's file, and the statements that it names.
+
+    Files that it names are looked for beside it.
+
+    Raises:
+        FleetError: it cannot be read, a statement of it cannot, or two robots have a name or an address in common.
+    """
+    file = read_toml(path, _File, FleetError)
+    if not file.robot:
+        raise FleetError(f"{path} names no robot: write [[robot]] with statement = FILE, or with endpoints, for each")
+    members = tuple(_member(path, number, robot, file) for number, robot in enumerate(file.robot, 1))
+    _refuse_common(path, members)
+    return members
+
+
+def _member(path: Path, number: int, robot: _Robot, file: _File) -> Member:
+    where = f"{path}: [[robot]] number {number}"
+    if (robot.statement is None) == (robot.endpoints is None):
+        raise FleetError(f"{where} must have one of the two: statement, or endpoints")
+    statement = path.parent / robot.statement if robot.statement is not None else None
+    name = robot.name or (statement.stem if statement else "")
+    if not _NAME.fullmatch(name):
+        raise FleetError(
+            f"{where}: name = {name!r} must be 1 to 64 letters, digits, hyphens and underscores: a folder is named so"
+        )
+    if statement is not None:
+        try:
+            endpoints = load_statement(statement).endpoints
+        except StatementError as error:
+            raise FleetError(f"{where}: {error}") from error
+    else:
+        endpoints = beside(path.parent.absolute(), robot.endpoints or Endpoints())
+    if not endpoints.interfaces:
+        raise FleetError(f"{where} ({name}) has no address: neither rest nor a WSDL is among its endpoints")
+    return Member(
+        name=name,
+        statement=statement,
+        endpoints=endpoints,
+        baseline=path.parent / robot.baseline if robot.baseline is not None else None,
+        movable=robot.allow_motion,
+        time_limit_s=robot.time_limit_s if robot.time_limit_s is not None else file.time_limit_s,
+    )
+
+
+def _refuse_common(path: Path, members: tuple[Member, ...]) -> None:
+    """Two runs in one folder would overwrite each other, and two on one robot disturb each other."""
+    named, found_at = defaultdict(list), defaultdict(list)
+    for number, member in enumerate(members, 1):
+        named[member.name.lower()].append(number)  # some file systems know no other case
+        for address in _addresses(member.endpoints):
+            found_at[address].append(number)
+    for what, found in (("are both called", named), ("have the same address,", found_at)):
+        for value, numbers in found.items():
+            if len(numbers) > 1:
+                raise FleetError(f"{path}: [[robot]] number {numbers[0]} and number {numbers[1]} {what} {value!r}")
+
+
+def _addresses(where: Endpoints) -> set[str]:
+    """The URLs at which a robot is; a WSDL's file may serve many robots."""
+    urls = (where.rest, where.publishers_endpoint, where.subscribers_endpoint)
+    wsdls = (where.publishers_wsdl, where.subscribers_wsdl)
+    return {url.rstrip("/") for url in urls if url} | {url for url in wsdls if url and "://" in url}

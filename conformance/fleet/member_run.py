@@ -1,0 +1,226 @@
+"""One robot of a fleet: its command, its process, and what came of it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hashlib
+import json
+import os
+import re
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from conformance.contract.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conformance.fleet.fleet_file import Member
+
+LOG_NAME = "certify.log"
+RESULT_NAME = "result.json"
+# What a certification writes: of an earlier run nothing may stay that looks like this one's.
+_WRITTEN = (RESULT_NAME, LOG_NAME, "certificate*", "junit.xml", "badge.json", "*.sarif", "ctrf*.json", "gl-*.json")
+# A run that is told to end stops the robot, and writes what it has.
+_GRACE_S = 30.0
+_PROGRESS = re.compile(rb"(\d+/\d+) checks[^\n]*\n[^\n]*\Z")
+_SHOWN = 400
+
+
+class Outcome(StrEnum):
+    """What came of a robot."""
+
+    CONFORMANT = "conformant"
+    NOT_CONFORMANT = "not-conformant"
+    INCONCLUSIVE = "inconclusive"
+    UNREACHABLE = "unreachable"
+    GIVEN_UP = "given-up"
+    NOT_JUDGED = "not-judged"
+    INTERRUPTED = "interrupted"
+    NOT_STARTED = "not-started"
+
+
+#: The exit code that each outcome would have by itself; a failure that a baseline accepts counts as none.
+EXIT_CODES = {
+    Outcome.CONFORMANT: ExitCode.PASSED,
+    Outcome.NOT_CONFORMANT: ExitCode.FAILED,
+    Outcome.INCONCLUSIVE: ExitCode.INCONCLUSIVE,
+    Outcome.UNREACHABLE: ExitCode.UNREACHABLE,
+    Outcome.GIVEN_UP: ExitCode.INCONCLUSIVE,
+    Outcome.NOT_JUDGED: ExitCode.USAGE,
+    Outcome.INTERRUPTED: ExitCode.INTERRUPTED,
+    Outcome.NOT_STARTED: ExitCode.INTERRUPTED,
+}
+_OF_VERDICT = {str(one): one for one in (Outcome.CONFORMANT, Outcome.NOT_CONFORMANT, Outcome.INCONCLUSIVE)}
+
+
+@dataclass(frozen=True)
+class MemberResult:
+    """What came of one robot.
+
+    Attributes:
+        outcome: in a word.
+        exit_code: of its process, negative for a signal; None where it was not started.
+        reason: why there is no verdict, or empty.
+        seconds: how long it took.
+        document: its result.json, or None where it left none.
+        digest: SHA-256 of that file, as `sha256:…`, or None.
+    """
+
+    member: Member
+    outcome: Outcome
+    exit_code: int | None = None
+    reason: str = ""
+    seconds: float = 0.0
+    document: dict[str, Any] | None = None
+    digest: str | None = None
+
+    @property
+    def trusted(self) -> list[str]:
+        """The classes that it may be trusted with: passed, in a run that was not cut short, nothing of them accepted.
+
+        A class that passed only because a baseline accepts its failures is none of them.
+        """
+        if self.document is None or self.document["interrupted"]:
+            return []
+        accepted = {item["class"] for item in self.document["requirements"] if "expected_failure" in item}
+        classes: dict[str, str] = self.document["classes"]
+        return [name for name, verdict in classes.items() if verdict == "pass" and name not in accepted]
+
+
+class Stop:
+    """Whether the fleet is told to end: once, so that each run ends by itself, and twice, so that it is ended."""
+
+    def __init__(self) -> None:
+        self.asked, self.insisted = asyncio.Event(), asyncio.Event()
+
+    def ask(self) -> None:
+        """Take note of a signal."""
+        (self.insisted if self.asked.is_set() else self.asked).set()
+
+
+class MemberRun:
+    """The run of one robot, in a process and a folder of its own.
+
+    Args:
+        member: the robot.
+        folder: where its results go.
+        options: of `roaas certify`, for it and for all others alike.
+        time_limit_s: after which it is given up, s.
+    """
+
+    def __init__(self, member: Member, folder: Path, options: list[str], time_limit_s: float) -> None:
+        self.member, self._folder, self._options, self._limit_s = member, folder, options, time_limit_s
+
+    async def judge(self, stop: Stop) -> MemberResult:
+        """Judge the robot; whatever goes wrong is its result, and none of the others'."""
+        started = time.monotonic()
+        try:
+            self._prepare()
+            with (self._folder / LOG_NAME).open("wb") as log:
+                # A session of its own: Ctrl-C reaches the fleet's process alone, which ends the runs one by one.
+                process = await asyncio.create_subprocess_exec(
+                    *self._command(), stdin=asyncio.subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
+                )
+            try:
+                ended = await self._wait(process, stop)
+            finally:
+                _kill(process)  # whatever ends the wait, no run outlives it
+        except OSError as error:
+            return MemberResult(self.member, Outcome.NOT_JUDGED, reason=f"it could not be started: {error}")
+        return self._result(process.returncode, ended, time.monotonic() - started)
+
+    def progress(self) -> str:
+        """How far it is, as `57/146 checks`, or empty where that is not known yet."""
+        with contextlib.suppress(OSError), (self._folder / LOG_NAME).open("rb") as log:
+            log.seek(max(0, log.seek(0, os.SEEK_END) - 1000))
+            found = _PROGRESS.search(log.read())
+            return f"{found[1].decode()} checks" if found else ""
+        return ""
+
+    def _prepare(self) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
+        for pattern in _WRITTEN:
+            for path in self._folder.glob(pattern):
+                path.unlink()
+        if self.member.statement is None:
+            (self._folder / "statement.toml").write_text(_statement(self.member), encoding="utf-8")
+
+    def _command(self) -> list[str]:
+        statement = self.member.statement or self._folder / "statement.toml"
+        command = [sys.executable, "-m", "roaas", "certify", str(statement), *self._options, "--out", str(self._folder)]
+        return [*command, "--baseline", str(self.member.baseline)] if self.member.baseline else command
+
+    async def _wait(self, process: asyncio.subprocess.Process, stop: Stop) -> Outcome | None:
+        """Wait for the end, at most for the time limit; returns what ended it, where it did not end by itself."""
+        if await _first(process, stop.asked, self._limit_s):
+            return None
+        ended = Outcome.INTERRUPTED if stop.asked.is_set() else Outcome.GIVEN_UP
+        with contextlib.suppress(ProcessLookupError):
+            process.terminate()
+        if not await _first(process, stop.insisted, _GRACE_S):
+            _kill(process)
+            await process.wait()
+        return ended
+
+    def _result(self, code: int | None, ended: Outcome | None, seconds: float) -> MemberResult:
+        path = self._folder / RESULT_NAME
+        document, digest = None, None
+        with contextlib.suppress(OSError, ValueError):
+            octets = path.read_bytes()
+            document, digest = json.loads(octets), f"sha256:{hashlib.sha256(octets).hexdigest()}"
+        outcome, reason = self._outcome(code, ended, document)
+        return MemberResult(self.member, outcome, code, reason, seconds, document, digest)
+
+    def _outcome(self, code: int | None, ended: Outcome | None, document: dict[str, Any] | None) -> tuple[Outcome, str]:
+        """The outcome, and why there is no verdict."""
+        if ended is not None:
+            reason = f"given up after {self._limit_s:g} s, its time limit" if ended is Outcome.GIVEN_UP else ""
+            return ended, reason
+        if code == ExitCode.UNREACHABLE:
+            return Outcome.UNREACHABLE, self._last_words()
+        if code == ExitCode.INTERRUPTED:
+            return Outcome.INTERRUPTED, "its process was interrupted"
+        if document is not None and code in {ExitCode.PASSED, ExitCode.FAILED, ExitCode.INCONCLUSIVE}:
+            return _OF_VERDICT[document["verdict"]], ""
+        return Outcome.NOT_JUDGED, f"its process ended with {code}: {self._last_words()}"
+
+    def _last_words(self) -> str:
+        """What its process said last that is no progress and no name of a file."""
+        with contextlib.suppress(OSError):
+            lines = (self._folder / LOG_NAME).read_text(encoding="utf-8", errors="replace").splitlines()
+            said = [line for line in lines if line.strip() and not line.startswith(("[", "report: ", "result: "))]
+            return said[-1].strip().removeprefix("error: ")[:_SHOWN] if said else "it said nothing"
+        return "it left no log"
+
+
+def _kill(process: asyncio.subprocess.Process) -> None:
+    """Kill a process that has not ended, with what it started; it still leads its group, since nobody waited for it."""
+    if process.returncode is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+async def _first(process: asyncio.subprocess.Process, event: asyncio.Event, most_s: float) -> bool:
+    """Wait for the end of a process, an event or a time; returns whether the process has ended."""
+    ended, happened = asyncio.create_task(process.wait()), asyncio.create_task(event.wait())
+    await asyncio.wait({ended, happened}, timeout=most_s, return_when=asyncio.FIRST_COMPLETED)
+    happened.cancel()
+    if not ended.done():
+        ended.cancel()
+        return False
+    return True
+
+
+def _statement(member: Member) -> str:
+    """A statement with the addresses that the fleet's file has; a basic string of TOML is written as JSON's."""
+    where = {name: getattr(member.endpoints, name) for name in member.endpoints.__struct_fields__}
+    endpoints = [
+        f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in where.items() if value is not None
+    ]
+    return "\n".join(["[robot]", f"name = {json.dumps(member.name)}", "", "[endpoints]", *endpoints, ""])

@@ -1,0 +1,99 @@
+"""fleet.json: what came of a fleet, as a document (format roaas-fleet/1), and the exit code that follows."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from conformance.contract.atomic_write import write_atomically
+from conformance.contract.classes import CLASS_TITLES, CLASSES
+from conformance.contract.exit_codes import ExitCode
+from conformance.engine.suite import suite_version
+from conformance.fleet.member_run import EXIT_CODES, MemberResult
+
+if TYPE_CHECKING:
+    import datetime as dt
+    from collections.abc import Sequence
+    from pathlib import Path
+
+FLEET_FORMAT = "roaas-fleet/1"
+FLEET_NAME = "fleet.json"
+ROBOTS_FOLDER = "robots"
+
+
+def exit_code(results: Sequence[MemberResult], *, interrupted: bool) -> ExitCode:
+    """Of the whole fleet: 130 where it was interrupted, else the lowest of its robots' codes that is not 0.
+
+    So one robot that does not conform (1) outranks one that could not be judged by its files (2), that was not
+    reached (3), or about which nothing could be said (4).
+    """
+    if interrupted:
+        return ExitCode.INTERRUPTED
+    return min((code for result in results if (code := _code(result)) != ExitCode.PASSED), default=ExitCode.PASSED)
+
+
+def _code(result: MemberResult) -> ExitCode:
+    if result.exit_code == ExitCode.PASSED:  # also where a baseline accepts each failure
+        return ExitCode.PASSED
+    return EXIT_CODES[result.outcome]
+
+
+def fleet_document(
+    results: Sequence[MemberResult], *, started: dt.datetime, finished: dt.datetime, parallel: int, interrupted: bool
+) -> dict[str, Any]:
+    """Put a fleet together as fleet.json has it."""
+    judged = {name for result in results for name in (result.document or {}).get("classes", ())}
+    names = [name for name in CLASSES if name in judged]
+    return {
+        "format": FLEET_FORMAT,
+        "suite": {"version": suite_version()},
+        "started": _rfc3339(started),
+        "finished": _rfc3339(finished),
+        "duration_s": round((finished - started).total_seconds(), 3),
+        "parallel": parallel,
+        "interrupted": interrupted,
+        "exit_code": int(exit_code(results, interrupted=interrupted)),
+        "outcomes": dict(Counter(str(result.outcome) for result in results)),
+        "class_titles": {str(name): CLASS_TITLES[name] for name in names},
+        "robots": [_robot(result) for result in results],
+    }
+
+
+def write_fleet(document: dict[str, Any], directory: Path) -> Path:
+    """Write fleet.json whole or not at all.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    return write_atomically(directory / FLEET_NAME, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+
+
+def _robot(result: MemberResult) -> dict[str, Any]:
+    document = result.document
+    told: dict[str, Any] = {
+        "name": result.member.name,
+        "folder": f"{ROBOTS_FOLDER}/{result.member.name}",
+        "outcome": str(result.outcome),
+        "exit_code": result.exit_code,
+        "reason": result.reason,
+        "seconds": round(result.seconds, 3),
+        "trusted": result.trusted,
+        "result": result.digest,
+    }
+    if document is not None:
+        told |= {
+            "robot": document["statement"]["robot"],
+            "finished": document["finished"],
+            "effort": document["effort"],
+            "motion_allowed": document["statement"]["motion_allowed"],
+            "requirement_set": document["requirement_set"],
+            "classes": document["classes"],
+            "accepted_until": document.get("accepted_until"),
+        }
+    return told
+
+
+def _rfc3339(moment: dt.datetime) -> str:
+    return moment.strftime("%Y-%m-%dT%H:%M:%S.%fZ")

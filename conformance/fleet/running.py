@@ -1,0 +1,101 @@
+"""A fleet's robots judged, several at once: none waits for another, and Ctrl-C ends them all with what they have."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+import time
+from typing import TYPE_CHECKING, TextIO
+
+from conformance.fleet.member_run import MemberResult, MemberRun, Outcome, Stop
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+# Who runs is told this often, s.
+_OFTEN_S = 10.0
+
+
+class FleetRun:
+    """The runs of a fleet.
+
+    Args:
+        runs: one for each robot.
+        parallel: how many may be under way at once.
+        out: where progress is told, or None for nowhere.
+        keep: is given what there is whenever one is done, in the fleet's order.
+    """
+
+    def __init__(
+        self, runs: Sequence[MemberRun], parallel: int, out: TextIO | None, keep: Callable[[list[MemberResult]], None]
+    ) -> None:
+        self._runs, self._out, self._keep = runs, out, keep
+        self._free = asyncio.Semaphore(parallel)
+        self._stop = Stop()
+        self._started = time.monotonic()
+        self._under_way: dict[str, MemberRun] = {}
+        self._results = {run.member.name: MemberResult(run.member, Outcome.NOT_STARTED) for run in runs}
+        self._done = 0
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether somebody ended it before its time."""
+        return self._stop.asked.is_set()
+
+    async def judge(self) -> list[MemberResult]:
+        """Judge them all; returns what came of each, in the fleet's order."""
+        with self._signals():
+            telling = asyncio.create_task(self._tell_often())
+            try:
+                await asyncio.gather(*(self._judge(run) for run in self._runs))
+            finally:
+                telling.cancel()
+        return list(self._results.values())
+
+    async def _judge(self, run: MemberRun) -> None:
+        async with self._free:
+            if self._stop.asked.is_set():
+                return
+            name = run.member.name
+            self._under_way[name] = run
+            self._tell(f"{name}: started")
+            result = await run.judge(self._stop)
+            del self._under_way[name]
+            self._results[name] = result
+            self._done += 1
+            reason = f": {result.reason}" if result.reason else ""
+            self._tell(f"{name}: {result.outcome}{reason} ({result.seconds:.1f} s)")
+            self._keep(list(self._results.values()))
+
+    @contextlib.contextmanager
+    def _signals(self) -> Iterator[None]:
+        """SIGINT and SIGTERM end the runs; a second one does not wait for them."""
+        loop = asyncio.get_running_loop()
+
+        def stop() -> None:
+            self._tell("ending; a second Ctrl-C kills" if not self._stop.asked.is_set() else "killing what still runs")
+            self._stop.ask()
+
+        numbers = (signal.SIGINT, signal.SIGTERM)
+        for number in numbers:
+            loop.add_signal_handler(number, stop)
+        try:
+            yield
+        finally:
+            for number in numbers:
+                loop.remove_signal_handler(number)
+
+    async def _tell_often(self) -> None:
+        while True:
+            await asyncio.sleep(_OFTEN_S)
+            running = (f"{name} {run.progress()}".strip() for name, run in self._under_way.items())
+            self._tell(f"under way: {', '.join(running)}")
+
+    def _tell(self, text: str) -> None:
+        if self._out is not None:
+            spent = time.monotonic() - self._started
+            # What a robot's run said last is foreign text: nothing of it is obeyed by a terminal.
+            shown = "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
+            self._out.write(f"[{spent:5.1f} s] {self._done}/{len(self._runs)} judged | {shown}\n")
+            self._out.flush()

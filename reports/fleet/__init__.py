@@ -1,0 +1,1 @@
+"""The page of a fleet: which robot may be trusted with what."""

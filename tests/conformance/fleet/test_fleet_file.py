@@ -1,0 +1,59 @@
+"""FLEET.toml: what is read of it, and what is refused by name before any robot is asked."""
+
+import pytest
+
+from conformance.fleet.fleet_file import FleetError, load_fleet
+
+REST = 'endpoints = {{ rest = "http://127.0.0.1:{}" }}'
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    (tmp_path / "courier.toml").write_text('[robot]\nname = "C"\n[endpoints]\nrest = "http://127.0.0.1:1"\n')
+    (tmp_path / "nowhere.toml").write_text('[robot]\nname = "N"\n')
+
+    def written(text):
+        path = tmp_path / "fleet.toml"
+        path.write_text(text)
+        return path
+
+    return written
+
+
+def test_statements_and_addresses_make_a_fleet(fleet, tmp_path):
+    path = fleet(
+        "time_limit_s = 60\n"
+        '[[robot]]\nstatement = "courier.toml"\nbaseline = "known.toml"\n'
+        f'[[robot]]\nname = "kiosk"\nallow_motion = false\ntime_limit_s = 5\n{REST.format(2)}\n'
+        '[[robot]]\nname = "lift"\nendpoints = { publishers_wsdl = "lift.wsdl", token_file = "token" }\n'
+    )
+    courier, kiosk, lift = load_fleet(path)
+    assert (courier.name, courier.statement, courier.time_limit_s) == ("courier", tmp_path / "courier.toml", 60)
+    assert (courier.baseline, courier.movable) == (tmp_path / "known.toml", True)
+    assert (kiosk.statement, kiosk.movable, kiosk.time_limit_s) == (None, False, 5)
+    assert lift.endpoints.token_file == str(tmp_path / "token"), "files are looked for beside the fleet's file"
+    assert lift.endpoints.publishers_wsdl == str(tmp_path / "lift.wsdl")
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "names no robot"),
+        ("robots = []", "unknown key 'robots'"),
+        ("[[robot]]", "number 1 must have one of the two"),
+        (f'[[robot]]\nstatement = "courier.toml"\n{REST.format(2)}', "must have one of the two"),
+        ('[[robot]]\nstatement = "missing.toml"', "missing.toml"),
+        ('[[robot]]\nstatement = "nowhere.toml"', "nowhere) has no address"),
+        (f"[[robot]]\n{REST.format(2)}", "name = ''"),
+        (f'[[robot]]\nname = "../up"\n{REST.format(2)}', "name = '../up'"),
+        (f'[[robot]]\nname = "a/b"\n{REST.format(2)}', "name = 'a/b'"),
+        ('[[robot]]\nname = "x"\nendpoints = { http = "y" }', "unknown key 'http'"),
+        ('[[robot]]\nstatement = "courier.toml"\ntime_limit_s = 0', "time_limit_s = 0 must be a positive number"),
+        (f'[[robot]]\nname = "a"\n{REST.format(2)}\n[[robot]]\nname = "A"\n{REST.format(3)}', "both called 'a'"),
+        (f'[[robot]]\nname = "a"\n{REST.format(2)}\n[[robot]]\nname = "b"\n{REST.format(2)}', "have the same address"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_name(fleet, text, named):
+    with pytest.raises(FleetError, match=r"fleet\.toml") as refused:
+        load_fleet(fleet(text))
+    assert named in str(refused.value)
