@@ -41,6 +41,13 @@ class Actions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     compute_path_to_pose: Text = "compute_path_to_pose"
 
 
+class Nodes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Names of nodes that have a lifecycle."""
+
+    navigator: Text = "bt_navigator"
+    planner: Text = "planner_server"
+
+
 class Frames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Frame ids as they stand in message headers."""
 
@@ -61,6 +68,7 @@ class RosNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     topics: Topics = Topics()
     services: Services = Services()
     actions: Actions = Actions()
+    nodes: Nodes = Nodes()
     frames: Frames = Frames()
     velocity: Velocity = Velocity()
 

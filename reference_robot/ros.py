@@ -17,6 +17,7 @@ import os
 import threading
 import time
 import traceback
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Final, Self
 
@@ -24,6 +25,7 @@ import rclpy
 from rclpy.action import ActionClient, ActionServer
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, ShutdownException
+from rclpy.impl.implementation_singleton import rclpy_implementation as rclpy_c
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -39,7 +41,12 @@ except ImportError:  # a Jazzy from before its backport
 
 _IDLE_WAKE_S: Final = 0.5
 _CLOSING_S: Final = 8.0  # for the executors and their threads together
+HUNG_S: Final = 2.0  # a callback takes milliseconds
 _HIGHEST_DOMAIN_ID: Final = 101  # higher ones put DDS's ports into Linux's ephemeral range
+
+
+class RosArgumentsError(ValueError):
+    """ROS does not understand its arguments; the message has them, and what ROS says of them."""
 
 
 class RosRuntime:
@@ -47,19 +54,30 @@ class RosRuntime:
 
     Args:
         domain_id: The ROS domain, 0 to 101; None takes ROS_DOMAIN_ID from the environment.
+        arguments: ROS's own (``--ros-args ...``): namespace, remappings, parameters, enclave, for all nodes.
 
     Raises:
         ValueError: The domain id is out of range.
+        RosArgumentsError: ROS does not understand the arguments.
     """
 
-    def __init__(self, domain_id: int | None = None) -> None:
+    def __init__(self, domain_id: int | None = None, arguments: Sequence[str] = ()) -> None:
         domain = int(os.environ.get("ROS_DOMAIN_ID") or 0) if domain_id is None else domain_id
         if not 0 <= domain <= _HIGHEST_DOMAIN_ID:
             raise ValueError(f"a ROS domain id is 0 to {_HIGHEST_DOMAIN_ID}, not {domain}")
         self.domain_id = domain
         self.context = Context()
-        rclpy.init(args=[], context=self.context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            rclpy.init(
+                args=list(arguments),
+                context=self.context,
+                domain_id=domain,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+        except (rclpy_c.RCLError, rclpy_c.RCLInvalidROSArgsError, rclpy_c.UnknownROSArgsError) as error:
+            raise RosArgumentsError(f"ROS does not take {' '.join(arguments)}: {error}") from error
         self._executors = [RosExecutor(context=self.context)]
+        self._awake: list[float] = []  # for each thread, when it last had nothing or one thing less to do
         self._nodes: list[Node] = []
         self._threads: list[threading.Thread] = []
         self._closing = threading.Event()
@@ -80,12 +98,21 @@ class RosRuntime:
     def start(self) -> None:
         """Run callbacks in threads of their own from now on; a second call does nothing."""
         if not self._threads:
+            self._awake = [time.monotonic()] * len(self._executors)
             self._threads = [
-                threading.Thread(target=self._spin, args=(executor,), name="ros", daemon=True)
-                for executor in self._executors
+                threading.Thread(target=self._spin, args=(number, executor), name="ros", daemon=True)
+                for number, executor in enumerate(self._executors)
             ]
             for thread in self._threads:
                 thread.start()
+
+    def silence(self) -> float:
+        """Return for how many seconds a thread has been in one callback, or without a sign of life; 0.5 s is usual."""
+        return time.monotonic() - min(self._awake, default=time.monotonic())
+
+    def hangs(self) -> bool:
+        """Tell whether a thread hangs: what the nodes keep of the robot's state is then as old as the silence."""
+        return self.silence() > HUNG_S
 
     def close(self) -> None:
         """Stop the threads, then tear down nodes and context; a second call does nothing."""
@@ -114,9 +141,10 @@ class RosRuntime:
     ) -> None:
         self.close()
 
-    def _spin(self, executor: RosExecutor) -> None:
+    def _spin(self, number: int, executor: RosExecutor) -> None:
         # Not executor.spin(): EventsExecutor's own loop takes a whole core off the main thread.
         while not self._closing.is_set() and self.context.ok():
+            self._awake[number] = time.monotonic()
             try:
                 executor.spin_once(timeout_sec=_IDLE_WAKE_S)
             except (ExternalShutdownException, ShutdownException):

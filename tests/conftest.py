@@ -41,6 +41,13 @@ def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
         yield held
 
 
+@pytest.fixture(scope="module")
+def module_domain_id() -> Iterator[int]:
+    """Yield a domain id for a robot that the tests of one module share."""
+    with _held_domain_id() as held:
+        yield held
+
+
 @pytest.fixture(scope="session")
 def session_domain_id() -> Iterator[int]:
     """Yield a domain id for a robot that many tests share; the environment is the user's affair."""

@@ -1,17 +1,20 @@
 """How the layers hang together: one pair of ROS nodes, handed down to every resource and web method (paper)."""
 
 from dataclasses import dataclass
+from typing import Final
 
 from reference_robot.webservices.configuration import Configuration
 from reference_robot.webservices.http.address import Address, url_of
 from reference_robot.webservices.http.authorization import Authorization
 from reference_robot.webservices.nodes.calls import RosCalls
+from reference_robot.webservices.nodes.lifecycle import ManagedNode
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.resources.delivery import Delivery, DeliveryList
 from reference_robot.webservices.resources.description import OpenApi, Wadl
 from reference_robot.webservices.resources.goal import Goal
 from reference_robot.webservices.resources.graph import GraphList
+from reference_robot.webservices.resources.health import Health as HealthResource
 from reference_robot.webservices.resources.plan import Plan
 from reference_robot.webservices.resources.pose import Pose
 from reference_robot.webservices.resources.velocity import LinearVelocity
@@ -19,12 +22,15 @@ from reference_robot.webservices.resources.velocity import Velocity as VelocityR
 from reference_robot.webservices.rest import RestInterface
 from reference_robot.webservices.robot.deliveries import Deliveries
 from reference_robot.webservices.robot.goals import Goals
+from reference_robot.webservices.robot.health import Health
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner
 from reference_robot.webservices.robot.velocity import Velocity
 from reference_robot.webservices.soap.interface import SoapInterface
 from reference_robot.webservices.soap.publishers import PublishersWebService
 from reference_robot.webservices.soap.subscribers import SubscribersWebService
+
+_STATE_DEADLINE: Final = 1.0  # seconds for a managed node to say its state
 
 
 @dataclass(frozen=True)
@@ -52,14 +58,22 @@ def interfaces(
     configuration: Configuration,
     endpoints: Endpoints,
     authorization: Authorization,
-) -> tuple[RestInterface, SoapInterface]:
-    """Return both interfaces, which share the nodes and everything that is known about the robot."""
+) -> tuple[RestInterface, SoapInterface, Velocity]:
+    """Return both interfaces, which share the nodes and everything that is known about the robot.
+
+    The third is what drives: to be closed when nobody is served any more, so that the robot stops.
+    """
     frames = configuration.frames
-    calls = RosCalls(publishers.node.executor, configuration.web.deadline)
-    goals = Goals(publishers, subscribers, calls, frames)
+    executor, nodes = publishers.node.executor, configuration.nodes
+    calls = RosCalls(executor, configuration.web.deadline)
+    quick_calls = RosCalls(executor, min(_STATE_DEADLINE, configuration.web.deadline))
+    navigator, planner_node = (
+        ManagedNode(subscribers.node, quick_calls, name) for name in (nodes.navigator, nodes.planner)
+    )
+    goals = Goals(publishers, subscribers, calls, navigator, frames)
     odometry = LatestOdometry(subscribers)
     velocity = Velocity(publishers, odometry, configuration.web, goals.is_active)
-    planner = Planner(subscribers, calls, odometry, frames)
+    planner = Planner(subscribers, calls, planner_node, odometry, frames)
     deliveries = Deliveries(publishers, subscribers)
     rest_address = Address(endpoints.rest)
     resources = [
@@ -69,6 +83,7 @@ def interfaces(
         GraphList("/robot/sensors/", "Sensors", subscribers.sensors),
         GraphList("/robot/navigation/services/", "NavigationServices", subscribers.navigation_services),
         Goal(goals),
+        HealthResource(Health(publishers, subscribers, odometry, navigator, planner_node)),
         Plan(planner),
         DeliveryList(deliveries),
         OpenApi(rest_address),
@@ -81,4 +96,5 @@ def interfaces(
     return (
         RestInterface(resources, Delivery(deliveries), authorization),
         SoapInterface(services, Address(endpoints.soap), authorization),
+        velocity,
     )

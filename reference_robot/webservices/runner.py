@@ -1,6 +1,7 @@
 """RobotWebServiceNodesRunner: starts nodes and endpoints, and stops them (paper; apart from the endpoint itself)."""
 
 import asyncio
+import contextlib
 import os
 import resource
 import signal
@@ -69,9 +70,12 @@ class RobotWebServiceNodesRunner:
             ros.start()
             if wait_for_robot:
                 _await_robot(publishers, subscribers)
-            pair = interfaces(publishers, subscribers, configuration, endpoints, self._listening.authorization)
+            *pair, velocity = interfaces(
+                publishers, subscribers, configuration, endpoints, self._listening.authorization
+            )
             publisher = EndpointPublisher(list(zip(pair, (rest, soap), strict=True)), configuration.web.read_deadline)
-            uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
+            with contextlib.closing(velocity):
+                uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
 
 
 async def _serve_until_signalled(publisher: EndpointPublisher, ready: Callable[[], None]) -> None:
@@ -87,7 +91,7 @@ async def _serve_until_signalled(publisher: EndpointPublisher, ready: Callable[[
 
 def _await_robot(publishers: RobotPublishersNode, subscribers: RobotSubscribersNode) -> None:
     missing = {
-        "odometry": lambda: subscribers.odometry is not None,
+        "odometry": lambda: subscribers.odometry[0] is not None,
         "a listener for velocity commands": publishers.find_velocity_subscribers,
         "a delivery application": publishers.delivery_is_served,
         "a navigation that takes goals": publishers.navigation_is_served,

@@ -8,6 +8,7 @@ from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
+from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation as rclpy_c
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.task import Future
@@ -22,7 +23,9 @@ _DELIVERY_QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 # milliseconds; with one that has fallen behind, publish holds the event loop for 0.1 s, and fails. Then it is left
 # alone for so many seconds. Not asked beforehand by wait_for_all_acked: unasked, readers acknowledge every 3 s.
 _RECOVERY: Final = 0.5
-_VELOCITY_QOS: Final = QoSProfile(depth=100)
+# Of velocities the newest alone counts: one that waited would drive the robot by yesterday's wish.
+_VELOCITY_QOS: Final = QoSProfile(depth=1)
+_LAST_WORD: Final = Duration(seconds=0.5)  # for a robot to take its last velocity
 _VELOCITY_TYPES: Final[dict[str, Any]] = {
     "geometry_msgs/msg/Twist": Twist,
     "geometry_msgs/msg/TwistStamped": TwistStamped,
@@ -90,6 +93,11 @@ class RobotPublishersNode:
                 sent &= _published(publisher, stamped)
         return sent
 
+    def await_velocity_taken(self) -> None:
+        """Wait until robots have the velocity that was published last, for half a second at most."""
+        for publisher in self._velocity.values():
+            publisher.wait_for_all_acked(_LAST_WORD)
+
     def _velocity_publisher(self, kind: str) -> None:
         if kind not in self._velocity:
             self._velocity[kind] = self.node.create_publisher(
@@ -111,6 +119,10 @@ class RobotPublishersNode:
         request = CancelGoal.Request()
         request.goal_info.goal_id.uuid = list(identity)
         return self._cancel.call_async(request)
+
+    def cancel_all_goals(self) -> Future:
+        """Cancel all goals, whoever sent them: an id and a stamp of zeros (action_msgs/CancelGoal)."""
+        return self._cancel.call_async(CancelGoal.Request())
 
 
 def _published(publisher: Any, message: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from collections import deque
 from functools import partial
+from time import monotonic
 from typing import Final
 
 from nav2_msgs.action import ComputePathToPose
@@ -12,6 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from rclpy.task import Future
 from std_msgs.msg import String
 
+from reference_robot.goal_statuses import GoalStatuses
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 
@@ -28,18 +30,22 @@ class RobotSubscribersNode:
     loop's thread reads. What a message means is worked out by whoever is asked for it.
 
     Attributes:
-        odometry: The odometry received last, None before the first.
+        odometry: The odometry received last, None before the first; and when it was received, by ``time.monotonic``.
         mission_reports: The JSON of what changed in the missions (see ``names.toml``), oldest first, to be taken off.
-        current_goal: The JSON of the goal that the robot follows, empty when it follows none.
+        goals: The goals of the robot's navigation, whoever sent them.
+        current_goal: The JSON of the goal that the robot follows, empty when it follows none; None where the robot
+            does not tell, as Nav2.
         last_rejection: The JSON of the goal refused last, and why; empty before the first.
     """
 
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self.node = ros.create_node("robot_subscribers")
-        self.odometry: Odometry | None = None
+        self._ros = ros
+        self.odometry: tuple[Odometry | None, float] = (None, 0.0)
         self.mission_reports: deque[str] = deque(maxlen=_MISSION_REPORTS)
-        self.current_goal = ""
+        self.current_goal: str | None = None
         self.last_rejection = ""
+        self.goals = GoalStatuses(self.node, names.actions.navigate_to_pose)
         topics = names.topics
         self.node.create_subscription(Odometry, topics.odom, self._keep_odometry, qos_profile_sensor_data)
         self.node.create_subscription(
@@ -52,10 +58,18 @@ class RobotSubscribersNode:
         self._planner_action = ActionClient(self.node, ComputePathToPose, names.actions.compute_path_to_pose)
 
     def _keep_odometry(self, message: Odometry) -> None:
-        self.odometry = message
+        self.odometry = message, monotonic()
 
     def _keep_text(self, attribute: str, message: String) -> None:
         setattr(self, attribute, message.data)
+
+    def silence(self) -> float:
+        """Return for how many seconds ROS's threads have shown no sign of life; up to 0.5 s is usual."""
+        return self._ros.silence()
+
+    def hangs(self) -> bool:
+        """Tell whether ROS's threads hang, so that nothing that is kept here is to be believed."""
+        return self._ros.hangs()
 
     # The graph
 

@@ -1,4 +1,7 @@
-"""/openapi.json and /application.wadl: the contract's files, with the address under which they were asked for."""
+"""/openapi.json and /application.wadl: the contract's files, with the robot's own extension in them.
+
+They are served with the address under which they were asked for.
+"""
 
 import json
 from collections.abc import Callable
@@ -9,7 +12,8 @@ from lxml import etree
 
 from conformance.contract.files import CONTRACT_DIR
 from reference_robot.webservices.http.messages import Request, Response, content
-from reference_robot.webservices.resources.resource import Resource
+from reference_robot.webservices.resources.health import Health
+from reference_robot.webservices.resources.resource import FORMATS, Resource
 
 _WADL_NAMESPACE: Final = "{http://wadl.dev.java.net/2009/02}"
 
@@ -22,7 +26,7 @@ class OpenApi(Resource):
     def __init__(self, address: Callable[[Request], str]) -> None:
         self._address = address
         document: Any = yaml.safe_load((CONTRACT_DIR / "openapi.yaml").read_text(encoding="utf-8"))
-        self._document: dict[str, Any] = document
+        self._document: dict[str, Any] = document | {"paths": document["paths"] | {Health.path: Health.described}}
 
     def get(self, request: Request) -> Response:
         """Return the description with this robot as its server."""
@@ -38,6 +42,8 @@ class Wadl(Resource):
     def __init__(self, address: Callable[[Request], str]) -> None:
         self._address = address
         self._document = etree.parse(CONTRACT_DIR / "robot.wadl")
+        for resources in self._document.iter(f"{_WADL_NAMESPACE}resources"):
+            resources.append(_health())
 
     def get(self, request: Request) -> Response:
         """Return the description with this robot as its base."""
@@ -45,3 +51,12 @@ class Wadl(Resource):
             resources.set("base", self._address(request) + "/")
         body = etree.tostring(self._document, encoding="utf-8", xml_declaration=True)
         return content(200, "application/vnd.sun.wadl+xml", body)
+
+
+def _health() -> etree._Element:
+    resource = etree.Element(f"{_WADL_NAMESPACE}resource", path=Health.path.removeprefix("/"))
+    method = etree.SubElement(resource, f"{_WADL_NAMESPACE}method", name="GET", id="getHealth")
+    response = etree.SubElement(method, f"{_WADL_NAMESPACE}response", status="200")
+    for media_type in FORMATS:
+        etree.SubElement(response, f"{_WADL_NAMESPACE}representation", mediaType=media_type)
+    return resource

@@ -1,6 +1,7 @@
 """The life of a goal: sent, repeated, preempted, cancelled, ended. One goal is current at a time, or none."""
 
 import asyncio
+import contextlib
 import json
 import uuid
 from collections import deque
@@ -15,11 +16,13 @@ from std_msgs.msg import Header
 
 from reference_robot.names import Frames
 from reference_robot.webservices.nodes.calls import RosCalls
+from reference_robot.webservices.nodes.lifecycle import ManagedNode
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
-from reference_robot.webservices.representation.messages import message_from, reader_of
+from reference_robot.webservices.representation.messages import message_from
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import Record, Text, shape_of
+from reference_robot.webservices.robot.reported_goals import STATUS_TEXTS, told_goal, untold_goal
 from reference_robot.webservices.robot.target_poses import require_pose
 
 _GOAL_ID: Final = Record("GoalID", (("stamp", shape_of(Time)), ("id", Text(1, 255))), optional=frozenset({"stamp"}))
@@ -34,11 +37,6 @@ GOAL: Final = Record(
     optional=frozenset({"header", "goal_id"}),
 )
 
-_STATUS_TEXTS: Final = {
-    GoalStatus.STATUS_ACCEPTED: "accepted",
-    GoalStatus.STATUS_EXECUTING: "executing",
-    GoalStatus.STATUS_CANCELING: "canceling",
-}
 _REMEMBERED: Final = 100
 _REASON_COMES_WITHIN: Final = 0.3  # seconds after a refusal in which its reason may still arrive
 _REASON_STEP: Final = 0.02
@@ -46,11 +44,15 @@ _REASON_STEP: Final = 0.02
 
 @dataclass(frozen=True)
 class _Goal:
-    """A goal that the robot accepted from us; ``handle`` is rclpy's, which follows its status."""
+    """A goal that the robot accepted from us; ``handle`` is rclpy's, which follows its status.
+
+    ``losses`` is how many action servers had gone when it was accepted.
+    """
 
     identity: bytes
     described: dict[str, Any]
     handle: Any
+    losses: int
 
     @property
     def status(self) -> int:
@@ -62,22 +64,36 @@ class Goals:
     """The goal resource's life cycle, on the event loop's thread; ``frames`` are those in which poses are taken."""
 
     def __init__(
-        self, publishers: RobotPublishersNode, subscribers: RobotSubscribersNode, calls: RosCalls, frames: Frames
+        self,
+        publishers: RobotPublishersNode,
+        subscribers: RobotSubscribersNode,
+        calls: RosCalls,
+        navigator: ManagedNode,
+        frames: Frames,
     ) -> None:
         self._publishers = publishers
         self._subscribers = subscribers
         self._calls = calls
+        self._navigator = navigator
         self._frames = frames
         self._own: _Goal | None = None
-        # Goals that are not a mission's, or were cancelled: the robot's word on the current goal may lag behind.
+        self._sending = 0  # how many goals the navigation is being asked to take, or will be next
+        self._cancels = 0
+        # Goals that are ours, or were cancelled: what the robot tells of its current goal may lag behind.
         self._known: deque[str] = deque(maxlen=_REMEMBERED)
         self._one_at_a_time = asyncio.Lock()
 
     def current(self) -> dict[str, Any] | None:
-        """Return the active goal as a plain MoveBaseActionGoal with its status, or None."""
+        """Return the active goal as a plain MoveBaseActionGoal with its status, or None.
+
+        Raises:
+            Problem: 503 while ROS's thread hangs: what the robot does now is not known then.
+        """
+        if self._subscribers.hangs():
+            raise not_yet(f"ROS has not been heard of for {self._subscribers.silence():.1f} s: the goal is not known")
         own = self._active_own()
         if own is not None:
-            return own.described | {"status": {"code": own.status, "text": _STATUS_TEXTS[own.status]}}
+            return own.described | {"status": {"code": own.status, "text": STATUS_TEXTS[own.status]}}
         return self._foreign()
 
     def is_active(self) -> bool:
@@ -96,65 +112,68 @@ class Goals:
                 id with another pose, 503 while no navigation is there.
         """
         require_pose(wanted["goal"]["target_pose"], self._frames, "goal.target_pose")
-        async with self._one_at_a_time:
-            current = self.current()
-            identity = wanted.get("goal_id", {}).get("id")
-            if current is not None and identity == current["goal_id"]["id"]:
-                if _destination(wanted) != _destination(current):
-                    raise Problem(409, f"goal_id.id {identity!a} is the current goal's, which has another target_pose")
-                return 200, current
-            own = self._own = await self._accepted(self._filled_in(wanted))
-            # A goal where the robot already stands may have ended by now: then it is no longer current.
-            sent = self.current() or own.described | {"status": {"code": 1, "text": "accepted"}}
-            return (201 if current is None else 202), sent
+        cancels = self._cancels
+        self._sending += 1
+        try:
+            async with self._one_at_a_time:
+                return await self._sent(wanted, cancels)
+        finally:
+            self._sending -= 1
+
+    async def _sent(self, wanted: dict[str, Any], cancels: int) -> tuple[int, dict[str, Any]]:
+        current = self.current()
+        identity = wanted.get("goal_id", {}).get("id")
+        if current is not None and identity == current["goal_id"]["id"]:
+            if _destination(wanted) != _destination(current):
+                raise Problem(409, f"goal_id.id {identity!a} is the current goal's, which has another target_pose")
+            return 200, current
+        own = self._own = await self._accepted(self._filled_in(wanted), cancels)
+        # A goal where the robot already stands may have ended by now: then it is no longer current.
+        sent = self.current() or own.described | {"status": {"code": 1, "text": "accepted"}}
+        return (201 if current is None else 202), sent
 
     async def cancel(self) -> None:
-        """Cancel the active goal.
+        """Cancel the active goal, whoever sent it, and one that is being sent; it waits for no other request.
 
         Raises:
             Problem: 404 when there is none, 409 when the robot will not cancel it, 503 when it does not answer.
         """
-        async with self._one_at_a_time:
-            current = self.current()
-            if current is None:
-                raise Problem(404, "the robot follows no goal")
-            own = self._active_own()
-            identity = own.identity if own else bytes.fromhex(current["goal_id"]["id"])
-            reply = await self._calls.result(
-                lambda: self._publishers.cancel_goal(identity), "the navigation's cancel service"
-            )
-            if reply.return_code == CancelGoal.Response.ERROR_REJECTED:
-                raise Problem(409, f"the navigation refuses to cancel goal {current['goal_id']['id']!a}")
-            # Cancelled, unknown or ended: in each case it is current no longer.
+        current, own, sending = self.current(), self._own, self._sending
+        if current is None and not sending:
+            raise Problem(404, "the robot follows no goal")
+        self._cancels += 1
+        # All of them: another one may have displaced the goal that we know of a moment ago.
+        doomed = [goal.identity for goal in self._subscribers.goals.active()]
+        reply = await self._calls.result(self._publishers.cancel_all_goals, "the navigation's cancel service")
+        if current is not None and reply.return_code == CancelGoal.Response.ERROR_REJECTED:
+            raise Problem(409, f"the navigation refuses to cancel goal {current['goal_id']['id']!a}")
+        # Cancelled, unknown or ended: in each case it is current no longer.
+        if self._own is own:
             self._own = None
-            self._known.append(identity.hex())
+        self._known.extend(doomed if current is None else [*doomed, current["goal_id"]["id"]])
 
     def _active_own(self) -> _Goal | None:
         own = self._own
         if own is None or not self._publishers.navigation_is_served():
             return None  # without a navigation, nobody follows it
-        if own.status not in _STATUS_TEXTS:
+        goals = self._subscribers.goals
+        is_lost = own.losses != goals.losses and own.identity.hex() not in {goal.identity for goal in goals.active()}
+        if is_lost or own.status not in STATUS_TEXTS:
             self._own = own = None  # it has ended
         return own
 
     def _foreign(self) -> dict[str, Any] | None:
-        """Return the goal of a mission, which the navigation publishes; a report amiss counts as none."""
-        report = self._subscribers.current_goal
-        if not report or not self._publishers.navigation_is_served():
+        """Return a goal that somebody else sent: a mission of the robot's own, or a goal of another client's."""
+        if not self._publishers.navigation_is_served():
             return None
-        try:
-            told = json.loads(report)
-            identity, code, pose = str(told["goal_id"]), int(told["status"]), told["pose"]
-            header = {"stamp": pose["header"]["stamp"], "frame_id": pose["header"]["frame_id"]}
-            described = {
-                "header": header,
-                "goal_id": {"stamp": header["stamp"], "id": identity},
-                "goal": {"target_pose": reader_of(PoseStamped)(message_from(shape_of(PoseStamped), pose))},
-                "status": {"code": code, "text": _STATUS_TEXTS.get(code, "")},
-            }
-        except (ValueError, TypeError, KeyError, AssertionError, Problem):
-            return None
-        return described if code in _STATUS_TEXTS and identity not in self._known else None
+        told = self._subscribers.current_goal
+        if told == "":
+            return None  # it says itself that it follows none
+        goal = told_goal(told) if told else None
+        if goal is None:
+            active = self._subscribers.goals.active()
+            goal = untold_goal(active[-1]) if active else None
+        return None if goal is None or goal["goal_id"]["id"] in self._known else goal
 
     def _filled_in(self, wanted: dict[str, Any]) -> dict[str, Any]:
         """Return the goal with what the client may leave out: stamps mean now, the id is a new one."""
@@ -167,17 +186,34 @@ class Goals:
             "goal": {"target_pose": {"header": now | target["header"], "pose": target["pose"]}},
         }
 
-    async def _accepted(self, described: dict[str, Any]) -> _Goal:
+    async def _accepted(self, described: dict[str, Any], cancels: int) -> _Goal:
+        """Have the navigation take a goal, unless there was a DELETE after the first ``cancels`` of them."""
         if not self._publishers.navigation_is_served():
             raise not_yet("the robot has no navigation that takes goals")
         identity = uuid.uuid4().bytes  # ROS's own: an id of the web may come again for another goal
         self._known.append(identity.hex())
+        losses = self._subscribers.goals.losses
         pose = message_from(shape_of(PoseStamped), described["goal"]["target_pose"])
-        handle = await self._calls.result(lambda: self._publishers.send_goal(identity, pose), "the navigation")
+        self._require_wanted(cancels)
+        try:
+            handle = await self._calls.result(lambda: self._publishers.send_goal(identity, pose), "the navigation")
+        except Problem:
+            with contextlib.suppress(ValueError):
+                self._known.remove(identity.hex())  # should it be taken yet, it is nobody's that we know of
+            raise
         if not handle.accepted:
+            await self._navigator.require_active()
             reason = await self._reason(described["goal"]["target_pose"])
             raise Problem(422, f"goal.target_pose is refused by the navigation: {reason}")
-        return _Goal(identity, described, handle)
+        if self._cancels != cancels:  # it may have been taken after the DELETE had reached the navigation
+            cancel = self._publishers.cancel_goal
+            await self._calls.result(lambda: cancel(identity), "the navigation's cancel service")
+        self._require_wanted(cancels)
+        return _Goal(identity, described, handle, losses)
+
+    def _require_wanted(self, cancels: int) -> None:
+        if self._cancels != cancels:
+            raise Problem(409, "the goal was cancelled, by a DELETE, before the navigation had taken it")
 
     async def _reason(self, target: dict[str, Any]) -> str:
         """Return why the robot refused a goal, which ours tells on a topic of its own; Nav2 does not."""

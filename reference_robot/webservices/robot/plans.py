@@ -11,6 +11,7 @@ from nav_msgs.srv import GetPlan
 
 from reference_robot.names import Frames
 from reference_robot.webservices.nodes.calls import RosCalls
+from reference_robot.webservices.nodes.lifecycle import ManagedNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
@@ -41,10 +42,16 @@ class Planner:
     """Asks ROS for plans between poses in one of its ``frames``."""
 
     def __init__(
-        self, subscribers: RobotSubscribersNode, calls: RosCalls, odometry: LatestOdometry, frames: Frames
+        self,
+        subscribers: RobotSubscribersNode,
+        calls: RosCalls,
+        planner: ManagedNode,
+        odometry: LatestOdometry,
+        frames: Frames,
     ) -> None:
         self._subscribers = subscribers
         self._calls = calls
+        self._planner = planner
         self._odometry = odometry
         self._frames = frames
         self._read = reader_of(Path)
@@ -80,6 +87,7 @@ class Planner:
         request = ComputePathToPose.Goal(start=start, goal=goal, use_start=True)
         handle = await self._calls.result(lambda: self._subscribers.ask_plan_action(request), "the planner")
         if not handle.accepted:
+            await self._planner.require_active()
             return Path()
         reply = await self._calls.result(handle.get_result_async, "the planner")
         return reply.result.path if reply.status == GoalStatus.STATUS_SUCCEEDED else Path()

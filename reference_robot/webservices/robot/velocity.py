@@ -13,6 +13,7 @@ from reference_robot.webservices.representation.messages import message_from, re
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import shape_of
 from reference_robot.webservices.robot.odometry import LatestOdometry
+from reference_robot.webservices.robot.watchdog import VelocityWatchdog
 
 _DISCOVERY: Final = 1.0  # seconds that a robot just found may take to be connected
 _DISCOVERY_STEP: Final = 0.02
@@ -35,17 +36,18 @@ class Velocity:
         self._read = reader_of(Twist)
         self._commanded: dict[str, Any] | None = None
         self._commanded_at = 0.0
+        self._watchdog = VelocityWatchdog(settings.hold, self._stop)
 
     def measured(self) -> dict[str, Any]:
         """Return the measured velocity as a plain geometry_msgs/Twist; m/s and rad/s.
 
         Raises:
-            Problem: 503 before the first odometry.
+            Problem: 503 without odometry of the last second.
         """
         return self._read(self._odometry.message().twist.twist)
 
     async def command(self, twist: dict[str, Any]) -> None:
-        """Publish a plain Twist once; the robot's own watchdog ends it after the hold time.
+        """Publish a plain Twist once; it ends after the hold time, by the robot's own watchdog or by ours.
 
         Raises:
             Problem: 422 for a value beyond the limits or for a component that a differential drive cannot actuate,
@@ -56,6 +58,10 @@ class Velocity:
             raise Problem(409, "the robot follows a goal; cancel it before setting a velocity")
         await self._robot_found()
         self._commanded, self._commanded_at = twist, time.monotonic()
+        if any(value for part in twist.values() for value in part.values()):
+            self._watchdog.renew()
+        else:
+            self._watchdog.release()
         if not self._publishers.publish_velocity(message_from(shape_of(Twist), twist)):
             raise not_yet("the robot does not take velocity commands fast enough")
 
@@ -71,6 +77,20 @@ class Velocity:
         else:
             angular = held["angular"]
         await self.command({"linear": linear, "angular": angular})
+
+    def close(self) -> None:
+        """Stop the robot if a velocity of ours is in force: nobody will, once this process is gone."""
+        self._watchdog.close()
+        self._publishers.await_velocity_taken()
+
+    def _stop(self) -> None:
+        """Publish zero, unless the robot follows a goal by now: then the velocities are the navigation's."""
+        try:
+            if self._goal_is_active():
+                return
+        except Problem:
+            pass  # what the robot does is not known: to stop is safe
+        self._publishers.publish_velocity(Twist())
 
     def _check_limits(self, twist: dict[str, Any]) -> None:
         limits = {("linear", "x"): self._settings.max_linear, ("angular", "z"): self._settings.max_angular}

@@ -19,7 +19,8 @@ def served_session(
     session_domain_id: int, foreign_session: ForeignRobot, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Served]:
     config = tmp_path_factory.mktemp("config") / "robot.toml"
-    config.write_text("[web]\nread_deadline = 1.0\n")
+    # A velocity of one test does not end in another one.
+    config.write_text("[web]\nread_deadline = 1.0\nhold = 600.0\n")
     with running_robot(session_domain_id, "--attach", f"--config={config}") as served:
         # A message published before the other side is connected would be lost.
         eventually(lambda: served.call("GET", "/robot/pose/").status_code == 200)

@@ -60,13 +60,16 @@ class Served:
         return socket.create_connection((where.hostname, where.port), timeout=2)
 
 
-class ForeignRobot:
-    """The other process: what it has seen over ROS, and what it is to do."""
+class RosProcess:
+    """Another process: what it has seen over ROS, and what it is to do."""
 
-    def __init__(self, domain_id: int, *arguments: str) -> None:
-        command = [sys.executable, str(Path(__file__).with_name("foreign_robot.py")), str(domain_id), *arguments]
+    def __init__(self, script: str, *arguments: str, **environment: str) -> None:
         self.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=ros_environment()
+            [sys.executable, str(Path(__file__).with_name(script)), *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=ros_environment() | environment,
         )
         self._events: queue.Queue[dict[str, Any]] = queue.Queue()
         threading.Thread(target=self._read, daemon=True).start()
@@ -107,6 +110,17 @@ class ForeignRobot:
     def close(self) -> None:
         self.process.stdin.close()
         self.process.wait(_PATIENCE)
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait(_PATIENCE)
+
+
+class ForeignRobot(RosProcess):
+    """A robot that is one node (foreign_robot.py)."""
+
+    def __init__(self, domain_id: int, *arguments: str) -> None:
+        super().__init__("foreign_robot.py", str(domain_id), *arguments)
 
 
 def ros_environment() -> dict[str, str]:

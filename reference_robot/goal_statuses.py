@@ -1,0 +1,70 @@
+"""The goals of an action server, whoever sent them, as its status topic tells (ROS 2 design, "Actions")."""
+
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+from action_msgs.msg import GoalStatus, GoalStatusArray
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import qos_profile_action_status_default
+
+ACTIVE: Final = frozenset({GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_CANCELING})
+
+
+class ReportedGoal(NamedTuple):
+    """A goal as its server reports it: the 16 octets of its id as hexadecimal, its status, when it was accepted."""
+
+    identity: str
+    status: int
+    seconds: int
+    nanoseconds: int
+
+
+class GoalStatuses:
+    """Keeps what an action's server told last, in the executor's thread; ``on_change`` is called after each report.
+
+    A server that died told nothing of the end of its goals, and the next one does not know them: they end with it.
+
+    Attributes:
+        reported: The goals in the order in which the server lists them, those that ended lately among them.
+        losses: How many servers have gone so far.
+    """
+
+    def __init__(self, node: Node, action: str, on_change: Callable[[], None] = lambda: None) -> None:
+        self.reported: tuple[ReportedGoal, ...] = ()
+        self.losses = 0
+        self._on_change = on_change
+        self._is_of_newest = True  # what is reported came from the server that came last
+        node.create_subscription(
+            GoalStatusArray,
+            f"{action}/_action/status",
+            self._keep,
+            qos_profile_action_status_default,
+            event_callbacks=SubscriptionEventCallbacks(matched=self._note_servers),
+        )
+
+    def active(self) -> list[ReportedGoal]:
+        """Return the goals that have not ended, oldest first."""
+        found = [goal for goal in self.reported if goal.status in ACTIVE]
+        return sorted(found, key=lambda goal: (goal.seconds, goal.nanoseconds))
+
+    def _keep(self, array: GoalStatusArray) -> None:
+        self._is_of_newest = True
+        self.reported = tuple(_reported(status) for status in array.status_list)
+        self._on_change()
+
+    def _note_servers(self, change: Any) -> None:
+        """Take up that servers came or went: ``change`` is rclpy's, and may stand for several changes."""
+        if change.total_count_change:
+            self._is_of_newest = False
+        lost = change.total_count_change - change.current_count_change
+        if lost > 0:
+            self.losses += lost
+            if not (self._is_of_newest and change.current_count):
+                self.reported = ()
+            self._on_change()
+
+
+def _reported(status: GoalStatus) -> ReportedGoal:
+    info = status.goal_info
+    return ReportedGoal(bytes(info.goal_id.uuid).hex(), status.status, info.stamp.sec, info.stamp.nanosec)

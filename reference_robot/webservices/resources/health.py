@@ -1,0 +1,62 @@
+"""/robot/health/: what is there and how old, an extension of this robot's."""
+
+from typing import Any, Final
+
+from reference_robot.webservices.http.messages import Request, Response
+from reference_robot.webservices.representation.writing import JSON, TEXT, XML
+from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
+from reference_robot.webservices.robot.health import Health as RobotHealth
+
+_PART: Final = {
+    "type": "object",
+    "required": ["available"],
+    "properties": {
+        "available": {"type": "boolean"},
+        "age": {"type": "number", "minimum": 0, "description": "Seconds since the last message."},
+        "silence": {"type": "number", "minimum": 0, "description": "Seconds without a sign of life."},
+        "state": {"type": "string", "description": "State of the managed node, or unmanaged, silent, unknown."},
+        "by": {"type": "string", "enum": ["service", "action"]},
+    },
+}
+_PARTS: Final = ("ros", "odometry", "velocity", "navigation", "planner", "delivery")
+_SCHEMA: Final = {
+    "type": "object",
+    "required": ["healthy", *_PARTS],
+    "properties": {"healthy": {"type": "boolean"}} | dict.fromkeys(_PARTS, _PART),
+    "xml": {"name": "Health"},
+}
+
+
+class Health(Resource):
+    """The robot's health; it is answered 200 whatever it says, for the question has been answered."""
+
+    path = "/robot/health/"
+    # As it stands under its path in an OpenAPI description.
+    described: Final[dict[str, Any]] = {
+        "get": {
+            "operationId": "getHealth",
+            "tags": ["extension"],
+            "summary": "What of the robot is there, and how old what is known of it is",
+            "description": "Not in the contract: this robot's own.",
+            "responses": {
+                "200": {
+                    "description": "A record for each part, and healthy for all together.",
+                    "content": {
+                        JSON: {"schema": _SCHEMA},
+                        XML: {"schema": _SCHEMA},
+                        TEXT: {"schema": {"type": "string"}},
+                    },
+                },
+                "401": {"$ref": "#/components/responses/Problem"},
+                "406": {"$ref": "#/components/responses/Problem"},
+            },
+        }
+    }
+
+    def __init__(self, health: RobotHealth) -> None:
+        self._health = health
+
+    async def get(self, request: Request) -> Response:
+        """Return the report."""
+        media_type = wanted_format(request)
+        return represented(await self._health.report(), "Health", media_type)

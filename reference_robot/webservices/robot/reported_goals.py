@@ -1,0 +1,53 @@
+"""Goals that somebody else sent, described as ours are: by the robot's own word, or by the action's status alone."""
+
+import json
+from typing import Any, Final
+
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import PoseStamped
+
+from reference_robot.goal_statuses import ReportedGoal
+from reference_robot.webservices.representation.messages import message_from, reader_of
+from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.representation.shapes import shape_of
+
+STATUS_TEXTS: Final = {
+    GoalStatus.STATUS_ACCEPTED: "accepted",
+    GoalStatus.STATUS_EXECUTING: "executing",
+    GoalStatus.STATUS_CANCELING: "canceling",
+}
+_ORIGIN: Final = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+
+
+def told_goal(report: str) -> dict[str, Any] | None:
+    """Return the goal of which a robot tells (``current_goal`` in ``names.toml``); a report amiss counts as none."""
+    try:
+        told = json.loads(report)
+        code, pose = int(told["status"]), told["pose"]
+        header = {"stamp": pose["header"]["stamp"], "frame_id": pose["header"]["frame_id"]}
+        return {
+            "header": header,
+            "goal_id": {"stamp": header["stamp"], "id": str(told["goal_id"])},
+            "goal": {"target_pose": reader_of(PoseStamped)(message_from(shape_of(PoseStamped), pose))},
+            "status": {"code": code, "text": STATUS_TEXTS[code]},
+        }
+    except (ValueError, TypeError, KeyError, AssertionError, Problem):
+        return None
+
+
+def untold_goal(goal: ReportedGoal) -> dict[str, Any]:
+    """Return an active goal of which only its action tells: that it is there, and not where it leads.
+
+    The representation has a pose all the same. It is in no frame (an empty ``frame_id``), so that nobody takes it for
+    a place, and the status says so in words.
+    """
+    header = {"stamp": {"sec": goal.seconds, "nanosec": goal.nanoseconds}, "frame_id": ""}
+    return {
+        "header": header,
+        "goal_id": {"stamp": header["stamp"], "id": goal.identity},
+        "goal": {"target_pose": {"header": header, "pose": _ORIGIN}},
+        "status": {
+            "code": goal.status,
+            "text": f"{STATUS_TEXTS[goal.status]}; another client sent it, and its target is not known",
+        },
+    }

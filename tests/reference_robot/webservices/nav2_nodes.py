@@ -1,0 +1,150 @@
+"""The nodes of a robot with Nav2, each in a process of its own, as far as a client on the graph can tell.
+
+Run as ``python nav2_nodes.py DOMAIN base|navigator|client [OPTION] [--ros-args ...]``. Like foreign_robot.py it prints
+what it sees, one JSON object a line, and takes commands on its stdin.
+
+base: tells ``velocity``; ``{"odometry": X}`` publishes odometry at x = X, null stops it. OPTION is what it takes: Twist
+or TwistStamped.
+navigator: tells ``goal`` and ``cancel``; ``{"state": "inactive"}`` refuses goals, as a bt_navigator does that is not
+active; ``{"answers": false}`` lets goals wait for their answer.
+client: ``{"goal": X}`` sends a goal to x = X, as RViz does; tells ``accepted`` with its id, ``ended`` with its status.
+"""
+
+import json
+import sys
+import threading
+from typing import Any
+
+import rclpy
+from action_msgs.msg import GoalStatus
+from foreign_robot import tell
+from geometry_msgs.msg import Twist, TwistStamped
+from lifecycle_msgs.msg import State
+from lifecycle_msgs.srv import GetState
+from nav2_msgs.action import NavigateToPose
+from nav_msgs.msg import Odometry
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+
+STATES = {"inactive": State.PRIMARY_STATE_INACTIVE, "active": State.PRIMARY_STATE_ACTIVE}
+
+
+class Base(Node):
+    def __init__(self, context: Context, velocity: str) -> None:
+        super().__init__("base", context=context)
+        self._x: float | None = 0.0
+        self._odometry = self.create_publisher(Odometry, "odom", 10)
+        self.create_timer(0.02, self._publish)
+        kind = {"Twist": Twist, "TwistStamped": TwistStamped}[velocity]
+        self.create_subscription(kind, "cmd_vel", self._velocity, 10)
+
+    def _publish(self) -> None:
+        if self._x is not None:
+            message = Odometry(child_frame_id="base_link")
+            message.header.frame_id = "odom"
+            message.header.stamp = self.get_clock().now().to_msg()
+            message.pose.pose.position.x = self._x
+            self._odometry.publish(message)
+
+    def _velocity(self, message: Any) -> None:
+        stamped = isinstance(message, TwistStamped)
+        twist = message.twist if stamped else message
+        tell(velocity={"x": twist.linear.x, "frame": message.header.frame_id if stamped else None})
+
+    def obey(self, command: dict[str, Any]) -> None:
+        self._x = command["odometry"]
+
+
+class Navigator(Node):
+    def __init__(self, context: Context, _option: str) -> None:
+        super().__init__("bt_navigator", context=context)
+        self._state = "active"
+        self._answers = threading.Event()
+        self._answers.set()
+        group = ReentrantCallbackGroup()
+        self.create_service(GetState, "bt_navigator/get_state", self._get_state, callback_group=group)
+        self._server = ActionServer(
+            self,
+            NavigateToPose,
+            "navigate_to_pose",
+            execute_callback=self._drive,
+            goal_callback=self._goal,
+            cancel_callback=self._cancel,
+            callback_group=group,
+        )
+
+    def _get_state(self, _request: GetState.Request, response: GetState.Response) -> GetState.Response:
+        response.current_state = State(id=STATES[self._state], label=self._state)
+        return response
+
+    def _goal(self, goal: NavigateToPose.Goal) -> GoalResponse:
+        tell(goal=goal.pose.pose.position.x)
+        self._answers.wait()
+        return GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT
+
+    def _cancel(self, handle: Any) -> CancelResponse:
+        tell(cancel=handle.request.pose.pose.position.x)
+        return CancelResponse.ACCEPT
+
+    def _drive(self, handle: Any) -> NavigateToPose.Result:
+        waiting = threading.Event()
+        while handle.status != GoalStatus.STATUS_CANCELING and self.context.ok():
+            waiting.wait(0.01)
+        if self.context.ok():
+            handle.canceled()
+        return NavigateToPose.Result()
+
+    def obey(self, command: dict[str, Any]) -> None:
+        self._state = command.get("state", self._state)
+        if command.get("answers", True):
+            self._answers.set()
+        else:
+            self._answers.clear()
+
+
+class Client(Node):
+    def __init__(self, context: Context, _option: str) -> None:
+        super().__init__("rviz", context=context)
+        self._actions = ActionClient(self, NavigateToPose, "navigate_to_pose")
+
+    def obey(self, command: dict[str, Any]) -> None:
+        self._actions.wait_for_server()
+        goal = NavigateToPose.Goal()
+        goal.pose.header.frame_id = "map"
+        goal.pose.pose.position.x = command["goal"]
+        self.executor.create_task(self._send, goal)
+
+    def _send(self, goal: NavigateToPose.Goal) -> None:
+        self._actions.send_goal_async(goal).add_done_callback(self._answered)
+
+    def _answered(self, answer: Any) -> None:
+        handle = answer.result()
+        tell(accepted=bytes(handle.goal_id.uuid).hex())
+        handle.get_result_async().add_done_callback(lambda ended: tell(ended=ended.result().status))
+
+
+NODES: dict[str, Any] = {"base": Base, "navigator": Navigator, "client": Client}
+
+
+def main() -> None:
+    domain, role, *rest = sys.argv[1:]
+    option = rest.pop(0) if rest and not rest[0].startswith("-") else "Twist"
+    context = Context()
+    rclpy.init(args=rest, context=context, domain_id=int(domain))
+    node = NODES[role](context, option)
+    executor = MultiThreadedExecutor(4, context=context)
+    executor.add_node(node)
+    spinner = threading.Thread(target=executor.spin, daemon=True)
+    spinner.start()
+    tell(ready=True)
+    for line in sys.stdin:
+        node.obey(json.loads(line))
+    context.try_shutdown()
+    spinner.join(2)
+
+
+if __name__ == "__main__":
+    main()

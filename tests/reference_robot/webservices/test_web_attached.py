@@ -1,0 +1,219 @@
+"""In front of a robot that is not ours: Nav2's nodes in processes of their own, which others use as well."""
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from web_messages import goal, query_envelope, twist
+from web_robot import RosProcess, Served, eventually, running_robot
+
+from reference_robot import ros
+from reference_robot.names import RosNames
+from reference_robot.ros import RosRuntime
+from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
+from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.robot.goals import Goals
+
+POSE, VELOCITY, GOAL, HEALTH = "/robot/pose/", "/robot/velocity/", "/robot/navigation/action/goal/", "/robot/health/"
+HOLD = 0.4
+LEASE = str(Path(__file__).with_name("short_lease.xml"))
+
+
+class Nav2:
+    """The robot: its processes."""
+
+    def __init__(self, domain_id: int) -> None:
+        self.domain = str(domain_id)
+        self.base = RosProcess("nav2_nodes.py", self.domain, "base", "TwistStamped")
+        self.navigator = self.navigation()
+        self.client = RosProcess("nav2_nodes.py", self.domain, "client")
+
+    def navigation(self) -> RosProcess:
+        return RosProcess("nav2_nodes.py", self.domain, "navigator", FASTRTPS_DEFAULT_PROFILES_FILE=LEASE)
+
+
+@pytest.fixture(scope="module")
+def nav2(module_domain_id: int) -> Iterator[Nav2]:
+    robot = Nav2(module_domain_id)
+    yield robot
+    for process in (robot.base, robot.navigator, robot.client):
+        process.close()
+
+
+@pytest.fixture(scope="module")
+def attached(nav2: Nav2, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    config = tmp_path_factory.mktemp("config") / "robot.toml"
+    config.write_text(f'[web]\nhold = {HOLD}\n[velocity]\nmessage = "TwistStamped"\n')
+    with running_robot(int(nav2.domain), "--attach", f"--config={config}") as served:
+        health = eventually(lambda: (now := served.call("GET", HEALTH).json())["healthy"] and now)
+        assert health["odometry"]["age"] < 1
+        eventually(lambda: served.call("GET", HEALTH).json()["navigation"] == {"available": True, "state": "active"})
+        eventually(lambda: served.call("GET", HEALTH).json()["velocity"]["available"])
+        yield served
+
+
+def test_odometry_older_than_a_second_is_none(attached, nav2):
+    assert attached.call("GET", POSE).status_code == 200
+    nav2.base.do(odometry=None)
+    began = time.monotonic()
+    eventually(lambda: attached.call("GET", POSE).status_code == 503)
+    assert 0.9 < time.monotonic() - began < 10
+    for path in (POSE, VELOCITY, VELOCITY + "linear/"):
+        answer = attached.call("GET", path)
+        assert answer.status_code == 503
+        assert int(answer.headers["Retry-After"]) > 0
+        assert answer.headers["Content-Type"] == "application/problem+json"
+        assert "s ago" in answer.json()["detail"]
+    for operation in ("GetPose", "GetVelocity"):
+        fault = attached.soap(query_envelope(operation), url=attached.subscribers)
+        assert fault.status_code == 500
+        assert "soap:Server" in fault.text
+    health = attached.call("GET", HEALTH).json()
+    assert not health["healthy"]
+    assert not health["odometry"]["available"]
+    assert health["odometry"]["age"] > 1
+    assert health["ros"]["available"]
+    nav2.base.do(odometry=2.0)
+    eventually(lambda: attached.call("GET", POSE).status_code == 200)
+
+
+def test_health_is_described_and_comes_in_every_format(attached):
+    assert HEALTH in attached.call("GET", "/openapi.json").json()["paths"]
+    assert 'path="robot/health/"' in attached.call("GET", "/application.wadl").text
+    for accept in ("application/json", "application/xml", "text/plain"):
+        answer = attached.call("GET", HEALTH, headers={"Accept": accept})
+        assert "healthy" in answer.text
+        assert "true" in answer.text
+
+
+def test_a_velocity_that_is_not_renewed_ends_with_zero(attached, nav2):
+    nav2.base.forget()
+    began = time.monotonic()
+    while time.monotonic() - began < 2 * HOLD:
+        assert attached.call("PUT", VELOCITY, json=twist(x=0.2)).status_code == 200
+        assert nav2.base.next("velocity") == {"x": 0.2, "frame": "base_link"}
+        time.sleep(HOLD / 4)
+    renewed = time.monotonic()
+    assert nav2.base.next("velocity")["x"] == 0.0
+    assert HOLD / 2 < time.monotonic() - renewed < 3 * HOLD
+    # Once, and not at all where the client has stopped the robot itself.
+    assert attached.call("PUT", VELOCITY, json=twist(x=0.1)).status_code == 200
+    assert attached.call("PUT", VELOCITY, json=twist(x=0.0)).status_code == 200
+    assert [nav2.base.next("velocity")["x"] for _ in range(2)] == [0.1, 0.0]
+    time.sleep(1.5 * HOLD)
+    assert nav2.base.heard_nothing()
+
+
+def test_somebody_else_s_goal_is_shown_not_fought_and_cancelled(attached, nav2):
+    assert attached.call("PUT", VELOCITY, json=twist(x=0.1)).status_code == 200
+    assert nav2.base.next("velocity")["x"] == 0.1
+    nav2.client.do(goal=3.5)
+    assert nav2.navigator.next("goal") == 3.5
+    identity = nav2.client.next("accepted")
+    shown = eventually(lambda: (a := attached.call("GET", GOAL)).is_success and a.json())
+    assert shown["goal_id"]["id"] == identity
+    assert shown["goal_id"]["stamp"]["sec"] > 0
+    assert shown["goal"]["target_pose"]["header"]["frame_id"] == ""  # in no frame: it is not known where it leads
+    eventually(lambda: attached.call("GET", GOAL).json()["status"]["code"] == 2)
+    assert "not known" in shown["status"]["text"]
+    soap = attached.soap(query_envelope("GetGoal"), url=attached.subscribers)
+    assert identity in soap.text
+    refused = attached.call("PUT", VELOCITY, json=twist())
+    assert refused.status_code == 409
+    time.sleep(1.5 * HOLD)
+    assert nav2.base.heard_nothing()  # the watchdog leaves the robot to the navigation
+    assert attached.call("DELETE", GOAL).status_code == 204
+    assert attached.call("GET", GOAL).status_code == 404
+    assert nav2.navigator.next("cancel") == 3.5
+    assert nav2.client.next("ended") == 5
+    # Somebody else's goal displaces ours.
+    assert attached.call("PUT", GOAL, json=goal("ours", x=1.0)).status_code == 201
+    assert attached.call("DELETE", GOAL).status_code == 204
+    assert [nav2.navigator.next(kind) for kind in ("goal", "cancel")] == [1.0, 1.0]
+
+
+def test_a_delete_overtakes_a_put_that_waits(attached, nav2):
+    nav2.navigator.do(answers=False)
+    answers = []
+    waiting = threading.Thread(target=lambda: answers.append(attached.call("PUT", GOAL, json=goal("first", x=7.0))))
+    waiting.start()
+    assert nav2.navigator.next("goal") == 7.0
+    began = time.monotonic()
+    assert attached.call("DELETE", GOAL).status_code == 204
+    assert time.monotonic() - began < 2
+    nav2.navigator.do(answers=True)
+    waiting.join()
+    assert answers[0].status_code == 409
+    assert "DELETE" in answers[0].json()["detail"]
+    assert nav2.navigator.next("cancel") == 7.0
+    assert attached.call("GET", GOAL).status_code == 404
+    assert attached.call("PUT", GOAL, json=goal("second", x=8.0)).status_code == 201
+    assert nav2.navigator.next("goal") == 8.0
+    assert attached.call("DELETE", GOAL).status_code == 204
+    assert nav2.navigator.next("cancel") == 8.0
+
+
+def test_a_navigator_that_is_not_active_is_503(attached, nav2):
+    nav2.navigator.do(state="inactive")
+    answer = attached.call("PUT", GOAL, json=goal("early"))
+    assert answer.status_code == 503
+    assert int(answer.headers["Retry-After"]) > 0
+    assert "bt_navigator is inactive" in answer.json()["detail"]
+    assert attached.call("GET", HEALTH).json()["navigation"]["state"] == "inactive"
+    nav2.navigator.do(state="active")
+    assert nav2.navigator.next("goal") == 3.0
+    assert nav2.navigator.heard_nothing()
+
+
+@pytest.mark.parametrize("sender", ["client", "web"])
+def test_goals_end_with_their_server_and_the_next_one_is_found(attached, nav2, sender):
+    if sender == "client":
+        nav2.client.do(goal=5.0)
+        nav2.client.next("accepted")
+    else:
+        assert attached.call("PUT", GOAL, json=goal("ours", x=5.0)).status_code == 201
+    eventually(lambda: attached.call("GET", GOAL).is_success)
+    nav2.navigator.kill()
+    nav2.navigator = nav2.navigation()  # at once: the dead one is still on the graph
+    eventually(lambda: attached.call("GET", GOAL).status_code == 404)
+    answer = eventually(lambda: (a := attached.call("PUT", GOAL, json=goal("again", x=6.0))).is_success and a)
+    assert answer.status_code == 201
+    assert nav2.navigator.next("goal") == 6.0
+    assert attached.call("GET", GOAL).json()["goal_id"]["id"] == "again"
+    assert attached.call("DELETE", GOAL).status_code == 204
+    assert nav2.navigator.next("cancel") == 6.0
+
+
+def test_the_robot_is_stopped_before_the_web_services_end(attached, nav2):
+    """The last test of this module: it ends them."""
+    nav2.base.forget()
+    assert attached.call("PUT", VELOCITY, json=twist(x=0.3)).status_code == 200
+    attached.process.terminate()
+    assert [nav2.base.next("velocity")["x"] for _ in range(2)] == [0.3, 0.0]
+    assert attached.process.wait(20) == 0
+
+
+def test_a_ros_thread_that_hangs_is_noticed(domain_id, monkeypatch):
+    monkeypatch.setattr(ros, "HUNG_S", 0.8)
+    with RosRuntime(domain_id) as runtime:
+        subscribers = RobotSubscribersNode(runtime, RosNames())
+        goals = Goals(publishers=None, subscribers=subscribers, calls=None, navigator=None, frames=RosNames().frames)
+        runtime.start()
+        time.sleep(1.0)
+        assert not runtime.hangs()  # with nothing to do
+        hanging, go_on = threading.Event(), threading.Event()
+
+        def hang() -> None:
+            hanging.set()
+            go_on.wait(20)
+
+        subscribers.node.executor.create_task(hang)
+        hanging.wait(20)
+        eventually(runtime.hangs)
+        with pytest.raises(Problem, match="ROS has not been heard of") as unknown:
+            goals.current()
+        assert unknown.value.status == 503
+        go_on.set()
+        eventually(lambda: not runtime.hangs())
