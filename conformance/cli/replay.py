@@ -11,14 +11,22 @@ import click
 from conformance.cli.summary import inert
 from conformance.contract.command import CommandResult, ResultCommand
 from conformance.contract.exit_codes import ExitCode
+from conformance.contract.files import CONTRACT_VERSION
 
 _FORMAT = "roaas-result/1"
+_WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
 
 
 @click.command(cls=ResultCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("result", type=click.Path(exists=True, path_type=Path))
 @click.argument("requirement", required=False)
 @click.option("--allow-motion", is_flag=True, help="The robot may be moved, as by the requests that were recorded.")
+@click.option(
+    "--statement",
+    "statement_file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="The robot's statement: let the requirements' own checks judge again, in place of sending what was recorded.",
+)
 @click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="Holds the bearer token to send.")
 @click.option("--ca-file", type=click.Path(exists=True, dir_okay=False), help="Authorities to trust for HTTPS.")
 @click.option(
@@ -35,6 +43,7 @@ def replay(
     requirement: str | None,
     *,
     allow_motion: bool,
+    statement_file: Path | None,
     token_file: str | None,
     ca_file: str | None,
     timeout_s: float,
@@ -42,10 +51,11 @@ def replay(
     """Send a finding's requests again, in order, and say whether it is still there.
 
     RESULT is a result.json, or the folder that holds one; REQUIREMENT is an id such as http/head, by default all that
-    were not met. A finding counts as still there when the last answer has the status, the media type and content as
-    then; whether values are right, only `roaas certify` says.
+    were not met. What was wrong with an answer by itself is judged as in the run; of all else, a finding counts as
+    still there when the last answer has the status, the media type and content as then. With --statement the checks of
+    the requirements run again, with the seed and effort of the result, and judge.
 
-    Exit code: 0 all gone, 1 one is still there, 2 usage, 3 robot not reached.
+    Exit code: 0 all gone, 1 one is still there, 2 usage, 3 robot not reached, 4 the checks could not judge.
     """
     # Imported here, so that --help stays quick.
     from conformance.engine.replay import Outcome, findings, moves  # noqa: PLC0415
@@ -59,13 +69,23 @@ def replay(
         chosen = list(findings(document, requirement))
         if not chosen:
             raise click.UsageError(f"{result} has no finding" + (f" of {requirement}" if requirement else ""))
+        if statement_file:
+            return _judge_again(document, statement_file, {id_ for id_, _ in chosen}, allow_motion=allow_motion)
         if not allow_motion and any(moves(document, failure) for _, failure in chosen):
             raise click.UsageError("these requests may move the robot: add --allow-motion, or name one that only reads")
-        replayed = [send_again(id_, failure, connection) for id_, failure in chosen]
+        # The contract at hand judges what was judged by it.
+        rest = document["target"].get("rest") if _by_contract(document) else None
+        replayed = [send_again(id_, failure, connection, rest) for id_, failure in chosen]
     except (KeyError, TypeError, ValueError) as error:
         raise click.UsageError(f"{result} is no well-made {_FORMAT}: {error!r}") from error
     for one in replayed:
-        came = f" ({one.came}, after {one.sent} requests)" if one.sent else f" ({one.came})" if one.came else ""
+        came = (
+            f" ({one.came}, after {one.sent} requests; {one.told_by})"
+            if one.sent
+            else f" ({one.came})"
+            if one.came
+            else ""
+        )
         click.echo(f"{one.outcome}: {one.requirement}: {inert(one.message)}{inert(came)}")
     outcomes = {one.outcome for one in replayed}
     if Outcome.STILL_THERE in outcomes:
@@ -75,6 +95,38 @@ def replay(
     if outcomes == {Outcome.NOT_REPLAYED}:
         raise click.UsageError("none of these findings has requests that could be sent again")
     return CommandResult(ExitCode.PASSED)
+
+
+def _judge_again(
+    document: dict[str, Any], statement_file: Path, requirements: set[str], *, allow_motion: bool
+) -> CommandResult:
+    from conformance.contract.files import ContractError  # noqa: PLC0415 - as above
+    from conformance.contract.statement import StatementError, load_statement  # noqa: PLC0415
+    from conformance.engine.judged_again import judged_by_checks  # noqa: PLC0415
+
+    if not _by_contract(document):
+        raise click.UsageError(
+            "the result is by a contract of its own: its checks judge with `roaas certify --contract`"
+        )
+    try:
+        statement = load_statement(statement_file)
+        judged = judged_by_checks(
+            statement, requirements, allow_motion=allow_motion, seed=document["seed"], effort=document["effort"]
+        )
+    except (StatementError, ContractError, OSError) as error:
+        raise click.UsageError(str(error)) from error
+    for item in judged:
+        word = _WORDS.get(item["verdict"], "not judged")
+        click.echo(f"{word}: {item['id']}: {inert(item['reason']) or 'passed'} ({item['cases']} cases)")
+    verdicts = {item["verdict"] for item in judged}
+    if verdicts & {"fail", "warn"}:
+        return CommandResult(ExitCode.FAILED)
+    return CommandResult(ExitCode.PASSED if verdicts == {"pass"} else ExitCode.INCONCLUSIVE)
+
+
+def _by_contract(document: dict[str, Any]) -> bool:
+    """Whether the contract that is part of the suite judged, in its present version."""
+    return bool(document["suite"]["contract"] == CONTRACT_VERSION)
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from conformance.engine.replay import is_same, send_again
+from conformance.engine.sending_again import is_same, send_again
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Again
 

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import time
-from contextlib import closing
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
 
+from conformance.engine.judged_again import observed_to_fail
+from conformance.engine.sending_again import is_same, send_again
 from conformance.engine.sequence import read_request
-from conformance.transport import raw
-from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Response, Unanswered
+from conformance.transport.exchange import Exchange, NoAnswer, Response, Unanswered
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from conformance.transport.client import Connection
     from conformance.transport.exchange import Attempt, Request
 
 # A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
 _LONGEST_PAUSE_S = 10.0
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
-# What the client says by itself.
-_OF_THE_CLIENT = frozenset({"host", "content-length", "connection"})
+_BY_JUDGEMENT = "judged as in the run"
+_BY_KIND = "by status, media type and whether there is content"
 
 
 class Outcome(StrEnum):
@@ -45,6 +44,7 @@ class Replayed:
         outcome: what became of it.
         came: what came now, in a few words.
         sent: how many requests went out.
+        told_by: what tells the outcome, in a few words.
     """
 
     requirement: str
@@ -52,6 +52,7 @@ class Replayed:
     outcome: Outcome
     came: str = ""
     sent: int = 0
+    told_by: str = ""
 
 
 def findings(result: Mapping[str, Any], requirement: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -70,8 +71,17 @@ def moves(result: Mapping[str, Any], failure: Mapping[str, Any]) -> bool:
     )
 
 
-def replay(id_: str, failure: Mapping[str, Any], connection: Connection) -> Replayed:
+def replay(id_: str, failure: Mapping[str, Any], connection: Connection, rest: str | None = None) -> Replayed:
     """Send one finding's requests again.
+
+    What the observers found in the recorded answer by itself, they judge in the new one. Of all else only the kind of
+    the answer can be compared.
+
+    Args:
+        id_: of the requirement.
+        failure: the finding, as in result.json.
+        connection: to the robot.
+        rest: base URL of its REST interface, or None.
 
     Raises:
         ValueError, KeyError, TypeError: the result is not well made.
@@ -89,45 +99,24 @@ def replay(id_: str, failure: Mapping[str, Any], connection: Connection) -> Repl
         if isinstance(attempt, Unanswered) and attempt.kind is NoAnswer.REFUSED:
             return Replayed(id_, message, Outcome.UNREACHABLE, attempt.problem)
         came.append(attempt)
-    outcome = Outcome.STILL_THERE if _same(failure["response"], came[-1]) else Outcome.GONE
-    return Replayed(id_, message, outcome, came[-1].came, len(requests))
+    there, told_by = _still_there(id_, failure["response"], requests[-1], came[-1], rest)
+    outcome = Outcome.STILL_THERE if there else Outcome.GONE
+    return Replayed(id_, message, outcome, came[-1].came, len(requests), told_by)
 
 
-def send_again(request: Request, connection: Connection) -> Attempt:
-    """Send a request as it was sent, over a connection of its own, and take what comes."""
-    where = urlsplit(request.url)
-    with closing(HttpClient(f"{where.scheme}://{where.netloc}", connection)) as client:
-        try:
-            if request.raw is not None:
-                octets = request.raw.replace(b"$ROAAS_TOKEN", (connection.token or "").encode("latin-1"))
-                answer = raw.talk(client, octets, answers=1)
-                return raw.read_one(client, octets, answer, request.method)[0]
-            fields = [pair for pair in request.headers if pair[0].lower() not in _OF_THE_CLIENT]
-            fields = [pair for pair in fields if pair != ("Authorization", "Bearer $ROAAS_TOKEN")]
-            authorized = len(fields) < sum(name.lower() not in _OF_THE_CLIENT for name, _ in request.headers)
-            if not any(name.lower() == "accept" for name, _ in fields):
-                fields.append(("Accept", ""))
-            target = where.path + (f"?{where.query}" if where.query else "")
-            return client.send(
-                request.method, target, headers=fields, body=request.body, fresh=True, authorized=authorized
-            )
-        except NoAnswerError as none:
-            return none.unanswered
-
-
-def _same(recorded: Mapping[str, Any], came: Attempt) -> bool:
-    """Whether an answer is what was found: none, or one of the same status, media type and kind of content."""
-    if not isinstance(came, Exchange):
-        return recorded["status"] is None
-    fields = tuple((name, str(value)) for name, value in recorded["headers"].items())
-    before = Response(recorded["status"] or 0, fields, (recorded["body"] or "").encode(), 0.0)
-    return is_same(before, came)
-
-
-def is_same(before: Response, came: Attempt) -> bool:
-    """Whether an answer has the status and the media type of another one, and content where that has some."""
-    if not isinstance(came, Exchange):
-        return False
-    now = came.response
-    same_kind = (before.status, before.media_type) == (now.status, now.media_type)
-    return same_kind and bool(before.body) == bool(now.body)
+def _still_there(
+    id_: str, recorded: Mapping[str, Any], request: Request, came: Attempt, rest: str | None
+) -> tuple[bool, str]:
+    """Whether an answer is what was found, and what tells it."""
+    if recorded["status"] is None or not isinstance(came, Exchange):
+        return recorded["status"] is None and not isinstance(came, Exchange), _BY_KIND
+    fields = tuple(
+        (name, str(value))
+        for name, values in recorded["headers"].items()
+        for value in (values if isinstance(values, list) else [values])
+    )
+    before = Response(recorded["status"], fields, (recorded["body"] or "").encode(), 0.0)
+    # Of a long body the result has only the beginning, of which nobody can judge.
+    if rest and "body_length" not in recorded and observed_to_fail(rest, id_, Exchange(request, before)):
+        return observed_to_fail(rest, id_, Exchange(request, came.response)), _BY_JUDGEMENT
+    return is_same(before, came), _BY_KIND

@@ -7,6 +7,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from click.testing import CliRunner
 
+from conformance.contract.files import CONTRACT_VERSION
 from conformance.engine.sequence import read_request, written
 from conformance.transport.exchange import Request
 from conformance.verdict.evidence import Sent
@@ -29,7 +30,13 @@ class _Handler(BaseHTTPRequestHandler):
         body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
         broken = self.command == "GET" and not self.server.repaired and self.server.asked[-1:] != []
         self.server.asked.append((self.command, self.path, body, self.headers.get("Authorization")))
-        self.send_response(500 if broken else 204)
+        if self.path == "/robot/pose/":
+            # Without Date until it is repaired, and always of one kind.
+            send = self.send_response if self.server.repaired else self.send_response_only
+            send(406)
+            self.send_header("Content-Length", "0")
+        else:
+            self.send_response(500 if broken else 204)
         self.end_headers()
 
     do_GET = do_PUT = _answer  # noqa: N815 - http.server's names
@@ -64,6 +71,7 @@ def _result(tmp_path, base, methods=("PUT", "GET")):
     }
     document = {
         "format": "roaas-result/1",
+        "suite": {"contract": CONTRACT_VERSION},
         "target": {"subscribers_endpoint": None},
         "requirements": [{"id": "http/declared-status", "failures": [failure]}, {"id": "http/head", "failures": []}],
     }
@@ -85,6 +93,36 @@ def test_a_finding_is_still_there_until_it_is_repaired(robot, tmp_path):
     robot.repaired = True
     gone = _replay(*arguments, "http/declared-status")
     assert (gone.exit_code, gone.output.split(":")[0]) == (0, "gone")
+
+
+def test_what_an_answer_shows_by_itself_is_judged_as_in_the_run(robot, tmp_path):
+    base = f"http://127.0.0.1:{robot.server_port}"
+    request = Request("GET", f"{base}/robot/pose/", (("Host", "x"), ("Accept", "image/png")))
+    failure = {
+        "message": "Date: None",
+        "response": {"status": 406, "headers": {"Content-Length": "0"}, "body": None},
+        "sequence": written([Sent(0.0, request)]),
+    }
+    document = {
+        "format": "roaas-result/1",
+        "suite": {"contract": CONTRACT_VERSION},
+        "target": {"rest": base},
+        "seed": 0,
+        "effort": "quick",
+        "requirements": [{"id": "http/date", "failures": [failure]}],
+    }
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    (tmp_path / "robot.toml").write_text(f'[endpoints]\nrest = "{base}"\n', encoding="utf-8")
+    by_checks = (str(tmp_path), "--statement", str(tmp_path / "robot.toml"))
+    there, checked = _replay(str(tmp_path)), _replay(*by_checks)
+    assert (there.exit_code, checked.exit_code) == (1, 1)
+    assert "judged as in the run" in there.output
+    assert "still there: http/date: " in checked.output
+    robot.repaired = True
+    gone, checked = _replay(str(tmp_path)), _replay(*by_checks)
+    assert (gone.exit_code, checked.exit_code) == (0, 0), (gone.output, checked.output)
+    assert "judged as in the run" in gone.output
+    assert "gone: http/date: passed" in checked.output
 
 
 def test_what_moves_the_robot_asks_first(robot, tmp_path):
