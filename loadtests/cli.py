@@ -102,6 +102,7 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 @click.option("--subscribers-wsdl", metavar="URL|FILE", help="WSDL of the service that tells the pose.")
 @click.option("--publishers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say.")
 @click.option("--subscribers-endpoint", metavar="URL", help="Likewise for the subscribers' service.")
+@click.option("--rosbridge", metavar="URL", help="A rosbridge to the robot, to measure as well.")
 @click.option(
     "--operation", "operations", multiple=True, type=click.Choice(OPERATIONS), help="What to call (repeatable)."
 )

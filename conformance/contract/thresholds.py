@@ -34,10 +34,11 @@ class Operation(StrEnum):
 
 
 class ApiStyle(StrEnum):
-    """The two that are compared."""
+    """The ways to a robot that are compared: the two of its web services, and rosbridge beside them."""
 
     REST = "rest"
     SOAP = "soap"
+    ROSBRIDGE = "rosbridge"
 
 
 class Client(StrEnum):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import gevent
 
-from loadtests.clients.endpoint import Endpoint
+from conformance.contract.thresholds import ApiStyle
 from loadtests.clients.failures import CallError, answer_error, is_success
 from loadtests.clients.library import LibraryRest, LibrarySoap
 from loadtests.clients.payloads import Values, variants
@@ -15,6 +15,7 @@ from loadtests.clients.wire import Connection, Request, now_ns
 
 if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
+    from loadtests.clients.rosbridge import Bridge
 
 _DURATION = re.compile(rb"([\w-]+)\s*;[^,]*?dur\s*=\s*\"?([0-9.]+)")
 
@@ -46,8 +47,9 @@ class Workload:
         self.documents = documents
         self.values: list[list[Values]] = [variants(name, seed) for name in operations]
         self.requests: dict[str, list[list[Request]]] = {
-            interface: [robot.requests(interface, name, seed) for name in operations] for interface in ("rest", "soap")
+            str(interface): [robot.requests(interface, name, seed) for name in operations] for interface in ApiStyle
         }
+        self.bridge = robot.bridge()  # one for all users
 
 
 class Caller:
@@ -56,27 +58,28 @@ class Caller:
     def __init__(self, workload: Workload, recorder: Any) -> None:
         self.workload = workload
         self.recorder = recorder
-        self._wires: dict[tuple[str, int], Connection] = {}
+        self._wires: dict[tuple[str, int], Connection | Bridge] = {}
         self._rest: LibraryRest | None = None
         self._soap: LibrarySoap | None = None
 
-    def _wire(self, interface: str, operation: int) -> Connection:
+    def _wire(self, interface: str, operation: int) -> Connection | Bridge:
         """The connection for an operation; those of one origin share it, as any HTTP client does."""
         known = self._wires.get((interface, operation))
         if known is None:
-            robot = self.workload.robot
-            endpoint = Endpoint.parse(robot.address(interface, self.workload.operations[operation]) or "")
-            for (other, _), connection in self._wires.items():
-                there = connection.endpoint
-                if other == interface and (there.scheme, there.host, there.port) == (
-                    endpoint.scheme,
-                    endpoint.host,
-                    endpoint.port,
-                ):
-                    known = connection
-            known = known or Connection(endpoint, robot.timeout_s, robot.tls)
+            known = self.workload.bridge if interface == "rosbridge" else self._http(interface, operation)
             self._wires[interface, operation] = known
         return known
+
+    def _http(self, interface: str, operation: int) -> Connection:
+        fresh = self.workload.robot.http(interface, self.workload.operations[operation])
+        for (other, _), connection in self._wires.items():
+            if (
+                other == interface
+                and isinstance(connection, Connection)
+                and connection.endpoint.origin == fresh.endpoint.origin
+            ):
+                return connection
+        return fresh
 
     def perform(
         self, segment: int, interface: str, client: str, operation: int, payload: int, due: int, *, queued: bool

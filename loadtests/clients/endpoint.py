@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
 DEFAULT_PORTS = {"http": 80, "https": 443}
@@ -39,19 +40,20 @@ class Endpoint:
     path: str
 
     @classmethod
-    def parse(cls, url: str) -> Endpoint:
-        """Read a URL.
+    def parse(cls, url: str, schemes: Mapping[str, int] = DEFAULT_PORTS) -> Endpoint:
+        """Read a URL of one of several schemes, which have their default ports.
 
         Raises:
-            EndpointError: no http(s) URL, no host, a port out of range, or user information in it.
+            EndpointError: another scheme, no host, a port out of range, or user information in it.
         """
         try:
             parts = urlsplit(url.strip())
             port = parts.port
         except ValueError as error:
             raise EndpointError(f"{url!r} is no URL: {error}") from None
-        if parts.scheme not in DEFAULT_PORTS:
-            raise EndpointError(f"{url!r} does not begin with http:// or https://")
+        if parts.scheme not in schemes:
+            wanted = " or ".join(f"{name}://" for name in schemes)
+            raise EndpointError(f"{url!r} does not begin with {wanted}")
         if not parts.hostname:
             raise EndpointError(f"{url!r} names no host")
         if parts.username is not None or parts.password is not None:
@@ -59,14 +61,19 @@ class Endpoint:
         if _FORBIDDEN.search(parts.netloc + parts.path):
             raise EndpointError(f"{url!r} holds a space or a control character")
         return cls(
-            parts.scheme, parts.hostname, DEFAULT_PORTS[parts.scheme] if port is None else port, parts.path.rstrip("/")
+            parts.scheme, parts.hostname, schemes[parts.scheme] if port is None else port, parts.path.rstrip("/")
         )
+
+    @property
+    def origin(self) -> tuple[str, str, int]:
+        """Scheme, host and port (RFC 9110 section 4.3.1): connections serve an origin."""
+        return self.scheme, self.host, self.port
 
     @property
     def authority(self) -> str:
         """The Host header's value (RFC 9110 section 7.2): the port only where it is not the scheme's own."""
         host = f"[{self.host}]" if ":" in self.host else self.host
-        return host if self.port == DEFAULT_PORTS[self.scheme] else f"{host}:{self.port}"
+        return host if self.port == DEFAULT_PORTS.get(self.scheme) else f"{host}:{self.port}"
 
     @property
     def url(self) -> str:

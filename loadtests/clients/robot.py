@@ -7,8 +7,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from conformance.contract.statement import Ros
 from loadtests.clients.endpoint import Endpoint, tls_context
 from loadtests.clients.payloads import BUILDERS, CATALOGUE, variants
+from loadtests.clients.rosbridge import Bridge, bridge_requests
+from loadtests.clients.wire import Connection
 
 if TYPE_CHECKING:
     from loadtests.clients.wire import Request
@@ -22,6 +25,8 @@ class Robot:
         publishers, subscribers: the SOAP services' addresses.
         publishers_wsdl, subscribers_wsdl: URL or file of their descriptions, for the zeep client.
         token: bearer token.
+        rosbridge: the address of a rosbridge to the robot's ROS graph (ws or wss).
+        delivery_topic: where deliveries are published on that graph.
     """
 
     rest: str | None
@@ -32,12 +37,14 @@ class Robot:
     ca_file: str | None = None
     token: str | None = None
     timeout_s: float = 10.0
+    rosbridge: str | None = None
+    delivery_topic: str = Ros().delivery_topic
 
     @cached_property
     def tls(self) -> Any:
         """The TLS context, where an address needs one."""
-        addresses = (self.rest, self.publishers, self.subscribers)
-        if not any(address and address.startswith("https") for address in addresses):
+        addresses = (self.rest, self.publishers, self.subscribers, self.rosbridge)
+        if not any(address and address.startswith(("https:", "wss:")) for address in addresses):
             return None
         return tls_context(Path(self.ca_file) if self.ca_file else None)
 
@@ -45,6 +52,8 @@ class Robot:
         """Where an operation is called over an interface; None where it cannot be."""
         if interface == "rest":
             return self.rest
+        if interface == "rosbridge":
+            return self.rosbridge
         return self.publishers if CATALOGUE[operation].service == "publishers" else self.subscribers
 
     def wsdl(self, operation: str) -> str | None:
@@ -55,12 +64,24 @@ class Robot:
         """Whether a client can call an operation over an interface: zeep needs the WSDL beside the address."""
         if self.address(interface, operation) is None:
             return False
+        if interface == "rosbridge":
+            return client == "wire"
         return interface == "rest" or client == "wire" or self.wsdl(operation) is not None
+
+    def http(self, interface: str, operation: str) -> Connection:
+        """A new connection to where REST or SOAP offer an operation; it opens at the first call."""
+        return Connection(Endpoint.parse(self.address(interface, operation) or ""), self.timeout_s, self.tls)
+
+    def bridge(self) -> Bridge:
+        """Likewise to rosbridge; only where there is one is it to be called."""
+        return Bridge(self.rosbridge or "", self.timeout_s, self.tls, self.token, self.delivery_topic)
 
     def requests(self, interface: str, operation: str, seed: int) -> list[Request]:
         """The operation's variants as octets; empty where it is not offered."""
         address = self.address(interface, operation)
         if address is None:
             return []
+        if interface == "rosbridge":  # values of its own: an echo of what another interface sent is not its own
+            return [*bridge_requests(variants(operation, seed + 1), self.delivery_topic)]
         endpoint = Endpoint.parse(address)
         return [BUILDERS[interface](endpoint, operation, values, self.token) for values in variants(operation, seed)]

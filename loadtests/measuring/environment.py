@@ -51,6 +51,7 @@ def describe(robot: Robot, output: Output, servers: dict[str, str | None]) -> di
             "rest": robot.rest,
             "publishers": robot.publishers,
             "subscribers": robot.subscribers,
+            **({"rosbridge": robot.rosbridge} if robot.rosbridge else {}),
             "servers": servers,
             "same_machine": here,
         },

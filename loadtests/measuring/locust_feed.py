@@ -29,7 +29,7 @@ class LocustFeed:
         """The method and the name under which Locust shows a series."""
         _, interface, client = SERIES[series]
         name = self._operations[operation]
-        method = CATALOGUE[name].method if interface == "rest" else "SOAP"
+        method = CATALOGUE[name].method if interface == "rest" else interface.upper()
         return method, f"{name} {interface} {client}"
 
     def succeeded(self, series: int, operation: int, response: Histogram) -> None:

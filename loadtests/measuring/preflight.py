@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import requests
 
-from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import UNREACHABLE, CallError, answer_error
 from loadtests.clients.library import LibraryRest, LibrarySoap, new_session, read_document
 from loadtests.clients.payloads import CATALOGUE, variants
-from loadtests.clients.wire import Answer, Connection
+from loadtests.clients.wire import Answer
 from loadtests.measuring.equivalence import deliveries_missing, pose_difference, requests_difference
 
 if TYPE_CHECKING:
@@ -92,7 +91,7 @@ def _compare(
 def _wire_call(robot: Robot, name: SeriesName, seed: int, findings: Findings) -> Answer:
     operation, interface, _ = name
     request = robot.requests(interface, operation, seed)[0]
-    connection = Connection(Endpoint.parse(robot.address(interface, operation) or ""), robot.timeout_s, robot.tls)
+    connection = robot.bridge() if interface == "rosbridge" else robot.http(interface, operation)
     try:
         answer = connection.call(request)
     finally:

@@ -14,6 +14,7 @@ from loadtests.schedule.arrivals import Schedule, arrivals_due
 from loadtests.schedule.plan import GAP_S, step_operation
 from loadtests.statistics import against, figures, steps, verdict
 from loadtests.statistics.recorder import Recorder
+from loadtests.statistics.third_way import other_ways
 
 if TYPE_CHECKING:
     from loadtests.measuring.preflight import Findings
@@ -58,6 +59,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "series": figures.series(measured, outcome.findings.sizes),
         "comparisons": figures.comparisons(measured),
         "noise_floor": noise_floor,
+        "other_ways": other_ways(measured),
         **({"against": compared} if compared else {}),
         "time_series": figures.time_series(measured),
         "steps": outcome.steps,

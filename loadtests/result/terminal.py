@@ -27,6 +27,14 @@ def summary(document: dict[str, Any]) -> str:
                 f"{entry['operation']} ({entry['client']}): SOAP takes {entry['ratio']:.3f}{between} times as long "
                 f"as REST at the median, {entry['soap_minus_rest_ms']:+.3f} ms"
             )
+    for entry in document["other_ways"]:
+        if entry["quantile"] == "p50" and entry["ratio"] is not None:
+            interval = entry["ci95"]
+            between = f" (95 %: {interval[0]:.3f} to {interval[1]:.3f})" if interval else ""
+            lines.append(
+                f"{entry['operation']} ({entry['client']}): {entry['interface']} takes {entry['ratio']:.3f}{between} "
+                f"times as long as REST at the median, {entry['minus_rest_ms']:+.3f} ms"
+            )
     lines += _against(document.get("against"))
     for entry in document["knee"]:
         highest = entry["highest_rate"]

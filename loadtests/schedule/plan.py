@@ -5,14 +5,14 @@ or the reverse by lot (ABBA), so that a drift of the machine or the robot meets 
 quartet one interface meets itself under two names (A/A): what difference that shows is noise. The library
 clients get quartets of their own, for their CPU time would delay the wire client's starts.
 
-Two robots take turns likewise, over one interface in each quartet.
+Three interfaces take turns likewise, in sextets; two robots over one interface in each quartet.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import product
+from itertools import count, product
 from typing import Any
 
 import msgspec
@@ -32,7 +32,6 @@ GAP_S = 0.010
 _BLOCK_S = 0.1
 _MAX_BLOCKS = 600  # bounds memory: each block keeps its own histograms
 _ARRIVALS_PER_BLOCK = 10
-_QUARTET = 4
 _TURNS, _LIBRARY_TURN, _AA_TURN = 5, 1, 3  # of five quartets the second and the fourth
 _NS = 1_000_000_000
 
@@ -139,12 +138,24 @@ class Plan:
 
     @cached_property
     def blocks(self) -> int:
-        """How many blocks the duel has: whole quartets, or two where there is no time for four."""
+        """How many blocks the duel has: whole rounds, or half of one where there is no time for more."""
+        return len(self._rounds)
+
+    @cached_property
+    def _rounds(self) -> list[Segment]:
+        """The duel's blocks in their order, without their times."""
         least = max(_BLOCK_S, self.load.duration_s / _MAX_BLOCKS)
         if self.load.rate:
             least = max(least, _ARRIVALS_PER_BLOCK / self.load.rate)
-        blocks = int(self.load.duration_s / least + 1e-9)
-        return blocks - blocks % _QUARTET if blocks >= _QUARTET else 2
+        most = int(self.load.duration_s / least + 1e-9)
+        lot = np.random.default_rng([self.load.seed, 1])
+        made: list[Segment] = []
+        for number in count():
+            turn = self._round(number, swapped=bool(lot.integers(2)))
+            if len(made) + len(turn) > most:
+                return made or turn[: len(turn) // 2]
+            made += turn
+        raise AssertionError("rounds without end")
 
     @property
     def block_s(self) -> float:
@@ -167,31 +178,34 @@ class Plan:
         return self.segments[-1].end_ns / _NS if self.segments else 0.0
 
     def _warmup(self) -> list[Segment]:
-        turns = list(product(self.clients, self.interfaces, range(self.robots)))
+        turns = [
+            turn
+            for turn in product(self.clients, self.interfaces, range(self.robots))
+            if self.offered(turn[1], turn[0])
+        ]
         if self.load.warmup_s <= 0:
             return []
-        count = max(len(turns), round(self.load.warmup_s / _BLOCK_S))
+        blocks = max(len(turns), round(self.load.warmup_s / _BLOCK_S))
         made = []
-        for index in range(count):
+        for index in range(blocks):
             client, interface, robot = turns[index % len(turns)]
-            start, end = (int(self.load.warmup_s * edge / count * _NS) for edge in (index, index + 1))
+            start, end = (int(self.load.warmup_s * edge / blocks * _NS) for edge in (index, index + 1))
             made.append(Segment(start, end, "warmup", interface, client, "", -1, self.rate_of(client), robot))
         return made
 
     def _duel(self) -> list[Segment]:
-        lot = np.random.default_rng([self.load.seed, 1])
-        made: list[Segment] = []
-        for quartet in range((self.blocks + _QUARTET - 1) // _QUARTET):
-            made += self._quartet(quartet, swapped=bool(lot.integers(2)))
         origin = self.load.warmup_s
         placed = []
-        for index, segment in enumerate(made[: self.blocks]):
+        for index, segment in enumerate(self._rounds):
             start, end = (int((origin + self.block_s * edge) * _NS) for edge in (index, index + 1))
-            placed.append(replace(segment, start_ns=start, end_ns=end, pair=index // 2))
+            placed.append(replace(segment, start_ns=start, end_ns=end))
         return placed
 
-    def _quartet(self, number: int, *, swapped: bool) -> list[Segment]:
-        """Four blocks. Of five quartets the second goes to the library clients and the fourth to A/A."""
+    def _round(self, number: int, *, swapped: bool) -> list[Segment]:
+        """All sides in turn, and then in reverse: four blocks of two sides, six of three.
+
+        Of five rounds the second goes to the library clients and the fourth to A/A.
+        """
         turn = number % _TURNS
         client = self.clients[-1] if turn == _LIBRARY_TURN else self.clients[0]
         if turn == _AA_TURN:
@@ -202,14 +216,16 @@ class Plan:
             interface = self.interfaces[earlier % len(self.interfaces)]
             sides = [("duel", interface, "", 0), ("against", interface, "", 1)]
         else:
-            sides = [("duel", interface, "", 0) for interface in self.interfaces]
+            sides = [("duel", interface, "", 0) for interface in self.interfaces if self.offered(interface, client)]
         if swapped:
             sides.reverse()
-        first, second = sides[0], sides[-1]
+        if len(sides) == 1:
+            sides *= 2  # one interface alone has as many blocks
         rate = self.rate_of(client)
         return [
-            Segment(0, 0, phase, interface, client, label, 0, rate, robot)
-            for phase, interface, label, robot in (first, second, second, first)
+            Segment(0, 0, phase, interface, client, label, 2 * number + half, rate, robot)
+            for half, order in enumerate((sides, sides[::-1]))
+            for phase, interface, label, robot in order
         ]
 
     def _steps(self) -> list[Segment]:

@@ -20,6 +20,7 @@ class CliOptions:
 
     Attributes:
         endpoints: those that were given of the statement's [endpoints], which they override.
+        rosbridge: its address.
         against: what is said of the other robot.
         tolerance: by which share the robot may be slower than that.
     """
@@ -38,6 +39,7 @@ class CliOptions:
     step_s: float = STEP_S
     allow_motion: bool = False
     thresholds: tuple[Threshold, ...] = ()
+    rosbridge: str | None = None
     against: Statement | None = None
     tolerance: float = TOLERANCE
     out: str = ""

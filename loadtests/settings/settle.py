@@ -10,6 +10,7 @@ import msgspec
 
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.robot import Robot
+from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS, Load
 from loadtests.settings.settings import Against, Limits, Output, Selection, Settings, Steps
 
@@ -43,6 +44,9 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
     endpoints = msgspec.structs.replace(statement.endpoints, **options.endpoints)
     _check_endpoints(endpoints)
     interfaces = _interfaces(options, endpoints)
+    robot = _robot(endpoints, interfaces)
+    if "rosbridge" in interfaces:
+        robot = replace(robot, rosbridge=options.rosbridge, delivery_topic=statement.ros.delivery_topic)
     operations = _operations(options)
     _check_numbers(options)
     rate, duration_s = _bounded(options, statement, operations)
@@ -51,7 +55,7 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
     if options.against is not None:
         interfaces, clients = _shared(options.against.endpoints, interfaces), clients[:1]
     settings = Settings(
-        robot=_robot(endpoints, interfaces),
+        robot=robot,
         selection=Selection(operations=operations, interfaces=interfaces, clients=clients),
         load=Load(
             rate=rate,
@@ -123,15 +127,28 @@ def _check_endpoints(endpoints: Endpoints) -> None:
 
 def _interfaces(options: CliOptions, endpoints: Endpoints) -> tuple[str, ...]:
     soap = endpoints.publishers or endpoints.subscribers
-    there = {"rest": bool(endpoints.rest), "soap": soap}
+    there = {"rest": bool(endpoints.rest), "soap": soap, "rosbridge": bool(options.rosbridge)}
     interfaces = options.selection.interfaces or tuple(name for name in INTERFACES if there[name])
     if not interfaces:
         raise SettingsError("no endpoint: give a statement, --rest, --publishers-wsdl or --subscribers-wsdl")
+    if "rosbridge" in interfaces:
+        _check_bridge(options)
     if "rest" in interfaces and not endpoints.rest:
         raise SettingsError("--interface rest needs --rest or the statement's [endpoints] rest")
     if "soap" in interfaces and not soap:
         raise SettingsError("--interface soap needs --publishers-wsdl, --subscribers-wsdl or an endpoint")
     return tuple(name for name in INTERFACES if name in interfaces)
+
+
+def _check_bridge(options: CliOptions) -> None:
+    if not options.rosbridge:
+        raise SettingsError("--interface rosbridge needs --rosbridge ws://…")
+    if options.against is not None:
+        raise SettingsError("--against compares the web services of two robots: leave --rosbridge out")
+    try:
+        bridge_endpoint(options.rosbridge)
+    except EndpointError as error:
+        raise SettingsError(f"--rosbridge: {error}") from None
 
 
 def _robot(endpoints: Endpoints, interfaces: tuple[str, ...]) -> Robot:

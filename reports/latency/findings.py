@@ -78,7 +78,7 @@ def headline(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Se
 
 def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[str]:
     """Further findings, a sentence each: noise floor, stalls, knee, failures."""
-    return [*_noise(result), *_stalled(result), *_knees(result), *_failed(result, series)]
+    return [*_noise(result), *_other_ways(result), *_stalled(result), *_knees(result), *_failed(result, series)]
 
 
 def _leading(result: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -135,6 +135,17 @@ def _noise(result: Mapping[str, Any]) -> list[str]:
             )
             return [sentence]
     return []
+
+
+def _other_ways(result: Mapping[str, Any]) -> list[str]:
+    """What each interface beside SOAP and REST takes at the median."""
+    return [
+        f"{way['interface'].capitalize()} takes {interval(way['ci95'], of_ratio=True)} times as long as REST at the "
+        f"median for {way['operation']}, with the {way['client']} client (95 % interval), "
+        f"{ms(way['minus_rest_ms'])} ms more."
+        for way in result.get("other_ways", [])
+        if way["quantile"] == "p50" and way["ci95"]
+    ]
 
 
 def _stalled(result: Mapping[str, Any]) -> list[str]:

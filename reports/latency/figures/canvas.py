@@ -21,9 +21,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 INK, SOFT, LINE = "#16202a", "#55616d", "#d9dfe5"
-COLOUR = {"rest": "#0072B2", "soap": "#D55E00"}
-MARK = {"rest": "o", "soap": "^"}
-"""A sign for each interface beside its colour: the two colours are one grey on a black and white printer."""
+COLOUR = {"rest": "#0072B2", "soap": "#D55E00", "rosbridge": "#009E73"}
+MARK = {"rest": "o", "soap": "^", "rosbridge": "s"}
+"""A sign for each interface beside its colour: the colours are one grey on a black and white printer."""
 SPAN_COLOUR = {"build": "#E69F00", "wire": "#56B4E9", "server": "#009E73", "parse": "#CC79A7"}
 SPAN_HATCH = {"build": "", "wire": "//", "server": "", "parse": "\\\\"}
 PAPER_COLOUR = "#7a4d8f"

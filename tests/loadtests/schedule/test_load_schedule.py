@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from loadtests.clients.wire import now_ns
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Pacer
-from loadtests.schedule.plan import CLIENTS, INTERFACES, Load, Plan
+from loadtests.schedule.plan import CLIENTS, Load, Plan
 
 LOAD = Load(rate=100.0, users=None, duration_s=20.0, warmup_s=1.0, arrivals="constant", seed=1)
-PLAN = Plan(("delivery", "pose"), INTERFACES, CLIENTS, LOAD, timeout_s=10.0, workers=1, connections=32)
+PLAN = Plan(("delivery", "pose"), ("rest", "soap"), CLIENTS, LOAD, timeout_s=10.0, workers=1, connections=32)
 
 
 def varied(clients=CLIENTS, workers=1, **load):
@@ -75,6 +75,26 @@ def test_rest_and_soap_take_turns_in_random_abba_quartets():
     phases = Counter((segment.phase, segment.client) for segment in duel)
     assert phases["duel", "wire"] == 120
     assert phases["duel", "zeep"] == phases["aa", "wire"] == 40
+
+
+def test_three_interfaces_take_turns_in_sextets_and_two_robots_in_quartets():
+    rosbridge = replace(PLAN, interfaces=("rest", "soap", "rosbridge"), offers={"rosbridge/zeep": []})
+    pairs = {}
+    for segment in rosbridge.segments:
+        if (segment.phase, segment.client) == ("duel", "wire"):
+            pairs.setdefault(segment.pair, []).append(segment.interface)
+    assert all(sorted(sides) == ["rest", "rosbridge", "soap"] for sides in pairs.values())
+    first, second = pairs[0], pairs[1]
+    assert first == second[::-1]
+    assert not [s for s in rosbridge.segments if (s.interface, s.client) == ("rosbridge", "zeep")]
+    robots = replace(PLAN, robots=2, clients=("wire",))
+    met = Counter()
+    for pair in {segment.pair for segment in robots.segments if segment.phase == "against"}:
+        here, there = sorted((segment for segment in robots.segments if segment.pair == pair), key=lambda s: s.robot)
+        assert (here.robot, here.phase, there.robot, there.phase) == (0, "duel", 1, "against")
+        assert here.interface == there.interface
+        met[here.interface] += 1
+    assert abs(met["rest"] - met["soap"]) <= 2
 
 
 def test_no_second_passes_without_the_wire_client():
