@@ -5,6 +5,7 @@ Rooms are imported when their command is used, so that ``roaas certify`` needs n
 
 from __future__ import annotations
 
+import signal
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -103,6 +104,8 @@ class FrontDoor:
 @click.version_option(package_name="roaas", prog_name="roaas")
 def main() -> None:
     """Conformance and load tests for robots that are web services."""
+    # What ends a command in a container or a CI job cleans up like Ctrl-C; some commands have a handler of their own.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 if __name__ == "__main__":

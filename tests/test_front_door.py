@@ -1,8 +1,12 @@
 """The front door renders the result that a command says it wrote, whatever the command's exit code."""
 
 import os
+import signal
+import subprocess
+import sys
 
 import click
+import psutil
 import pytest
 from click.testing import CliRunner
 
@@ -55,3 +59,17 @@ def test_wrong_usage_renders_nothing(rendered):
 
     assert run(callback) == ExitCode.USAGE
     assert rendered == []
+
+
+def test_a_command_that_is_ended_leaves_no_process_behind(tmp_path):
+    command = [sys.executable, "-m", "roaas", "selftest", "--target", "plain", "--short", "--seeds", "0"]
+    process = subprocess.Popen(
+        [*command, "--faults", "*-unknown", "--out", tmp_path], stderr=subprocess.PIPE, text=True
+    )
+    process.stderr.readline()  # a first mutant has been judged
+    children = psutil.Process(process.pid).children(recursive=True)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60) == ExitCode.INTERRUPTED
+    process.stderr.close()
+    assert children
+    assert psutil.wait_procs(children, timeout=10)[1] == []

@@ -9,15 +9,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from lxml import etree
 
 from conformance.contract.files import CONTRACT_DIR
+from conformance.selftest.at_once import each_at_once
 from conformance.selftest.messages import unchanged
 from conformance.selftest.mutant_run import RobotPool
 from conformance.selftest.mutants.mutant import Mutant
@@ -54,7 +53,6 @@ def compare(
     pool: RobotPool, mutants: Iterable[Mutant], *, tell: Callable[[SchemathesisResult], None]
 ) -> tuple[Findings, list[SchemathesisResult]]:
     """Run Schemathesis against the good robot, and then against every REST mutant that no ROS probe is needed for."""
-    lock = threading.Lock()
     robot, proxy = pool.take()
     try:
         good = _findings(proxy)
@@ -70,16 +68,12 @@ def compare(
         finally:
             proxy.change = unchanged
             pool.give(robot, proxy)
-        seen = SchemathesisResult(
+        return SchemathesisResult(
             mutant.name, bool(beyond), tuple(sorted(f"{operation} {code}" for operation, code in beyond))
         )
-        with lock:
-            tell(seen)
-        return seen
 
     tried = [mutant for mutant in mutants if mutant.interface == "rest" and not mutant.probe]
-    with ThreadPoolExecutor(pool.size) as executor:
-        return good, list(executor.map(one, tried))
+    return good, each_at_once(one, tried, pool.size, tell)
 
 
 def _findings(proxy: Proxy, token: str = "") -> Findings:

@@ -4,10 +4,10 @@ import contextlib
 import tempfile
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from conformance.selftest.at_once import each_at_once
 from conformance.selftest.certifying import Job, Outcome, run_job
 from conformance.selftest.link import linked
 from conformance.selftest.proxy import Proxy
@@ -86,16 +86,12 @@ def run_controls(
         with lock:
             domain = domains.pop()
         try:
-            found = _try(case, effort, domain, requirements)
+            return _try(case, effort, domain, requirements)
         finally:
             with lock:
                 domains.append(domain)
-        with lock:
-            tell(found)
-        return found
 
-    with ThreadPoolExecutor(parallel) as executor:
-        return list(executor.map(one, cases))
+    return each_at_once(one, cases, parallel, tell)
 
 
 def _try(case: Case, effort: str, domain: int, requirements: tuple[str, ...]) -> ControlResult:

@@ -1,13 +1,12 @@
 """Each mutant is judged, and each requirement that must catch it has to say so."""
 
 import queue
-import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any, Self
 
+from conformance.selftest.at_once import each_at_once
 from conformance.selftest.certifying import Job, Outcome, run_job
 from conformance.selftest.messages import unchanged
 from conformance.selftest.mutants.mutant import Mutant
@@ -129,20 +128,15 @@ def run_mutants(
         already: requirements that say fail or warn of the good robot itself: nothing can be shown of them.
         tell: called as each is done.
     """
-    lock = threading.Lock()
 
     def one(mutant: Mutant) -> MutantResult:
         robot, proxy = pool.take()
         try:
-            result = _try(mutant, robot, proxy, effort, seed, already)
+            return _try(mutant, robot, proxy, effort, seed, already)
         finally:
             pool.give(robot, proxy)
-        with lock:
-            tell(result)
-        return result
 
-    with ThreadPoolExecutor(pool.size) as executor:
-        return list(executor.map(one, mutants))
+    return each_at_once(one, mutants, pool.size, tell)
 
 
 def _try(mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, already: frozenset[str]) -> MutantResult:

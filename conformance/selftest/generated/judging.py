@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final
 
 from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import load_ledger
 from conformance.contract.statement import load_statement
+from conformance.selftest.at_once import each_at_once
 from conformance.selftest.certifying import Outcome, run_job
 from conformance.selftest.generated.mutant import GeneratedMutant, Tally
 from conformance.selftest.messages import unchanged
@@ -74,22 +74,17 @@ def judge(
         seed: of everything random.
         tell: called as each is done.
     """
-    lock = threading.Lock()
     claimed = tuple(load_statement(statement_of(pool.kind)).claimed())
     blamed = _Blamed(claimed, seed)
 
     def one(mutant: GeneratedMutant) -> GeneratedResult:
         robot, proxy = pool.take()
         try:
-            result = _judge(mutant, robot, proxy, efforts, seed, blamed)
+            return _judge(mutant, robot, proxy, efforts, seed, blamed)
         finally:
             pool.give(robot, proxy)
-        with lock:
-            tell(result)
-        return result
 
-    with ThreadPoolExecutor(pool.size) as executor:
-        return list(executor.map(one, mutants))
+    return each_at_once(one, mutants, pool.size, tell)
 
 
 class _Blamed:

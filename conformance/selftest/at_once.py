@@ -1,0 +1,49 @@
+"""Several robots judged at once, each told of as it is done, and Ctrl-C that does not wait for the others."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Final, TypeVar
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
+# How long after a certification was killed to look for one more, s: a mutant may be tried several times.
+_AGAIN_S: Final = 0.1
+
+
+def each_at_once(
+    judge: Callable[[_Item], _Result], items: Iterable[_Item], at_once: int, tell: Callable[[_Result], None]
+) -> list[_Result]:
+    """Judge each item in a thread, ``at_once`` at a time; results in the items' order.
+
+    Args:
+        judge: runs certifications in processes of their own (certifying.run_job).
+        items: what to judge.
+        at_once: how many at a time.
+        tell: called with each result when it is there, one call at a time.
+
+    Raises:
+        KeyboardInterrupt: after what was under way has been killed, and its robots are stopped.
+    """
+    lock = threading.Lock()
+
+    def told(item: _Item) -> _Result:
+        result = judge(item)
+        with lock:
+            tell(result)
+        return result
+
+    with ThreadPoolExecutor(at_once) as executor:
+        judged = [executor.submit(told, item) for item in items]
+        try:
+            return [one.result() for one in judged]
+        except BaseException:
+            executor.shutdown(wait=False, cancel_futures=True)
+            running = [one for one in judged if not one.cancelled()]
+            while wait(running, _AGAIN_S).not_done:
+                for process in multiprocessing.active_children():
+                    process.kill()
+            raise
