@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope, statement_in
 from reports.attestation.statement import RESULT_SUBJECT, sha256
-from reports.certificate.junit import junit
-from reports.certificate.page import certificate_html, certificate_markdown, certificate_print
+from reports.certificate.page import certificate_html, certificate_print
 from reports.certificate.seal import Seal
 from reports.errors import ReportError, ResultMissingError
 from reports.fleet.page import fleet_html, fleet_markdown
+from reports.formats.catalogue import FORMATS
 from reports.pages.page import write_pages
 from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_fleet, read_latency, read_result
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from reports.attestation.signing import Notary
@@ -64,15 +64,28 @@ def render(directory: Path, notary: Notary | None = None) -> list[Path]:
     return written
 
 
+def render_formats(directory: Path, names: Sequence[str]) -> list[Path]:
+    """Write a directory's `result.json` in the formats of these names, as `reports.formats.catalogue` has them.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ReportError: as `render`, of `result.json` alone.
+    """
+    return write_pages(directory, written_as(read_result(directory / RESULT_NAME), names))
+
+
+def written_as(result: Mapping[str, Any], names: Sequence[str]) -> dict[str, str]:
+    """A valid `roaas-result/1` document in some formats: each file's name and its text."""
+    return {FORMATS[name].file: FORMATS[name].write(result) for name in names}
+
+
 def _conformance(path: Path, notary: Notary | None) -> dict[str, str]:
     document = read_result(path)
     digest = sha256(path.read_bytes())
     seal = Seal(digest, notary.key if notary else _signed_by(path, digest))
-    pages = {
-        "certificate.html": certificate_html(document, seal),
-        "certificate.md": certificate_markdown(document),
-        "junit.xml": junit(document).decode(),
-    }
+    pages = {"certificate.html": certificate_html(document, seal), **written_as(document, ("markdown", "junit"))}
     if seal.key:
         pages["certificate-print.html"] = certificate_print(document, seal)
     return {**pages, ENVELOPE_NAME: notary.envelope(path, document, pages)} if notary else pages

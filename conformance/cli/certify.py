@@ -17,6 +17,7 @@ from conformance.contract.classes import CLASSES, PROFILES
 from conformance.contract.command import CommandResult, FrontDoor, ResultCommand
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.files import CONTRACT_DIR, Contract, ContractError
+from conformance.contract.places import places
 from conformance.contract.requirement_sets import RequirementSetError, judged_by, names
 from conformance.contract.statement import Statement, StatementError, load_statement
 from conformance.verdict.effort import EFFORTS, Effort
@@ -193,6 +194,7 @@ def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None)
             statement=file_digest(statement) if statement else None,
             baseline=file_digest(options["baseline"]) if options["baseline"] else None,
             nonce=options["nonce"],
+            places=places(contract, statement),
         )
     except (OSError, BaselineError, RequirementSetError) as error:
         raise StatementError(str(error)) from error

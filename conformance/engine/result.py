@@ -65,6 +65,7 @@ def result_document(
         "digests": {"statement": run.given.statement, "contract": contract_digests(run.contract)},
         "baseline": {"digest": run.given.baseline} if run.given.baseline else None,
         "nonce": run.given.nonce,
+        "places": run.given.places,
         "target": _target(robot),
         "statement": {
             "robot": statement.robot,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from conformance.contract.classes import Prerequisite
 from conformance.contract.files import Contract
@@ -33,11 +33,13 @@ class Given:
         statement: digest of the statement's file, as `sha256:…`; None where there was none.
         baseline: digest of the file of accepted failures, likewise.
         nonce: what the relying party chose, or None.
+        places: where in their files claims and requirements stand, as result.json has it.
     """
 
     statement: str | None = None
     baseline: str | None = None
     nonce: str | None = None
+    places: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass

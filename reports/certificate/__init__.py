@@ -1,1 +1,1 @@
-"""What becomes of result.json: the certificate as HTML and Markdown, and junit.xml."""
+"""What becomes of result.json: the certificate as HTML and Markdown, and what changed between two."""

@@ -1,6 +1,6 @@
-"""The certificate: a conformance result as a page that a vendor can hand to a customer, and as Markdown.
+"""The certificate: a conformance result as a page that a vendor can hand to a customer.
 
-What it says is worked out here, once, for both; how it looks is the templates' affair. It calls itself a
+What it says is worked out here, once, for all its forms; how it looks is the templates' affair. It calls itself a
 certificate only where every claimed class passed.
 """
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from reports.certificate.seal import Seal
-from reports.pages.page import html_page, markdown_page
+from reports.pages.page import html_page
 
 SHOWN_FAILURES = 5
 """Findings shown for each requirement; the rest are counted. Result files hold them all."""
@@ -196,20 +196,16 @@ def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
 
 def certificate_html(result: Mapping[str, Any], seal: Seal | None = None) -> str:
     """The certificate as one HTML file."""
-    return html_page("certificate.html.j2", seal=seal, **_values(result))
+    return html_page("certificate.html.j2", seal=seal, **page_values(result))
 
 
 def certificate_print(result: Mapping[str, Any], seal: Seal) -> str:
     """A signed certificate's first page alone, for a wall or a folder: one sheet of A4."""
-    return html_page("certificate-print.html.j2", seal=seal, **_values(result))
+    return html_page("certificate-print.html.j2", seal=seal, **page_values(result))
 
 
-def certificate_markdown(result: Mapping[str, Any]) -> str:
-    """The short form for a pull request."""
-    return markdown_page("certificate.md.j2", **_values(result))
-
-
-def _values(result: Mapping[str, Any]) -> dict[str, Any]:
+def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
+    """What the templates of all forms of a certificate are filled with."""
     return {
         "certificate": certificate(result),
         "result": result,

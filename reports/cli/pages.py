@@ -6,10 +6,11 @@ import click
 
 from reports.cli.refusal import refuse
 from reports.errors import ReportError
+from reports.formats.catalogue import FORMATS
 from reports.pages.page import write_pages
 from reports.pages.untrusted import visible
 from reports.reading import LATENCY_NAME, read_latency
-from reports.rendering import render
+from reports.rendering import render, render_formats
 
 EXIT_OK = 0
 EXIT_SLOWER = 1
@@ -18,14 +19,22 @@ EXIT_INVALID = 4
 
 @click.command()
 @click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
-def report(directory: Path) -> None:
+@click.option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice(list(FORMATS)),
+    help="Write result.json in this format instead; repeatable.",
+)
+def report(directory: Path, formats: tuple[str, ...]) -> None:
     """Write the pages that belong to the result files in DIR again.
 
     result.json gives certificate.html, certificate.md and junit.xml; latency.json gives latency.html and
-    latency.md. Exit code 2 where DIR holds no result file, or an unreadable one.
+    latency.md. With --format: that file alone, for a CI system or a code host. Exit code 2 where DIR holds no result
+    file, or an unreadable one.
     """
     try:
-        written = render(directory)
+        written = render_formats(directory, formats) if formats else render(directory)
     except ReportError as error:
         refuse(error)
     for path in written:

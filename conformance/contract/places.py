@@ -1,0 +1,66 @@
+"""Where in their files the things stand that a result speaks of, for whoever shows it beside the files.
+
+TOML's readers give values without their lines; the two files are looked at as text again, for headings and names.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from conformance.contract.files import CONTRACT_DIR
+
+if TYPE_CHECKING:
+    from conformance.contract.files import Contract
+
+_TABLE = re.compile(r'^\s*\[\s*"?([\w-]+)"?\s*\.\s*"?([\w-]+)"?\s*\]', re.MULTILINE)
+_CLAIMS = re.compile(r"^\s*\[\s*claims\s*\]", re.MULTILINE)
+_NEXT_TABLE = re.compile(r"^\s*\[[\w\s\"'.-]+\]\s*(?:#.*)?$", re.MULTILINE)
+_NAME = re.compile(r"[\"']([\w-]+)[\"']")
+_LEDGER = "requirements.toml"
+
+
+def places(contract: Contract, statement: Path | None) -> dict[str, Any]:
+    """What result.json says of places: of the ledger, and of the statement where there is one.
+
+    Lines count from 1, and files are named from the working directory where they lie below it.
+    """
+    own = contract.directory / _LEDGER
+    ledger = own if own.is_file() else CONTRACT_DIR / _LEDGER
+    lines = {id_: line for id_, line in _ledger_lines(_text(ledger)).items() if id_ in contract.ledger}
+    return {
+        "statement": None if statement is None else {"file": _shown(statement), **_claim_lines(_text(statement))},
+        "ledger": {"file": _shown(ledger), "lines": lines},
+    }
+
+
+def _ledger_lines(text: str) -> dict[str, int]:
+    return {f"{found[1]}/{found[2]}": _line(text, found.start(1)) for found in _TABLE.finditer(text)}
+
+
+def _claim_lines(text: str) -> dict[str, Any]:
+    """The line of the table `[claims]`, 1 where there is none, and of each name that is claimed there."""
+    table = _CLAIMS.search(text)
+    if table is None:
+        return {"line": 1, "classes": {}}
+    end = _NEXT_TABLE.search(text, table.end())
+    names = _NAME.finditer(text, table.end(), end.start() if end else len(text))
+    line = _line(text, text.index("[", table.start()))
+    return {"line": line, "classes": {found[1]: _line(text, found.start()) for found in names}}
+
+
+def _line(text: str, offset: int) -> int:
+    return text.count("\n", 0, offset) + 1
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+def _shown(path: Path) -> str:
+    """From the working directory; of what lies elsewhere, only the folder and the name."""
+    try:
+        return path.resolve().relative_to(Path.cwd()).as_posix()
+    except ValueError:
+        return "/".join(path.resolve().parts[-2:])

@@ -1,0 +1,43 @@
+"""The certificate's short form, for a pull request and for the summary of a CI job: Markdown of bounded size.
+
+GitHub refuses a job summary of more than 1 MiB whole, so that the worst run would be the one of which nothing is seen.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from reports.certificate.page import page_values
+from reports.pages.page import markdown_page
+
+MOST_OCTETS = 512 * 1024
+"""Of what is told of single requirements; verdict, classes and reasons are bounded by their number."""
+_MOST_SHOWN = 30
+_MOST_NAMED = 500
+_MOST_GROUPS = 30
+_HEADINGS = {"fail": "What failed", "warn": "Warnings"}
+
+
+class _Part(NamedTuple):
+    """Requirements of one verdict: those that are told in full, and the rest."""
+
+    heading: str
+    told: Sequence[str]
+    rest: Sequence[Mapping[str, Any]]
+
+
+def certificate_markdown(result: Mapping[str, Any]) -> str:
+    """Write a valid `roaas-result/1` document as Markdown of less than 1 MiB."""
+    values = page_values(result)
+    parts, left = [], MOST_OCTETS
+    for verdict, heading in _HEADINGS.items():
+        found = values["certificate"].with_verdict(verdict)
+        told: list[str] = []
+        for requirement in found[:_MOST_SHOWN]:
+            block = markdown_page("requirement.md.j2", r=requirement)
+            left -= len(block.encode())
+            if left < 0:
+                break
+            told.append(block)
+        if found:
+            parts.append(_Part(heading, told, found[len(told) :]))
+    return markdown_page("certificate.md.j2", parts=parts, most_named=_MOST_NAMED, most_groups=_MOST_GROUPS, **values)

@@ -1,0 +1,1 @@
+"""A conformance result in the forms that CI systems and code hosts read: one module for each."""

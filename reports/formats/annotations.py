@@ -1,0 +1,40 @@
+"""GitHub's workflow commands: the worst cases as annotations, at most ten, and how many more there are.
+
+GitHub shows ten errors and ten warnings of a step and drops the rest without a word.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from reports.formats.cases import Case, Outcome, cases, worst_first
+from reports.formats.places import places_of
+from reports.pages.untrusted import excerpt
+
+MOST = 10
+_MESSAGE = 600
+
+
+def annotations(result: Mapping[str, Any]) -> str:
+    """Write a valid `roaas-result/1` document as workflow commands, a line each."""
+    found = worst_first(cases(result))
+    lines = [_command(result, case) for case in found[:MOST]]
+    if len(found) > MOST:
+        lines.append(f"::notice title=RoAAS::{len(found) - MOST} more are in the job summary and in certificate.html")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _command(result: Mapping[str, Any], case: Case) -> str:
+    place = places_of(result, case)[0]
+    command = "error" if case.outcome in {Outcome.FAILED, Outcome.ERROR} else "warning"
+    title = f"{case.name} ({case.outcome})"
+    told = f"file={_property(place.file)},line={place.line},title={_property(title)}"
+    return f"::{command} {told}::{_data(excerpt(case.message, _MESSAGE))}"
+
+
+def _data(text: str) -> str:
+    """What could end a command is escaped: a robot's words start none of their own."""
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    return _data(excerpt(text, _MESSAGE)).replace(":", "%3A").replace(",", "%2C")

@@ -1,0 +1,21 @@
+"""A badge, as shields' endpoint reads it: green for a conforming robot and for nothing else."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from reports.certificate.page import VERDICT_WORDS
+
+_COLOURS = {"conformant": "brightgreen", "not-conformant": "red", "inconclusive": "lightgrey"}
+
+
+def badge(result: Mapping[str, Any]) -> str:
+    """Write a valid `roaas-result/1` document as a badge."""
+    verdict, colour = VERDICT_WORDS[result["verdict"]].lower(), _COLOURS[result["verdict"]]
+    values = list(result["classes"].values())
+    told = f"{verdict} ({values.count('pass')} of {len(values)} classes)"
+    if result.get("accepted_until"):
+        told, colour = f"{verdict}, known failures until {result['accepted_until']}", "orange"
+    if result.get("interrupted"):
+        told, colour = f"{verdict}, interrupted", "red" if verdict == "not conformant" else "lightgrey"
+    return json.dumps({"schemaVersion": 1, "label": "RoAAS", "message": told, "color": colour}, indent=1) + "\n"

@@ -1,0 +1,176 @@
+"""A conformance result as test cases: what every format of a CI system is written from.
+
+One case for each requirement. A class whose verdict no case of its own explains (a missing prerequisite, nothing
+executed) gets a case of its own, and so does a run that nothing explains: no reader sees green where the suite
+saw none.
+"""
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from reports.pages.untrusted import beginning
+
+_SHOWN_FAILURES = 10
+_SHOWN_OCTETS = 40_000
+_SHOWN_BODY = 2000
+_SHOWN_CURL = 8000
+
+
+class Outcome(StrEnum):
+    """What became of a case; the worst first."""
+
+    FAILED = "failed"
+    ERROR = "error"  # it could not be judged
+    ACCEPTED = "accepted"  # it failed, and the baseline expects that until a day
+    WARNING = "warning"  # a SHOULD was not kept, which breaks no build
+    PASSED = "passed"
+    SKIPPED = "skipped"
+
+
+_OUTCOMES = {
+    "pass": Outcome.PASSED,
+    "fail": Outcome.FAILED,
+    "warn": Outcome.WARNING,
+    "skip": Outcome.SKIPPED,
+    "error": Outcome.ERROR,
+    "not-claimed": Outcome.SKIPPED,
+}
+_UNEXPLAINED = {Outcome.ERROR: "No verdict.", Outcome.SKIPPED: "Not tested."}
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One test case: of a requirement, a class or the run.
+
+    Attributes:
+        name: the requirement's id, `class NAME`, or `run`.
+        class_name: the conformance class; empty for the run.
+        outcome: what became of it.
+        message: one line for it; empty where there is nothing to say.
+        requirement: as result.json has it; None for a class or the run.
+    """
+
+    name: str
+    class_name: str
+    outcome: Outcome
+    message: str = ""
+    requirement: Mapping[str, Any] | None = None
+
+    @property
+    def detail(self) -> str:
+        """What belongs to it in full; empty where nothing was judged."""
+        if self.requirement is None or self.outcome is Outcome.SKIPPED:
+            return ""
+        told = f"{self.requirement['level']}: {self.requirement['text']}\nSource: {self.requirement['source']}"
+        evidence = f"{self.requirement['cases']} cases by {', '.join(self.requirement['checks']) or 'no check'}"
+        if self.outcome is Outcome.PASSED:
+            return f"{told}\n{evidence}"
+        return "\n\n".join([told, evidence, *_findings(self.requirement["failures"])])
+
+    @property
+    def rule(self) -> str:
+        """A name that stays the same from run to run."""
+        return self.name.replace(" ", "/")
+
+    @property
+    def fingerprint(self) -> str:
+        """The rule's name as 64 hexadecimal digits."""
+        return hashlib.sha256(f"roaas/1 {self.rule}".encode()).hexdigest()
+
+
+def cases(result: Mapping[str, Any]) -> list[Case]:
+    """The cases of a valid `roaas-result/1` document, class by class."""
+    found = [case for name in classes(result) for case in _of_class(result, name)]
+    if not found or (
+        result["verdict"] != "conformant"
+        and not any(case.outcome in {Outcome.FAILED, Outcome.ERROR, Outcome.ACCEPTED} for case in found)
+    ):
+        found.append(Case("run", "", Outcome.ERROR, "Nothing was judged."))
+    return found
+
+
+def worst_first(found: Sequence[Case]) -> list[Case]:
+    """The cases that somebody has to look at: failed, not judged, accepted, warnings."""
+    order = [Outcome.FAILED, Outcome.ERROR, Outcome.ACCEPTED, Outcome.WARNING]
+    return sorted((case for case in found if case.outcome in order), key=lambda case: order.index(case.outcome))
+
+
+def classes(result: Mapping[str, Any]) -> list[str]:
+    """The names of all classes, those of requirements whose class has no verdict included."""
+    return list(dict.fromkeys([*result["classes"], *(r["class"] for r in result["requirements"])]))
+
+
+def _of_class(result: Mapping[str, Any], name: str) -> Iterator[Case]:
+    own = [_of_requirement(requirement) for requirement in result["requirements"] if requirement["class"] == name]
+    verdict = result["classes"].get(name, "inconclusive")
+    outcomes = {case.outcome for case in own}
+    reason = result["class_reasons"].get(name, "")
+    if verdict == "fail" and not outcomes & {Outcome.FAILED, Outcome.ACCEPTED}:
+        yield Case(f"class {name}", name, Outcome.FAILED, reason or "The class failed.")
+    if verdict == "inconclusive" and not outcomes & {Outcome.FAILED, Outcome.ERROR}:
+        yield Case(f"class {name}", name, Outcome.ERROR, reason or "The class could not be judged.")
+    yield from own
+
+
+def _of_requirement(requirement: Mapping[str, Any]) -> Case:
+    outcome, message = _outcome(requirement)
+    return Case(requirement["id"], requirement["class"], outcome, message, requirement)
+
+
+def _outcome(requirement: Mapping[str, Any]) -> tuple[Outcome, str]:
+    expected = requirement.get("expected_failure")
+    if expected is not None:
+        until = f" until {expected['expires']}" if expected.get("expires") else ""
+        return Outcome.ACCEPTED, f"Expected by the baseline{until}: {expected['reason']}"
+    verdict, reason = requirement["verdict"], requirement["untestable"] or requirement["reason"]
+    outcome = _OUTCOMES[verdict]
+    if outcome in {Outcome.FAILED, Outcome.WARNING}:
+        return outcome, _headline(requirement)
+    if verdict == "not-claimed":
+        return outcome, "The class is not claimed."
+    return outcome, "" if outcome is Outcome.PASSED else reason or _UNEXPLAINED[outcome]
+
+
+def _headline(requirement: Mapping[str, Any]) -> str:
+    failures = requirement["failures"]
+    if not failures:
+        return str(requirement["reason"] or requirement["text"])
+    more = f" (and {len(failures) - 1} more findings)" if len(failures) > 1 else ""
+    return f"{failures[0]['message']}{more}"
+
+
+def _findings(failures: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    shown, octets = 0, 0
+    for number, failure in enumerate(failures[:_SHOWN_FAILURES], start=1):
+        if octets > _SHOWN_OCTETS:
+            break
+        lines = [f"[{number}] {failure['message']}", f"expected: {failure['expected']}"]
+        if failure["seen"] > 1:
+            lines.append(f"seen in {failure['seen']} cases")
+        if failure["request"]:
+            lines.append(f"send it again: {_cut(failure['request']['curl'], _SHOWN_CURL)}")
+        told = "\n".join([*lines, *_response(failure["response"])])
+        yield told
+        shown, octets = number, octets + len(told.encode("utf-8", "surrogatepass"))
+    if len(failures) > shown:
+        yield f"{len(failures) - shown} more findings are in result.json."
+
+
+def _response(response: Mapping[str, Any] | None) -> Iterator[str]:
+    if response is None:
+        return
+    took = "" if response["elapsed_ms"] is None else f" after {response['elapsed_ms']:.1f} ms"
+    if response["status"] is None:
+        yield f"no response{took}: {response.get('error') or 'no reason was recorded'}"
+        return
+    yield f"answered {response['status']}{took}"
+    if response["body"]:
+        yield _cut(response["body"], _SHOWN_BODY, response.get("body_length"))
+
+
+def _cut(text: str, limit: int, octets: int | None = None) -> str:
+    part = beginning(text, limit, octets)
+    return f"{part.text}\n… {part.omitted} of {part.total} {part.unit} are not shown" if part.cut else part.text

@@ -1,0 +1,30 @@
+"""All formats by the name that `roaas report --format` takes, with the file that each becomes."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from reports.certificate.markdown import certificate_markdown
+from reports.formats.annotations import annotations
+from reports.formats.badge import badge
+from reports.formats.ctrf import ctrf
+from reports.formats.gitlab import gitlab
+from reports.formats.junit import junit
+from reports.formats.sarif import sarif
+
+
+class Format(NamedTuple):
+    """A format: the name of its file, which is what its readers look for, and what writes it."""
+
+    file: str
+    write: Callable[[Mapping[str, Any]], str]
+
+
+FORMATS = {
+    "junit": Format("junit.xml", junit),
+    "sarif": Format("roaas.sarif", sarif),
+    "ctrf": Format("ctrf-report.json", ctrf),
+    "gitlab": Format("gl-code-quality-report.json", gitlab),
+    "markdown": Format("certificate.md", certificate_markdown),
+    "annotations": Format("annotations.txt", annotations),
+    "badge": Format("badge.json", badge),
+}

@@ -1,0 +1,102 @@
+"""SARIF 2.1.0 (OASIS, errata 01): what code hosts show beside a repository's files.
+
+A result for each case that somebody has to look at; what passed or was skipped is left out, because some hosts show
+every result as a problem, whatever its kind. What could not be judged is of kind `open`, and the run
+is a result of level `error` then: a host that counts errors never shows green for an inconclusive run.
+
+Failures that the baseline accepts are warnings, not suppressed results: hosts hide those.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+from urllib.parse import quote
+
+from reports.certificate.page import certificate
+from reports.formats.cases import Case, Outcome, cases, worst_first
+from reports.formats.places import Place, page_of, places_of
+from reports.pages.untrusted import excerpt, visible
+
+SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+_MESSAGE = 1000
+_DETAIL = 6000
+_LEVELS = {Outcome.FAILED: "error", Outcome.ERROR: "none", Outcome.ACCEPTED: "warning", Outcome.WARNING: "warning"}
+
+
+def sarif(result: Mapping[str, Any]) -> str:
+    """Write a valid `roaas-result/1` document as a SARIF log of one run."""
+    found = worst_first(cases(result))
+    if any(case.outcome is Outcome.ERROR for case in found) and not any(case.name == "run" for case in found):
+        found.append(Case("run", "", Outcome.ERROR, certificate(result).headline))
+    rules = [_rule(result, case) for case in found]
+    run = {
+        "tool": {"driver": {"name": "RoAAS", "version": result["suite"]["version"], "rules": rules}},
+        "automationDetails": {"id": "roaas/"},
+        "invocations": [_invocation(result, found)],
+        "columnKind": "unicodeCodePoints",
+        "results": [_result(result, case, index) for index, case in enumerate(found)],
+        "properties": {"verdict": result["verdict"], "suiteDigest": result["suite"]["digest"], "seed": result["seed"]},
+    }
+    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=1) + "\n"
+
+
+def _invocation(result: Mapping[str, Any], found: Sequence[Case]) -> dict[str, Any]:
+    judged = result["verdict"] != "inconclusive" and not result.get("interrupted")
+    open_cases = [case for case in found if case.outcome is Outcome.ERROR]
+    return {
+        # Of the run, not of the robot: false where no verdict was reached.
+        "executionSuccessful": judged,
+        "startTimeUtc": result["started"],
+        **({"endTimeUtc": result["finished"]} if result["finished"] else {}),
+        "toolExecutionNotifications": [
+            {"level": "error" if not judged else "note", "message": {"text": _text(f"{case.name}: {case.message}")}}
+            for case in open_cases
+        ],
+    }
+
+
+def _rule(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
+    requirement = case.requirement
+    if requirement is None:
+        title = result.get("class_titles", {}).get(case.class_name)
+        said = f"Class {case.class_name}: {title}" if title else f"The verdict of {case.name}"
+        return {"id": case.rule, "shortDescription": {"text": _text(said)}}
+    page = page_of(requirement["source"])
+    source = f"Source: {requirement['source']}"
+    return {
+        "id": case.rule,
+        "shortDescription": {"text": _text(requirement["text"])},
+        "help": {"text": _text(f"{requirement['text']} {source}")},
+        **({"helpUri": page} if page else {}),
+        "defaultConfiguration": {"level": "error" if requirement["level"] == "MUST" else "warning"},
+        "properties": {"tags": [case.class_name, requirement["level"], requirement["verdict"]]},
+    }
+
+
+def _result(result: Mapping[str, Any], case: Case, index: int) -> dict[str, Any]:
+    first, *others = places_of(result, case)
+    undecided = case.outcome is Outcome.ERROR and case.requirement is not None
+    return {
+        "ruleId": case.rule,
+        "ruleIndex": index,
+        "kind": "open" if undecided else "fail",
+        "level": _LEVELS[case.outcome] if case.requirement else "error",
+        "message": {"text": _text(case.message or case.name)},
+        "locations": [{"physicalLocation": _location(first)}],
+        "relatedLocations": [
+            {"id": number, "physicalLocation": _location(place), "message": {"text": "What the contract asks for"}}
+            for number, place in enumerate(others)
+        ],
+        "partialFingerprints": {"roaas/v1": case.fingerprint},
+        "properties": {"outcome": case.outcome, "detail": visible(case.detail[:_DETAIL])},
+    }
+
+
+def _location(place: Place) -> dict[str, Any]:
+    return {"artifactLocation": {"uri": quote(place.file)}, "region": {"startLine": place.line}}
+
+
+def _text(text: str) -> str:
+    """One line that a viewer shows as it is: no placeholder (SARIF 3.11.5), no link (3.11.6) comes alive in it."""
+    line = excerpt(text, _MESSAGE)
+    return line.replace("{", "{{").replace("}", "}}").replace("\\", "\\\\").replace("[", "\\[").replace("]", "\\]")
