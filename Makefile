@@ -6,7 +6,7 @@ OUT := out
 # The newest Python that is there, from 3.11 up; or say which: make PYTHON=/path/to/python3.12 install
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' 2>/dev/null && command -v $$p && break; done)
-INTERFACES := $(addprefix reference_robot/interfaces/,mybot_delivery_app nav2_msgs)
+INTERFACES := $(addprefix reference_robot/interfaces/,mybot_delivery_app nav2_msgs tf2_msgs)
 INTERFACE_FILES := $(shell find reference_robot/interfaces -type f -not -path '*/build/*')
 
 .PHONY: help install demo test lint selftest coverage-page bench clean

@@ -19,6 +19,8 @@ _NEEDED: Final = {
     "mybot_delivery_app.msg": "the interface package: pip install reference_robot/interfaces/mybot_delivery_app",
     "nav2_msgs.action": "the interface package: pip install reference_robot/interfaces/nav2_msgs, "
     "or apt's ros-jazzy-nav2-msgs",
+    "tf2_msgs.msg": "the interface package: pip install reference_robot/interfaces/tf2_msgs, "
+    "or apt's ros-jazzy-tf2-msgs",
     "uvloop": "the event loop: pip install 'roaas[robot]'",
     "httptools": "the HTTP parser: pip install 'roaas[robot]'",
 }

@@ -10,6 +10,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from reference_robot.names import RosNames
+from reference_robot.simulation.frames import FramePublisher
 from reference_robot.simulation.kinematics import Accelerations, Motion, advance
 from reference_robot.simulation.messages import quaternion_of
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE
@@ -56,6 +57,7 @@ class Base:
         self._odometry.pose.covariance = _POSE_COVARIANCE
         self._odometry.twist.covariance = _TWIST_COVARIANCE
         self._publisher = node.create_publisher(Odometry, names.topics.odom, 10)
+        self._frames = FramePublisher(node, names)
         newest = QoSProfile(depth=1)
         if names.velocity.message == "TwistStamped":
             node.create_subscription(TwistStamped, names.topics.cmd_vel, self._take_stamped, newest)
@@ -105,3 +107,4 @@ class Base:
         odometry.twist.twist.linear.x = motion.linear
         odometry.twist.twist.angular.z = motion.angular
         self._publisher.publish(odometry)
+        self._frames.tell(odometry)

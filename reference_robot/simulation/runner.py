@@ -4,6 +4,7 @@ from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 from reference_robot.simulation.base import Base
 from reference_robot.simulation.delivery import Delivery
+from reference_robot.simulation.frames import MapServer
 from reference_robot.simulation.localisation import Localisation
 from reference_robot.simulation.navigation import Navigation
 from reference_robot.simulation.office import OFFICE
@@ -32,6 +33,7 @@ class Simulation:
         self.base = Base(base_node, names, time_scale, realism)
         self.sensors = Sensors(base_node, names, lambda: self.base.motion)
         navigation_node = ros.create_node("navigation")
+        self.map = MapServer(navigation_node, names)
         planner = Planner(OFFICE)
         localisation = Localisation(navigation_node, names)
         self.planning = Planning(navigation_node, names, planner, localisation)

@@ -16,6 +16,7 @@ from std_msgs.msg import String
 from reference_robot.goal_statuses import GoalStatuses
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
+from reference_robot.webservices.nodes.transforms import MapTransform
 
 _LATCHED_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _MISSION_REPORTS: Final = 200
@@ -33,6 +34,7 @@ class RobotSubscribersNode:
         odometry: The odometry received last, None before the first; and when it was received, by ``time.monotonic``.
         mission_reports: The JSON of what changed in the missions (see ``names.toml``), oldest first, to be taken off.
         goals: The goals of the robot's navigation, whoever sent them.
+        map_transform: Where the odometry frame lies in the map.
         current_goal: The JSON of the goal that the robot follows, empty when it follows none; None where the robot
             does not tell, as Nav2.
         last_rejection: The JSON of the goal refused last, and why; empty before the first.
@@ -46,6 +48,7 @@ class RobotSubscribersNode:
         self.current_goal: str | None = None
         self.last_rejection = ""
         self.goals = GoalStatuses(self.node, names.actions.navigate_to_pose)
+        self.map_transform = MapTransform(self.node, names)
         topics = names.topics
         self.node.create_subscription(Odometry, topics.odom, self._keep_odometry, qos_profile_sensor_data)
         self.node.create_subscription(

@@ -18,7 +18,7 @@ _PART: Final = {
         "by": {"type": "string", "enum": ["service", "action"]},
     },
 }
-_PARTS: Final = ("ros", "odometry", "velocity", "navigation", "planner", "delivery")
+_PARTS: Final = ("ros", "odometry", "velocity", "navigation", "planner", "localisation", "delivery")
 _SCHEMA: Final = {
     "type": "object",
     "required": ["healthy", *_PARTS],

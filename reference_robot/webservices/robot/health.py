@@ -55,5 +55,6 @@ class Health:
             "velocity": {"available": publishers.find_velocity_subscribers()},
             "navigation": {"available": publishers.navigation_is_served(), "state": navigator},
             "planner": {"available": bool(served), "state": planner} | ({"by": served[0]} if served else {}),
+            "localisation": {"available": subscribers.map_transform.latest is not None},
             "delivery": {"available": publishers.delivery_is_served()},
         }

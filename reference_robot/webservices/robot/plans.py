@@ -1,7 +1,9 @@
 """Plans: a GetPlan service where the robot has one, else the ComputePathToPose action of Nav2."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import partial
+from typing import Any, Final, TypeAlias
 
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Pose, PoseStamped
@@ -15,8 +17,11 @@ from reference_robot.webservices.nodes.lifecycle import ManagedNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
+from reference_robot.webservices.robot.frames import inverse, moved
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.target_poses import planar_pose, require_known_frame
+
+_Move: TypeAlias = Callable[[Pose], Pose]
 
 _LARGEST_TOLERANCE: Final = 3.4e38  # nav_msgs/GetPlan carries it as a float32
 
@@ -25,7 +30,7 @@ _LARGEST_TOLERANCE: Final = 3.4e38  # nav_msgs/GetPlan carries it as a float32
 class PlanQuery:
     """What a plan is asked for: metres and radians, goal and start in ``frame_id``.
 
-    A part of the start that is left out is the robot's own.
+    Without a start the planner takes where it knows the robot to be; a part of one that is left out is the robot's own.
     """
 
     x: float
@@ -61,30 +66,45 @@ class Planner:
 
         Raises:
             Problem: 422 for an unknown frame, a negative tolerance or a goal that no plan reaches; 503 while there is
-                no planner, or no odometry to start from.
+                no planner, or no odometry where a part of the start is the robot's own.
         """
         require_known_frame(query.frame_id, self._frames, "frame_id")
         if not 0 <= query.tolerance <= _LARGEST_TOLERANCE:
             raise Problem(422, f"tolerance must be a length of 0 m or more, not {query.tolerance}")
-        start = self._stamped(self._start(query), query.frame_id)
-        goal = self._stamped(planar_pose(query.x, query.y, query.yaw), query.frame_id)
+        frame, into, back = self._planning_frame(query.frame_id)
+        start = self._start(query)
+        stamped_start = None if start is None else self._stamped(into(start), frame)
+        goal = self._stamped(into(planar_pose(query.x, query.y, query.yaw)), frame)
         if self._subscribers.plan_service_is_served():
-            request = GetPlan.Request(start=start, goal=goal, tolerance=query.tolerance)
+            # A start in no frame is none (move_base's make_plan).
+            request = GetPlan.Request(start=stamped_start or PoseStamped(), goal=goal, tolerance=query.tolerance)
             reply = await self._calls.result(lambda: self._subscribers.ask_plan_service(request), "the plan service")
             path = reply.plan
         elif self._subscribers.plan_action_is_served():
-            path = await self._by_action(start, goal)
+            path = await self._by_action(stamped_start, goal)
         else:
             raise not_yet("the robot has no planner")
         if not path.poses:
             raise Problem(422, f"no plan leads to x = {query.x}, y = {query.y} in frame {query.frame_id}")
+        if path.header.frame_id == frame != query.frame_id:
+            _move(path, back, query.frame_id)
         plain = self._read(path)
         if plain["header"]["frame_id"] != query.frame_id:
             raise Problem(422, f"the robot plans in frame {plain['header']['frame_id']}, not {query.frame_id}")
         return {"plan": plain}
 
-    async def _by_action(self, start: PoseStamped, goal: PoseStamped) -> Path:
-        request = ComputePathToPose.Goal(start=start, goal=goal, use_start=True)
+    def _planning_frame(self, asked: str) -> tuple[str, _Move, _Move]:
+        """Return the frame to plan in, and how a pose gets there and back.
+
+        Planners plan in the map, and answer in it too; so does ours where it is known how the asked frame lies there.
+        """
+        transform = self._subscribers.map_transform.latest
+        if transform is None or asked == self._frames.map:
+            return asked, _as_it_is, _as_it_is
+        return self._frames.map, partial(moved, transform), partial(moved, inverse(transform))
+
+    async def _by_action(self, start: PoseStamped | None, goal: PoseStamped) -> Path:
+        request = ComputePathToPose.Goal(start=start or PoseStamped(), goal=goal, use_start=start is not None)
         handle = await self._calls.result(lambda: self._subscribers.ask_plan_action(request), "the planner")
         if not handle.accepted:
             await self._planner.require_active()
@@ -92,10 +112,13 @@ class Planner:
         reply = await self._calls.result(handle.get_result_async, "the planner")
         return reply.result.path if reply.status == GoalStatus.STATUS_SUCCEEDED else Path()
 
-    def _start(self, query: PlanQuery) -> Pose:
+    def _start(self, query: PlanQuery) -> Pose | None:
+        """Return the start in the asked frame."""
         if query.start_x is not None and query.start_y is not None:
             return planar_pose(query.start_x, query.start_y, query.start_yaw or 0.0)
-        own = self._odometry.message().pose.pose
+        if query.start_x is None and query.start_y is None and query.start_yaw is None:
+            return None
+        own = self._own_pose(query.frame_id)
         x = own.position.x if query.start_x is None else query.start_x
         y = own.position.y if query.start_y is None else query.start_y
         pose = planar_pose(x, y, query.start_yaw or 0.0)
@@ -103,8 +126,25 @@ class Planner:
             pose.orientation = own.orientation
         return pose
 
+    def _own_pose(self, frame_id: str) -> Pose:
+        """Return where the robot is: in the odometry frame, which is the map where nobody tells how it lies there."""
+        pose = self._odometry.message().pose.pose
+        transform = self._subscribers.map_transform.latest
+        return pose if transform is None or frame_id != self._frames.map else moved(transform, pose)
+
     def _stamped(self, pose: Pose, frame_id: str) -> PoseStamped:
         stamped = PoseStamped(pose=pose)
         stamped.header.frame_id = frame_id
         stamped.header.stamp = self._subscribers.node.get_clock().now().to_msg()
         return stamped
+
+
+def _as_it_is(pose: Pose) -> Pose:
+    return pose
+
+
+def _move(path: Path, into: _Move, frame_id: str) -> None:
+    path.header.frame_id = frame_id
+    for stamped in path.poses:
+        stamped.header.frame_id = frame_id
+        stamped.pose = into(stamped.pose)

@@ -11,6 +11,7 @@ import pytest
 from lxml import etree
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import ComputePathToPose, NavigateToPose
+from tf2_msgs.msg import TFMessage
 
 import reference_robot
 from conformance.contract.delivery import COFFEE, COORDINATES, COURIER, MESSAGE_FIELDS
@@ -110,15 +111,16 @@ TIMES = "builtin_interfaces/Duration navigation_time, builtin_interfaces/Duratio
             ComputePathToPose.Result,
             "nav_msgs/Path path, builtin_interfaces/Duration planning_time, uint16 error_code, string error_msg",
         ),
+        (TFMessage, "sequence<geometry_msgs/TransformStamped> transforms"),
     ],
 )
-def test_the_actions_are_nav2s(message, definition):
+def test_the_actions_are_nav2s_and_transforms_tf2s(message, definition):
     fields = message.get_fields_and_field_types()
     assert {f"{kind} {name}" for name, kind in fields.items()} == set(definition.split(", "))
     assert NavigateToPose.Result.NONE == ComputePathToPose.Result.NONE == 0
 
 
-@pytest.mark.parametrize("name", ["mybot_delivery_app", "nav2_msgs"])
+@pytest.mark.parametrize("name", ["mybot_delivery_app", "nav2_msgs", "tf2_msgs"])
 def test_a_package_is_what_colcon_expects(name):
     folder = INTERFACES / name
     manifest = etree.parse(folder / "package.xml")

@@ -3,11 +3,13 @@
 Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent] [planner]``. It prints one JSON object a line:
 ``ready``, then ``delivery``, ``velocity``, ``goal`` and ``cancel`` as they come. Each line on its stdin is a command:
 ``{"odometry": {"x": …, "covariance": …, "stopped_clock": …}}`` publishes that odometry over and over,
-``{"finish": true}`` ends the goal, ``{"current_goal": …}`` tells of one that another client sent,
-``{"tell_next_goal_as": …}`` tells of the next one that comes, and of no later one.
+``{"transform": [x, y, yaw]}`` tells how its odometry lies in the map, ``{"finish": true}`` ends the goal,
+``{"current_goal": …}`` tells of one that another client sent, ``{"tell_next_goal_as": …}`` tells of the next one that
+comes, and of no later one. With ``planner`` it tells ``plan`` of each one that it is asked for.
 """
 
 import json
+import math
 import struct
 import sys
 import threading
@@ -16,7 +18,7 @@ from typing import Any
 
 import rclpy
 from action_msgs.msg import GoalStatus
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped, Twist, TwistStamped
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import ComputePathToPose, NavigateToPose
 from nav_msgs.msg import Odometry
@@ -27,6 +29,7 @@ from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
 
 _UNREACHABLE_X = 1000.0
 
@@ -40,11 +43,21 @@ def bits(value: float) -> str:
     return struct.pack(">d", value).hex()
 
 
+def transform(parent: str, child: str, x: float, y: float, yaw: float) -> TransformStamped:
+    told = TransformStamped(child_frame_id=child)
+    told.header.frame_id = parent
+    told.transform.translation.x, told.transform.translation.y = x, y
+    told.transform.rotation.z, told.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+    return told
+
+
 class ForeignRobot(Node):
     def __init__(self, context: Context, velocity: type, *, silent: bool) -> None:
         super().__init__("foreign_robot", context=context)
         self.odometry = None if silent else Odometry()
         self.stopped_clock = False
+        self._tf = self.create_publisher(TFMessage, "/tf", 100)
+        self.transforms = TFMessage(transforms=[transform("odom", "base_link", 1.0, 2.0, 3.0)])
         self.tells_goal_as: dict[str, Any] | None = None
         self.finished = threading.Event()
         self._latest_goal: Any = None
@@ -73,6 +86,7 @@ class ForeignRobot(Node):
             if not self.stopped_clock:
                 odometry.header.stamp = self.get_clock().now().to_msg()
             self._publisher.publish(odometry)
+        self._tf.publish(self.transforms)
 
     def _delivery(self, message: DeliveryRequestMsg) -> None:
         fields = message.get_fields_and_field_types()
@@ -121,8 +135,10 @@ class ForeignRobot(Node):
         if goal.goal.pose.position.x == _UNREACHABLE_X:
             handle.abort()
             return result
-        result.path.header.frame_id = "map"
-        result.path.poses = [goal.start, goal.goal]
+        tell(plan={"use_start": goal.use_start, "frame_id": goal.goal.header.frame_id})
+        start = goal.start if goal.use_start else PoseStamped()
+        start.header.frame_id = result.path.header.frame_id = "map"
+        result.path.poses = [start, goal.goal]
         handle.succeed()
         return result
 
@@ -135,6 +151,11 @@ class ForeignRobot(Node):
             odometry.twist.twist.linear.x = command["odometry"]["x"] / 10
             self.stopped_clock = command["odometry"].get("stopped_clock", False)
             self.odometry = odometry
+        if "transform" in command:
+            self.transforms.transforms = [
+                transform("map", "elsewhere", 9.0, 9.0, 0.0),
+                transform("map", "odom", *command["transform"]),
+            ]
         if "current_goal" in command:
             self._current_goal.publish(String(data=json.dumps(command["current_goal"])))
         if "tell_next_goal_as" in command:

@@ -1,0 +1,69 @@
+"""What the robot tells of its frames and its map (REP 105): map → odom → base, and the office as an occupancy grid."""
+
+import array
+import math
+import time
+from typing import Final
+
+import numpy as np
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import OccupancyGrid, Odometry
+from rclpy.node import Node
+from tf2_msgs.msg import TFMessage
+
+from reference_robot.names import RosNames
+from reference_robot.simulation.messages import LATCHED
+from reference_robot.simulation.office import OFFICE
+
+_RESOLUTION_M: Final = 0.05
+_OCCUPIED: Final = 100  # nav_msgs/OccupancyGrid: a probability in percent
+_PERIOD_S: Final = 0.05  # between transforms, which tf2 interpolates: at 50 Hz they would cost as much as the odometry
+_TRANSFORMS: Final = 100  # depth, as tf2's broadcaster has it
+
+
+class FramePublisher:
+    """Publishes the transform of the base at 20 Hz, and once, latched, that map and odometry coincide."""
+
+    def __init__(self, node: Node, names: RosNames) -> None:
+        self._base = TransformStamped()
+        self._message = TFMessage(transforms=[self._base])
+        self._told_at = -math.inf
+        self._moving = node.create_publisher(TFMessage, names.topics.tf, _TRANSFORMS)
+        self._static = node.create_publisher(TFMessage, names.topics.tf_static, LATCHED)
+        identity = TransformStamped(child_frame_id=names.frames.odom)  # a quaternion's default turns nothing
+        identity.header.stamp = node.get_clock().now().to_msg()
+        identity.header.frame_id = names.frames.map
+        self._static.publish(TFMessage(transforms=[identity]))
+
+    def tell(self, odometry: Odometry) -> None:
+        """Publish the odometry's pose as a transform, unless the last one is that young."""
+        now = time.monotonic()
+        if now - self._told_at < _PERIOD_S:
+            return
+        self._told_at = now
+        base, pose = self._base, odometry.pose.pose
+        base.header, base.child_frame_id = odometry.header, odometry.child_frame_id
+        base.transform.translation.x, base.transform.translation.y = pose.position.x, pose.position.y
+        base.transform.rotation = pose.orientation
+        self._moving.publish(self._message)
+
+
+class MapServer:
+    """Publishes the office's map once, latched, as Nav2's map_server does."""
+
+    def __init__(self, node: Node, names: RosNames) -> None:
+        west, south, east, north = OFFICE.bounds
+        columns, rows = (round(length / _RESOLUTION_M) for length in (east - west, north - south))
+        cells = np.zeros((rows, columns), dtype=np.int8)
+        for box in np.round((OFFICE.boxes - (west, south, west, south)) / _RESOLUTION_M).astype(int):
+            left, bottom, right, top = box
+            cells[bottom:top, left:right] = _OCCUPIED
+        grid = OccupancyGrid()
+        grid.header.stamp = grid.info.map_load_time = node.get_clock().now().to_msg()
+        grid.header.frame_id = names.frames.map
+        grid.info.resolution = _RESOLUTION_M
+        grid.info.width, grid.info.height = columns, rows
+        grid.info.origin.position.x, grid.info.origin.position.y = west, south
+        grid.data = array.array("b", cells.tobytes())
+        self._publisher = node.create_publisher(OccupancyGrid, names.topics.map, LATCHED)
+        self._publisher.publish(grid)

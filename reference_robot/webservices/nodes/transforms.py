@@ -1,0 +1,38 @@
+"""Where the odometry frame lies in the map, as the robot's localisation tells it (REP 105)."""
+
+from typing import Any, Final
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from tf2_msgs.msg import TFMessage
+
+from reference_robot.names import RosNames
+
+_MOVING: Final = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+_STATIC: Final = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class MapTransform:
+    """Keeps the transform from the map to the odometry frame, in the executor's thread.
+
+    No tf2 listener: one transform is asked for, of the tens that a robot tells a hundred times a second. So messages
+    come as octets, and one is read only if the map's name stands in it, which costs a hundredth.
+
+    Attributes:
+        latest: The geometry_msgs/Transform told last; None where nobody tells it.
+    """
+
+    def __init__(self, node: Node, names: RosNames) -> None:
+        self.latest: Any = None
+        self._parent = names.frames.map
+        self._child = names.frames.odom
+        self._mark = self._parent.encode() + b"\0"  # as strings end in CDR
+        node.create_subscription(TFMessage, names.topics.tf, self._take, _MOVING, raw=True)
+        node.create_subscription(TFMessage, names.topics.tf_static, self._take, _STATIC, raw=True)
+
+    def _take(self, octets: bytes) -> None:
+        if self._mark in octets:
+            for stamped in deserialize_message(octets, TFMessage).transforms:
+                if (stamped.header.frame_id, stamped.child_frame_id) == (self._parent, self._child):
+                    self.latest = stamped.transform
