@@ -25,6 +25,7 @@ _COMMANDS = {
     "keygen": ("reports.cli.attestation", "keygen"),
     "sign": ("reports.cli.signing", "sign"),
     "verify": ("reports.cli.attestation", "verify"),
+    "registry": ("reports.cli.registry", "registry"),
     "selftest": ("conformance.cli.selftest", "selftest"),
     "contract": ("conformance.cli.contract", "contract"),
 }
@@ -40,6 +41,7 @@ _SUMMARIES = {
     "keygen": "Make a key pair for signing results.",
     "sign": "Sign a result, so that others can check whose it is.",
     "verify": "Say what a signed certificate proves, and whether it is enough.",
+    "registry": "Make a static site of signed certificates: who passed what.",
     "selftest": "Show that the suite catches faulty robots and blames no good one.",
     "contract": "Show the requirements, export the contract's files.",
 }

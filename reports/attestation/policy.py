@@ -64,7 +64,7 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ros: bool = False
     baseline: bool = False
     interrupted: bool = False
-    max_age_days: Annotated[float, msgspec.Meta(gt=0)] = 365
+    max_age_days: Annotated[float, msgspec.Meta(gt=0, le=100_000)] = 365
     nonce: str | None = None
 
 

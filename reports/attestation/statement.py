@@ -8,7 +8,7 @@ extension field `roaas` (a consumer ignores what it does not know: in-toto attes
 
 import hashlib
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import msgspec
@@ -62,13 +62,15 @@ class RequirementSet(msgspec.Struct, frozen=True):
     digest: str
 
 
-class Run(msgspec.Struct, frozen=True, kw_only=True):
+class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """What a relying party asks of a run; nothing of addresses and tokens.
 
     Attributes:
         verdict: of the whole.
         classes: the verdict of each class.
         requirements: how many have each verdict.
+        outcomes: which, by level and verdict, so that two certificates can be compared; empty in those that were signed
+            before this was.
         accepted: ids of the requirements whose failure the baseline accepts.
         accepted_until: until when, where a baseline is why the run ended well.
         baseline: digest of the file of accepted failures, or None.
@@ -97,6 +99,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     views: dict[str, str]
     started: str
     finished: str
+    outcomes: dict[str, dict[str, list[str]]] = {}
 
 
 class Verifier(msgspec.Struct, frozen=True):
@@ -198,4 +201,12 @@ def _run(result: Mapping[str, Any]) -> Run:
         views=dict(result.get("class_views", {})),
         started=result["started"],
         finished=result["finished"] or result["started"],
+        outcomes=_outcomes(requirements),
     )
+
+
+def _outcomes(requirements: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, list[str]]]:
+    found: dict[str, dict[str, list[str]]] = {}
+    for item in requirements:
+        found.setdefault(item["level"], {}).setdefault(item["verdict"], []).append(item["id"])
+    return found

@@ -2,6 +2,10 @@
 
 import copy
 import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -59,3 +63,36 @@ def hostile(result: dict[str, Any]) -> dict[str, Any]:
             )
             failure["response"].update(status=200, headers={HOSTILE: [HOSTILE] * 2}, body=HOSTILE)
     return result
+
+
+# Pages of one folder may look into each other's files: that is how a wrapper page measures.
+_BROWSER_OPTIONS = (
+    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync --allow-file-access-from-files --window-size=1400,1000 "
+    "--virtual-time-budget=20000 --dump-dom"
+)
+
+
+@pytest.fixture(scope="session")
+def browse() -> Callable[[Path, str], dict[str, Any]]:
+    """Return what shows a wrapper page in a folder, and takes the JSON that its script leaves in `#out`."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.fail("this test needs a browser: install Debian's package `chromium` (apt-get install chromium)")
+
+    def show(folder: Path, page: str) -> dict[str, Any]:
+        wrapper = folder / "wrapper.html"
+        wrapper.write_text(page, encoding="utf-8")
+        profile = f"--user-data-dir={folder / 'profile'}"
+        done = subprocess.run(
+            [browser, *_BROWSER_OPTIONS.split(), profile, wrapper.as_uri()],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=True,
+        )
+        out = re.search(r'<pre id="out">(\{.*?\})</pre>', done.stdout, re.DOTALL)
+        assert out, f"the pages did not load: {done.stderr[-2000:]}"
+        return json.loads(out.group(1).replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">"))
+
+    return show

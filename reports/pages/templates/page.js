@@ -34,6 +34,14 @@ if (filter) {
   });
   filter.append(box);
 }
+// A page that is read long after it was written: what has expired since is not green any more.
+for (const item of document.querySelectorAll("[data-until]")) {
+  if (new Date(item.dataset.until) > new Date()) continue;
+  for (const green of [item, ...item.querySelectorAll(".good")].filter((one) => one.classList.contains("good"))) green.classList.replace("good", "quiet");
+  for (const sign of item.querySelectorAll(".sign")) if (sign.textContent === "✓") { sign.textContent = "○"; sign.setAttribute("aria-label", "expired"); }
+  for (const word of item.querySelectorAll(".until")) word.textContent = "expired";
+  item.dataset.may = "";
+}
 let folded = [];
 addEventListener("beforeprint", () => {
   folded = Array.from(document.querySelectorAll("details:not([open])"));

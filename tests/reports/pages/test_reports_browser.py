@@ -4,9 +4,6 @@ Debian's Chromium shows the pages, as they are, in frames of a wrapper page, who
 """
 
 import json
-import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -19,12 +16,6 @@ from reports.latency.page import latency_html
 DATA = Path(__file__).parents[1] / "data"
 WIDTHS = (1280, 390)
 PAGES = ("certificate", "latency", "compare")
-# Pages of one folder may look into each other's files: that is how the wrapper measures.
-OPTIONS = (
-    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync --allow-file-access-from-files --window-size=1400,1000 "
-    "--virtual-time-budget=20000 --dump-dom"
-)
 MEASURE = """<!doctype html><meta charset="utf-8"><title>wrapper</title><body><pre id="out"></pre><script>
 "use strict";
 const found = {};
@@ -60,11 +51,8 @@ for (const frame of FRAMES) {
 
 
 @pytest.fixture(scope="module")
-def seen(tmp_path_factory):
+def seen(tmp_path_factory, browse):
     """Show every page at every width, once, and return what was measured."""
-    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if browser is None:
-        pytest.fail("this test needs a browser: install Debian's package `chromium` (apt-get install chromium)")
     folder = tmp_path_factory.mktemp("pages")
     result = json.loads((DATA / "result-example.json").read_text(encoding="utf-8"))
     latency = json.loads((DATA / "latency-example.json").read_text(encoding="utf-8"))
@@ -75,18 +63,7 @@ def seen(tmp_path_factory):
     frames = [
         {"name": name, "width": width, "url": (folder / f"{name}.html").as_uri()} for name in PAGES for width in WIDTHS
     ]
-    wrapper = folder / "wrapper.html"
-    wrapper.write_text(MEASURE.replace("FRAMES", json.dumps(frames)), encoding="utf-8")
-    done = subprocess.run(
-        [browser, *OPTIONS.split(), f"--user-data-dir={folder / 'profile'}", wrapper.as_uri()],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
-    out = re.search(r'<pre id="out">(\{.*?\})</pre>', done.stdout, re.DOTALL)
-    assert out, f"the pages did not load: {done.stderr[-2000:]}"
-    return json.loads(out.group(1).replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">"))
+    return browse(folder, MEASURE.replace("FRAMES", json.dumps(frames)))
 
 
 EACH = pytest.mark.parametrize("page", [f"{name} {width}" for name in PAGES for width in WIDTHS])

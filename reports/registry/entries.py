@@ -1,0 +1,132 @@
+"""What a registry is made of: envelopes that one of its keys signed, and those that are refused.
+
+Of an envelope that does not verify nothing is believed, so nothing of it is shown either: the site says why in words of
+its own, and names the file by its digest. What is wrong in detail is for whoever builds the site.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+from securesystemslib.signer import SSlibKey
+
+from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope
+from reports.attestation.keys import public_key
+from reports.attestation.signature import unseal
+from reports.attestation.statement import Run, Statement, sha256
+from reports.errors import EnvelopeRefusedError, KeyUnusableError, ResultMissingError
+
+_PRIVATE = b"PRIVATE KEY-----"
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """An envelope that verifies.
+
+    Attributes:
+        octets: the envelope's file.
+        statement: what was signed.
+        key: fingerprint of the key that signed it, which is one of the registry's.
+        publishable: whether the signed octets hold what is known here and nothing beside it; what is not known might
+            be an address.
+    """
+
+    octets: bytes
+    statement: Statement
+    key: str
+    publishable: bool
+
+    @property
+    def run(self) -> Run:
+        """What it says of the run."""
+        return self.statement.predicate.roaas
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the envelope's file, in hexadecimal."""
+        return sha256(self.octets)
+
+
+@dataclass(frozen=True)
+class Refused:
+    """An envelope that proves nothing.
+
+    Attributes:
+        digest: SHA-256 of its file, in hexadecimal.
+        reason: for the site: nothing of the envelope is in it.
+        detail: for whoever builds the site: the file, and what is wrong with it.
+    """
+
+    digest: str
+    reason: str
+    detail: str
+
+
+def find_envelopes(places: Iterable[Path]) -> list[Path]:
+    """Files as they are named; of folders, each certificate.intoto.json that is somewhere in them.
+
+    Raises:
+        ResultMissingError: there is no such file or folder, or no certificate in a folder.
+    """
+    found: dict[Path, None] = {}
+    for place in places:
+        inside = sorted(place.rglob(ENVELOPE_NAME)) if place.is_dir() else [place]
+        if not inside:
+            raise ResultMissingError(f"{place}: there is no {ENVELOPE_NAME} in it")
+        found |= dict.fromkeys(inside)
+    return list(found)
+
+
+def read_keys(directory: Path) -> tuple[dict[str, SSlibKey], list[Path]]:
+    """The public keys in a folder (*.pem), by fingerprint, and the private keys, which are left alone.
+
+    Raises:
+        KeyUnusableError: there is none, or a file is no Ed25519 key.
+    """
+    keys: dict[str, SSlibKey] = {}
+    private: list[Path] = []
+    for path in sorted(directory.glob("*.pem")):
+        try:
+            if _PRIVATE in path.read_bytes():
+                private.append(path)
+                continue
+        except OSError as error:
+            raise KeyUnusableError(f"{path}: {error.strerror or error}") from error
+        key = public_key(path)
+        keys[key.keyid] = key
+    if not keys:
+        raise KeyUnusableError(f"{directory}: no public key (*.pem) is in it; whom to trust is for you to say")
+    return keys, private
+
+
+def read_entries(paths: Iterable[Path], keys: Mapping[str, SSlibKey]) -> list[Certificate | Refused]:
+    """Read and verify envelopes; a file that is there twice counts once.
+
+    Raises:
+        ResultMissingError: there is no such file.
+        ResultUnreadableError: it cannot be read.
+    """
+    files: dict[bytes, Path] = {}
+    for path in paths:
+        files.setdefault(read_envelope(path), path)
+    entries = {path: entry_of(octets, keys) for octets, path in files.items()}
+    return [
+        replace(one, detail=f"{path}: {one.detail}") if isinstance(one, Refused) else one
+        for path, one in entries.items()
+    ]
+
+
+def entry_of(octets: bytes, keys: Mapping[str, SSlibKey]) -> Certificate | Refused:
+    """Verify one envelope."""
+    reason = "it is no envelope with one signature"
+    try:
+        opened = open_envelope(octets)
+        reason = "it is signed by a key that is none of this registry's"
+        if opened.keyid not in keys:
+            raise EnvelopeRefusedError(f"foreign key: {opened.keyid[:64]!r}")  # noqa: TRY301 - refused as all others are
+        reason = "its signature is not by the key that it names, over a certificate of a run"
+        statement = unseal(octets, keys[opened.keyid])
+    except EnvelopeRefusedError as error:
+        return Refused(sha256(octets), reason, str(error))
+    return Certificate(octets, statement, opened.keyid, msgspec.json.encode(statement) == opened.payload)

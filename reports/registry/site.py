@@ -1,0 +1,135 @@
+"""The site's files: an index of robots and classes, a page for each robot, and the envelopes themselves."""
+
+import datetime as dt
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from reports.attestation.statement import RESULT_SUBJECT, Run
+from reports.certificate.difference import MEANINGS, Kind
+from reports.certificate.difference_page import SHOWN, headline
+from reports.errors import ResultUnreadableError
+from reports.pages.matrix import Mark, Matrix, Row, marks
+from reports.pages.page import html_page, write_pages
+from reports.registry.change import firmware_changes
+from reports.registry.entries import Refused
+from reports.registry.standing import History, Standing
+
+INDEX = "index.html"
+ROBOTS, ENVELOPES = "robots", "envelopes"
+# Names that a site has of an earlier build: what is not in this one would still be green.
+_OURS = {ROBOTS: re.compile(r"[a-z0-9-]+-[0-9a-f]{12}\.html"), ENVELOPES: re.compile(r"[0-9a-f]{64}\.intoto\.json")}
+_TONES = {"conformant": "good", "not-conformant": "bad"}
+# Nothing of a comparison is green: what was fixed may have been so in a certificate that does not count.
+_CHANGE_TONES = {Kind.NEW_FAILURE: "bad", Kind.LOST: "warning"}
+
+
+def write_site(site: Path, found: Sequence[History], refused: Sequence[Refused], now: dt.datetime) -> list[Path]:
+    """Write the site, and take away what an earlier build left of robots and envelopes that are gone.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ResultUnreadableError: the folder cannot be written to.
+    """
+    files = {
+        ROBOTS: {history.page: _robot_html(history, now) for history in found},
+        ENVELOPES: {
+            _envelope(standing): standing.certificate.octets.decode()
+            for history in found
+            for standing in history.standings
+            if standing.certificate.publishable
+        },
+    }
+    try:
+        for folder, names in files.items():
+            for path in (site / folder).glob("*"):
+                if path.name not in names and _OURS[folder].fullmatch(path.name):
+                    path.unlink()
+    except OSError as error:
+        raise ResultUnreadableError(f"{site}: cannot write there: {error.strerror or error}") from error
+    written = [path for folder, pages in files.items() if pages for path in write_pages(site / folder, pages)]
+    return [*write_pages(site, {INDEX: _index_html(found, refused, now)}), *written]
+
+
+def _index_html(found: Sequence[History], refused: Sequence[Refused], now: dt.datetime) -> str:
+    counting = sum(history.current.stands for history in found)
+    return html_page(
+        "registry.html.j2",
+        matrix=Matrix(tuple(map(_row, found))),
+        refused=refused,
+        counting=counting,
+        robots=len(found),
+        key=tuple(Mark),
+        now=_minute(now),
+    )
+
+
+def _robot_html(history: History, now: dt.datetime) -> str:
+    return html_page(
+        "registry-robot.html.j2",
+        history=history,
+        runs=[(standing, *_word(standing), _envelope(standing)) for standing in history.standings],
+        marks=_marks(history.current),
+        changes=[
+            (change, headline(change.found) if change.found else "") for change in firmware_changes(history.firmwares)
+        ],
+        meanings=MEANINGS,
+        tones=_CHANGE_TONES,
+        shown=SHOWN,
+        until=_until(history.current),
+        result_name=RESULT_SUBJECT,
+        now=_minute(now),
+    )
+
+
+def _row(history: History) -> Row:
+    standing = history.current
+    run = standing.certificate.run
+    tone, word = _word(standing)
+    firmware = f"firmware {run.robot.version}" if run.robot.version else ""
+    notes = (
+        ", ".join(filter(None, [history.vendor, firmware])),
+        f"{run.finished[:10]}, {_judged_by(run)}",
+        f"key {standing.certificate.key[:16]}…",
+    )
+    return Row(
+        name=history.name,
+        marks=_marks(standing),
+        tone=tone,
+        word=word,
+        notes=tuple(filter(None, notes)),
+        href=f"{ROBOTS}/{history.page}",
+        until=_until(standing),
+    )
+
+
+def _marks(standing: Standing) -> dict[str, Mark]:
+    classes = standing.certificate.run.classes
+    return marks(classes, standing.trusted, stands=standing.stands)
+
+
+def _word(standing: Standing) -> tuple[str, str]:
+    """Tone and words of a certificate: its verdict where it counts, else what is against it."""
+    if not standing.stands:
+        return "quiet", standing.against[0]
+    verdict = standing.certificate.run.verdict
+    return _TONES.get(verdict, "warning"), verdict.replace("-", " ")
+
+
+def _judged_by(run: Run) -> str:
+    by = f"set {run.requirement_set.name}" if run.requirement_set else "a contract of its own"
+    return f"RoAAS {run.suite.version}, {by}, {run.effort} effort"
+
+
+def _envelope(standing: Standing) -> str:
+    return f"{standing.certificate.digest}.intoto.json"
+
+
+def _until(standing: Standing) -> str:
+    return standing.until.strftime("%Y-%m-%dT%H:%M:%SZ") if standing.stands and standing.until else ""
+
+
+def _minute(moment: dt.datetime) -> str:
+    return moment.strftime("%Y-%m-%d, %H:%M UTC")

@@ -1,0 +1,85 @@
+"""The pages of who may do what in a browser, from files alone: wide and narrow, filtered, and read years later."""
+
+import json
+import re
+
+from reports.certificate.difference import difference
+from reports.certificate.difference_page import difference_html
+from reports.fleet.page import fleet_html
+
+WIDTHS = (1280, 390)
+MEASURE = """<!doctype html><meta charset="utf-8"><title>wrapper</title><body><pre id="out"></pre><script>
+"use strict";
+const found = {};
+for (const frame of FRAMES) {
+  const element = document.createElement("iframe");
+  element.style = `border: 0; height: 900px; width: ${frame.width}px`;
+  element.src = frame.url;
+  element.addEventListener("load", () => {
+    const page = element.contentDocument;
+    const all = (what) => Array.from(page.querySelectorAll(what));
+    const shown = () => all("tr[data-found]").filter((row) => row.getClientRects().length).length;
+    const seen = {
+      width: page.documentElement.scrollWidth,
+      right: Math.max(0, ...all("td.mark").map((cell) => cell.getBoundingClientRect().right)),
+      rows: shown(),
+      green: all(".good").filter((one) => !one.closest(".small.tally")).length,
+      loaded: element.contentWindow.performance.getEntriesByType("resource").length,
+    };
+    const radio = page.getElementById("may-0");
+    if (radio) { radio.click(); seen.filtered = shown(); }
+    const box = page.querySelector("input[type=search]");
+    if (box) {
+      page.getElementById("may-all").click();
+      box.value = "courier 7";
+      box.dispatchEvent(new Event("input"));
+      seen.searched = shown();
+    }
+    found[`${frame.name} ${frame.width}`] = seen;
+    if (Object.keys(found).length === FRAMES.length) document.getElementById("out").textContent = JSON.stringify(found);
+  });
+  document.body.append(element);
+}
+</script>"""
+
+
+def test_the_pages_fit_a_desk_and_a_phone_and_can_be_filtered(host, fleet, browse, make_requirement):
+    classes = dict.fromkeys(fleet["class_titles"], "pass")
+    broken = [make_requirement(f"http/a-rather-long-name-{number}") for number in range(3)]
+    host.sign("old", days_ago=3, classes=classes, requirements=broken, statement__robot__version="2.3")
+    changed = [{**item, "verdict": "warn"} for item in broken]
+    host.sign("new", classes=classes, requirements=changed)
+    host.sign("other", statement__robot__name="Kiosk", classes={**classes, "rest-resources": "not-claimed"})
+    host.sign("foreign", vendor="stranger")
+    assert host.build().exit_code == 1
+    index = (host.site / "index.html").read_text()
+    (robot,) = (host.site / "robots").glob("courier-7-*.html")
+    both = difference({**host.result, "seed": 1}, host.result)
+    pages = {
+        "index": index,
+        "robot": robot.read_text(),
+        "fleet": fleet_html(fleet),
+        "diff": difference_html(both, ("old", "new")),
+        "index later": re.sub(r'data-until="[^"]+"', 'data-until="2026-01-01T00:00:00Z"', index),
+        "robot later": re.sub(r'data-until="[^"]+"', 'data-until="2026-01-01T00:00:00Z"', robot.read_text()),
+    }
+    for name, text in pages.items():
+        (host.site / f"{name}.html").write_text(text)
+    frames = [
+        {"name": name, "width": width, "url": (host.site / f"{name}.html").as_uri()}
+        for name in pages
+        for width in WIDTHS
+    ]
+    seen = browse(host.site, MEASURE.replace("FRAMES", json.dumps(frames)))
+    for page, found in seen.items():
+        assert found["width"] <= int(page.split()[-1]), f"{page} hangs over the edge"
+        assert found["right"] <= int(page.split()[-1]), f"{page}: classes are out of sight"
+        assert found["loaded"] == 0, page
+    for width in WIDTHS:
+        at = {name: seen[f"{name} {width}"] for name in pages}
+        assert (at["index"]["rows"], at["index"]["filtered"], at["index"]["searched"]) == (2, 1, 1)
+        assert (at["fleet"]["rows"], at["fleet"]["filtered"]) == (4, 1)
+        assert at["index"]["green"] > 0
+        assert at["robot"]["green"] > 0
+        assert at["index later"]["green"] == at["robot later"]["green"] == 0, "what expired since is not green any more"
+        assert at["index later"]["filtered"] == 0
