@@ -18,8 +18,10 @@ from robot import DELIVERY, ENVELOPE
 
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
+from reference_robot.webservices.http.admission import Admission
 from reference_robot.webservices.http.authorization import Authorization
 from reference_robot.webservices.http.connection import HttpConnection
+from reference_robot.webservices.http.hosts import AllowedHosts
 from reference_robot.webservices.http.messages import Request
 from reference_robot.webservices.http.port import Limits, Port
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
@@ -60,6 +62,12 @@ class Wire:
     def write(self, _octets: bytes) -> None:
         """Drop what is written."""
 
+    def get_extra_info(self, _name: str) -> None:
+        """Know nothing of a peer."""
+
+    def set_write_buffer_limits(self, _high: int) -> None:
+        """Buffer nothing."""
+
 
 class Callbacks:
     """What a parser costs that tells nobody."""
@@ -68,7 +76,7 @@ class Callbacks:
 def interfaces(publishers: Any) -> tuple[RestInterface, SoapInterface]:
     """Return both interfaces with nothing but deliveries behind them."""
     deliveries = Deliveries(publishers, Nobody())
-    everybody = Authorization(None)
+    everybody = Admission(Authorization(None), AllowedHosts(["robot"]))
     return (
         RestInterface([], Delivery(deliveries), everybody),
         SoapInterface([PublishersWebService(deliveries)], lambda _: "", everybody),

@@ -29,6 +29,7 @@ _NEEDED: Final = {
 @click.command()
 @click.option("--config", type=_FILE, help="TOML file of names, limits and deadlines.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option("--insecure", is_flag=True, help="Let everybody who reaches --host drive the robot, without a token.")
 @click.option("--rest-port", type=_PORT, default=7003, show_default=True, help="0 takes a free one.")
 @click.option("--soap-port", type=_PORT, default=5555, show_default=True, help="0 takes a free one.")
 @click.option(
@@ -52,7 +53,27 @@ _NEEDED: Final = {
     help="Simulate a robot like a real one: odometry that is slow, noisy and drifts, wheels that slip, late commands.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Which realistic robot.")
-@click.option("--token-file", type=_FILE, help="Ask for the bearer token in this file.")
+@click.option("--token-file", type=_FILE, help="Ask for a bearer token in this file, with its scopes.")
+@click.option("--tls-cert", type=_FILE, help="Serve HTTPS with this certificate, or chain, in PEM.")
+@click.option("--tls-key", type=_FILE, help="The certificate's private key in PEM.")
+@click.option(
+    "--allowed-host",
+    multiple=True,
+    metavar="NAME",
+    help="Answer to this name as well; .NAME: and to all below it. Repeatable.",
+)
+@click.option(
+    "--public-url",
+    multiple=True,
+    metavar="[rest=|soap=]URL",
+    help="Where clients find the robot, or one of its interfaces, behind a proxy. Repeatable.",
+)
+@click.option(
+    "--trusted-proxy",
+    multiple=True,
+    metavar="ADDRESS",
+    help="Believe X-Forwarded-Proto and -Host from this address or network. Repeatable.",
+)
 @click.option("--attach", is_flag=True, help="Start no simulation; serve the robot on the ROS graph.")
 def robot(**options: object) -> None:
     """Run the reference robot.

@@ -20,10 +20,21 @@ from reference_robot.simulated import SimulatedRobot, SimulationError
 from reference_robot.webservices.assembly import Endpoints
 from reference_robot.webservices.configuration import load_configuration
 from reference_robot.webservices.endpoint import PortInUseError
-from reference_robot.webservices.http.authorization import Authorization, TokenFileError, read_token
-from reference_robot.webservices.runner import Listening, RobotNotFoundError, RobotWebServiceNodesRunner
+from reference_robot.webservices.http.authorization import Authorization, TokenFileError, read_tokens
+from reference_robot.webservices.http.hosts import is_loopback
+from reference_robot.webservices.http.listening import (
+    Listening,
+    ListeningError,
+    host_patterns,
+    public_urls,
+    require_guarded,
+    trusted_proxies,
+)
+from reference_robot.webservices.http.tls import TlsFileError, server_context
+from reference_robot.webservices.runner import RobotNotFoundError, RobotWebServiceNodesRunner
 from reference_robot.webservices.soap.publishers import PATH as PUBLISHERS_PATH
 
+_LOGGER: Final = logging.getLogger(__name__)
 _DISCOVERY_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
@@ -50,6 +61,12 @@ class Options:
     domain_id: int
     time_scale: float
     token_file: Path | None
+    insecure: bool
+    tls_cert: Path | None
+    tls_key: Path | None
+    allowed_host: tuple[str, ...]
+    public_url: tuple[str, ...]
+    trusted_proxy: tuple[str, ...]
     attach: bool
     realistic: bool
     seed: int
@@ -71,15 +88,40 @@ def run(options: Options) -> None:
 
     try:
         configuration = load_configuration(options.config)
-        token = None if options.token_file is None else read_token(options.token_file)
-        listening = Listening(options.host, options.rest_port, options.soap_port, Authorization(token))
-        runner = RobotWebServiceNodesRunner(configuration, listening, options.domain_id)
+        runner = RobotWebServiceNodesRunner(configuration, _listening(options), options.domain_id)
         with contextlib.suppress(_Stopped), _stopped_by_signals(), _simulation(options):
             runner.run(ready, wait_for_robot=not options.attach)
-    except (TomlFileError, TokenFileError, PortInUseError) as error:
+    except (TomlFileError, TokenFileError, TlsFileError, ListeningError, PortInUseError) as error:
         raise UnusableError(str(error)) from error
     except (SimulationError, RobotNotFoundError) as error:
         raise RobotLostError(str(error)) from error
+
+
+def _listening(options: Options) -> Listening:
+    """Return how the robot is reached.
+
+    Raises:
+        TokenFileError: The token file cannot be used.
+        TlsFileError: Certificate or key cannot be used.
+        ListeningError: Another option cannot be used, or lets strangers drive the robot.
+    """
+    authorization = Authorization(None if options.token_file is None else read_tokens(options.token_file))
+    if not options.insecure:
+        require_guarded(options.host, authorization)
+    if (options.tls_cert is None) != (options.tls_key is None):
+        raise ListeningError("--tls-cert and --tls-key go together: a server needs a certificate and its key")
+    if authorization.is_asked_for and options.tls_cert is None and not is_loopback(options.host):
+        _LOGGER.warning("tokens travel in the clear to --host %s: --tls-cert and --tls-key hide them", options.host)
+    return Listening(
+        options.host,
+        options.rest_port,
+        options.soap_port,
+        authorization,
+        host_patterns(options.allowed_host),
+        public_urls(options.public_url),
+        trusted_proxies(options.trusted_proxy),
+        server_context(options.tls_cert, options.tls_key) if options.tls_cert and options.tls_key else None,
+    )
 
 
 class _Stopped(BaseException):

@@ -5,7 +5,7 @@ from typing import Final
 
 from reference_robot.webservices.configuration import Configuration
 from reference_robot.webservices.http.address import Address, url_of
-from reference_robot.webservices.http.authorization import Authorization
+from reference_robot.webservices.http.listening import REST, SOAP, Listening
 from reference_robot.webservices.nodes.calls import RosCalls
 from reference_robot.webservices.nodes.lifecycle import ManagedNode
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
@@ -35,8 +35,9 @@ _STATE_DEADLINE: Final = 1.0  # seconds for a managed node to say its state
 
 @dataclass(frozen=True)
 class Endpoints:
-    """Where the two interfaces listen: host, and the ports that were really bound."""
+    """Where the two interfaces listen: scheme, host, and the ports that were really bound."""
 
+    scheme: str
     host: str
     rest_port: int
     soap_port: int
@@ -44,12 +45,12 @@ class Endpoints:
     @property
     def rest(self) -> str:
         """The base URL of the REST interface."""
-        return url_of(self.host, self.rest_port)
+        return url_of(self.host, self.rest_port, self.scheme)
 
     @property
     def soap(self) -> str:
         """The base URL of the SOAP interface."""
-        return url_of(self.host, self.soap_port)
+        return url_of(self.host, self.soap_port, self.scheme)
 
 
 def interfaces(
@@ -57,7 +58,7 @@ def interfaces(
     subscribers: RobotSubscribersNode,
     configuration: Configuration,
     endpoints: Endpoints,
-    authorization: Authorization,
+    listening: Listening,
 ) -> tuple[RestInterface, SoapInterface, Velocity]:
     """Return both interfaces, which share the nodes and everything that is known about the robot.
 
@@ -75,14 +76,16 @@ def interfaces(
     velocity = Velocity(publishers, odometry, configuration.web, goals.is_active)
     planner = Planner(subscribers, calls, planner_node, odometry, frames)
     deliveries = Deliveries(publishers, subscribers)
-    rest_address = Address(endpoints.rest)
+    rest_address = Address(endpoints.rest, listening.public_urls.get(REST))
+    soap_address = Address(endpoints.soap, listening.public_urls.get(SOAP))
+    admission = listening.admission()
     resources = [
         Pose(odometry),
         VelocityResource(velocity),
         LinearVelocity(velocity),
         GraphList("/robot/sensors/", "Sensors", subscribers.sensors),
         GraphList("/robot/navigation/services/", "NavigationServices", subscribers.navigation_services),
-        Goal(goals),
+        Goal(goals, rest_address),
         HealthResource(Health(publishers, subscribers, odometry, navigator, planner_node)),
         Plan(planner),
         DeliveryList(deliveries),
@@ -94,7 +97,7 @@ def interfaces(
         SubscribersWebService(subscribers, odometry, velocity, goals, planner),
     ]
     return (
-        RestInterface(resources, Delivery(deliveries), authorization),
-        SoapInterface(services, Address(endpoints.soap), authorization),
+        RestInterface(resources, Delivery(deliveries), admission),
+        SoapInterface(services, soap_address, admission),
         velocity,
     )

@@ -5,9 +5,11 @@ The robot publishes its endpoints itself, without an application server (paper, 
 
 import asyncio
 import socket
+import ssl
 
 from reference_robot.webservices.http.interface import Interface
-from reference_robot.webservices.http.port import Limits, Port
+from reference_robot.webservices.http.port import Held, Limits, Port
+from reference_robot.webservices.http.proxies import TrustedProxies
 from reference_robot.webservices.http.server import serve
 
 
@@ -32,19 +34,36 @@ def bound(host: str, port: int) -> socket.socket:
 
 
 class EndpointPublisher:
-    """Serves interfaces until it is told to stop; a client may take ``patience`` seconds to send one request."""
+    """Serves interfaces until it is told to stop.
 
-    def __init__(self, interfaces: list[tuple[Interface, socket.socket]], patience: float) -> None:
+    Args:
+        interfaces: Each with the socket on which it listens.
+        limits: What clients may use of each interface; what is kept for them, of all together.
+        proxies: Whose word on what was asked is taken.
+        context: What is needed for TLS; None for HTTP without.
+    """
+
+    def __init__(
+        self,
+        interfaces: list[tuple[Interface, socket.socket]],
+        limits: Limits,
+        proxies: TrustedProxies,
+        context: ssl.SSLContext | None,
+    ) -> None:
         self._interfaces = interfaces
-        self._patience = patience
+        self._limits = limits
+        self._proxies = proxies
+        self._context = context
 
     async def serve(self, stop: asyncio.Event, started: asyncio.Event) -> None:
         """Answer requests, setting ``started``, until ``stop`` is set; answers under way are finished then."""
+        held = Held()
         async with asyncio.TaskGroup() as group:
             listening = []
             for interface, listener in self._interfaces:
                 listening.append(asyncio.Event())
-                group.create_task(serve(Port(interface, Limits(self._patience)), listener, listening[-1], stop))
+                port = Port(interface, self._limits, held, self._proxies)
+                group.create_task(serve(port, listener, listening[-1], stop, self._context))
             for event in listening:
                 await event.wait()
             started.set()

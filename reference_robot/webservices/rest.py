@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Iterable
 from typing import Final
 
-from reference_robot.webservices.http.authorization import Authorization
+from reference_robot.webservices.http.admission import Admission
+from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.problems import Problem
@@ -20,10 +21,14 @@ _DELIVERY_PATHS: Final = b"/robot/app/delivery/"
 class RestInterface(Interface):
     """Serves resources with a fixed path, and the delivery, which has values in its path."""
 
-    def __init__(self, resources: Iterable[Resource], delivery: Delivery, authorization: Authorization) -> None:
-        super().__init__(authorization)
+    def __init__(self, resources: Iterable[Resource], delivery: Delivery, admission: Admission) -> None:
+        super().__init__(admission)
         self._fixed: dict[bytes, Handlers] = {resource.path.encode(): resource.handlers() for resource in resources}
         self._delivery = delivery
+
+    def scope(self, request: Request) -> Scope:
+        """Return ``deliver`` for deliveries and ``move`` for everything else."""
+        return Scope.DELIVER if request.path.startswith(_DELIVERY_PATHS) else Scope.MOVE
 
     def answer(self, request: Request) -> Response | Awaitable[Response]:
         """Return the resource's answer.

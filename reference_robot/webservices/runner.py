@@ -7,7 +7,6 @@ import resource
 import signal
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 import uvloop
@@ -16,7 +15,8 @@ from reference_robot.ros import RosRuntime
 from reference_robot.webservices.assembly import Endpoints, interfaces
 from reference_robot.webservices.configuration import Configuration
 from reference_robot.webservices.endpoint import EndpointPublisher, bound
-from reference_robot.webservices.http.authorization import Authorization
+from reference_robot.webservices.http.listening import Listening
+from reference_robot.webservices.http.port import Limits
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
@@ -27,16 +27,6 @@ _DISCOVERY_STEP: Final = 0.05
 
 class RobotNotFoundError(RuntimeError):
     """The robot that was started did not appear on the ROS graph."""
-
-
-@dataclass(frozen=True)
-class Listening:
-    """Addresses to bind, and who may call; port 0 takes a free one."""
-
-    host: str
-    rest_port: int
-    soap_port: int
-    authorization: Authorization
 
 
 class RobotWebServiceNodesRunner:
@@ -59,21 +49,25 @@ class RobotWebServiceNodesRunner:
         # Fast DDS's default, and no user's setting: the sender's own thread of the asynchronous mode holds a lock that
         # each publish waits for, which makes one answer in ten 3 ms slower. Other middleware ignores it.
         os.environ["RMW_FASTRTPS_PUBLICATION_MODE"] = "SYNCHRONOUS"
-        host = self._listening.host
+        listening = self._listening
+        host = listening.host
         with (
-            bound(host, self._listening.rest_port) as rest,
-            bound(host, self._listening.soap_port) as soap,
+            bound(host, listening.rest_port) as rest,
+            bound(host, listening.soap_port) as soap,
             RosRuntime(self._domain_id) as ros,
         ):
-            endpoints = Endpoints(host, rest.getsockname()[1], soap.getsockname()[1])
+            endpoints = Endpoints(listening.scheme, host, rest.getsockname()[1], soap.getsockname()[1])
             publishers, subscribers = RobotPublishersNode(ros, configuration), RobotSubscribersNode(ros, configuration)
             ros.start()
             if wait_for_robot:
                 _await_robot(publishers, subscribers)
-            *pair, velocity = interfaces(
-                publishers, subscribers, configuration, endpoints, self._listening.authorization
+            *pair, velocity = interfaces(publishers, subscribers, configuration, endpoints, listening)
+            publisher = EndpointPublisher(
+                list(zip(pair, (rest, soap), strict=True)),
+                Limits(configuration.web.read_deadline),
+                listening.proxies,
+                listening.tls,
             )
-            publisher = EndpointPublisher(list(zip(pair, (rest, soap), strict=True)), configuration.web.read_deadline)
             with contextlib.closing(velocity):
                 uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
 

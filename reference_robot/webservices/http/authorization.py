@@ -1,13 +1,31 @@
-"""Bearer tokens (RFC 6750): with a token file, both interfaces ask for the token in it."""
+"""Bearer tokens (RFC 6750): with a token file, both interfaces ask for a token in it, and for its scope."""
 
 import hmac
+import re
+from collections.abc import Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
 from reference_robot.webservices.representation.problems import Problem
 
-_CHALLENGE: Final = ((b"www-authenticate", b'Bearer realm="robot"'),)
-_INVALID: Final = ((b"www-authenticate", b'Bearer realm="robot", error="invalid_token"'),)
+_REALM: Final = b'Bearer realm="robot"'
+_CHALLENGE: Final = ((b"www-authenticate", _REALM),)
+_INVALID: Final = ((b"www-authenticate", _REALM + b', error="invalid_token"'),)
+
+_TOKEN: Final = re.compile(r"[!-~]+")  # printable ASCII without spaces
+_COMMENT: Final = "# "  # no token has a space in it
+
+
+class Scope(StrEnum):
+    """What a token is good for (RFC 6749 3.3)."""
+
+    READ = "read"
+    MOVE = "move"
+    DELIVER = "deliver"
+
+
+EVERYTHING: Final = frozenset(Scope)
 
 
 class TokenFileError(ValueError):
@@ -15,32 +33,69 @@ class TokenFileError(ValueError):
 
 
 class Authorization:
-    """Lets requests through that carry the token; all of them where there is none."""
+    """Lets requests through that carry a token with the scope that they need; all of them where there are no tokens.
 
-    def __init__(self, token: str | None) -> None:
-        self._token = None if token is None else token.encode()
+    Attributes:
+        is_asked_for: Whether there are tokens.
+    """
 
-    def check(self, headers: dict[bytes, bytes]) -> None:
-        """Raise the 401 of RFC 9110 15.5.2 for a request without the token."""
-        if self._token is None:
-            return
-        scheme, _, token = headers.get(b"authorization", b"").partition(b" ")
+    def __init__(self, tokens: Mapping[str, frozenset[Scope]] | None) -> None:
+        self.is_asked_for = tokens is not None
+        self._tokens = [(token.encode(), scopes) for token, scopes in (tokens or {}).items()]
+
+    def check(self, headers: dict[bytes, bytes], scope: Scope | None) -> None:
+        """Raise the 401 of RFC 9110 15.5.2 for a request without a token, and the 403 for one without the scope.
+
+        Args:
+            headers: Field values by lower-case name.
+            scope: What the request needs; None for what any token may do.
+        """
+        scheme, _, sent = headers.get(b"authorization", b"").partition(b" ")
         if scheme.lower() != b"bearer":
             raise Problem(401, "this robot asks for a bearer token in the Authorization field", _CHALLENGE)
-        if not hmac.compare_digest(token.strip(), self._token):
-            raise Problem(401, "the bearer token in the Authorization field is not this robot's", _INVALID)
+        sent, granted = sent.strip(), None
+        for token, scopes in self._tokens:  # all of them, so that the time tells nothing
+            if hmac.compare_digest(sent, token):
+                granted = scopes
+        if granted is None:
+            raise Problem(401, "the bearer token in the Authorization field is none of this robot's", _INVALID)
+        if scope is not None and scope not in granted:
+            challenge = _REALM + b', error="insufficient_scope", scope="%b"' % scope.encode()
+            raise Problem(
+                403,
+                f"the bearer token is good for {' and '.join(sorted(granted))}; this needs the scope {scope}",
+                ((b"www-authenticate", challenge),),
+            )
 
 
-def read_token(path: Path) -> str:
-    """Return the token that a file holds, without surrounding white space.
+def read_tokens(path: Path) -> dict[str, frozenset[Scope]]:
+    """Return the scopes of each token that a file holds.
+
+    A line is a token and its scopes, separated by white space: ``TOKEN read deliver``. A token alone is good for
+    everything. Empty lines count for nothing, nor do those that start with a hash and a space.
 
     Raises:
-        TokenFileError: The file cannot be read, or holds anything but one word of printable ASCII.
+        TokenFileError: The file cannot be read, or a line is something else. No message quotes a line: it may be a
+            secret.
     """
     try:
-        token = path.read_text(encoding="ascii").strip()
+        lines = path.read_text(encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise TokenFileError(f"cannot read the token file {path}: {error}") from error
-    if not token or not token.isprintable() or " " in token:
-        raise TokenFileError(f"the token file {path} must hold one token of printable ASCII without spaces")
-    return token
+        why = "it is not ASCII" if isinstance(error, UnicodeDecodeError) else error
+        raise TokenFileError(f"cannot read the token file {path}: {why}") from None
+    tokens: dict[str, frozenset[Scope]] = {}
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.startswith(_COMMENT):
+            continue
+        token, *scopes = line.split()
+        if not _TOKEN.fullmatch(token) or not EVERYTHING.issuperset(scopes):
+            raise TokenFileError(
+                f"the token file {path}, line {number}, must be a token of printable ASCII and, after it, its scopes "
+                f"of {', '.join(Scope)}; a token alone has them all"
+            )
+        if token in tokens:
+            raise TokenFileError(f"the token file {path}, line {number}, repeats a token")
+        tokens[token] = frozenset(map(Scope, scopes)) or EVERYTHING
+    if not tokens:
+        raise TokenFileError(f"the token file {path} holds no token")
+    return tokens

@@ -4,8 +4,8 @@ An ``asyncio.Protocol`` on httptools' parser. What a resource answers at once is
 what has to wait there is a task, and what the client sends meanwhile waits its turn. The content is complete before a
 resource sees its request. What keeps strangers from using the robot up:
 
-- sizes: of the target, of the head, of the content, of all content that the port holds, of what is read and dropped
-  after a refusal;
+- sizes: of the target, of the head, of the content, of what is read and dropped after a refusal; and of all that
+  clients make the robot keep: half a request, one that waits, an answer that nobody reads;
 - times: ``due`` is when the client must have moved on, whatever it is about: sending a request, reading answers, asking
   for something. There is no state of a connection without it but one: the robot works on an answer;
 - turns: so many requests may wait on a connection; then no more is read from it, nor while the client does not read.
@@ -26,6 +26,7 @@ from httptools import HttpParserCallbackError, HttpParserError, HttpRequestParse
 from reference_robot.webservices.http.interface import described
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field, Request, Response
 from reference_robot.webservices.http.port import Port
+from reference_robot.webservices.http.proxies import take_forwarded
 from reference_robot.webservices.http.reading import (
     HEAD_LIMIT,
     TARGET_LIMIT,
@@ -42,6 +43,8 @@ from reference_robot.webservices.representation.problems import Problem, not_yet
 _LINGER: Final = 2.0  # seconds in which what a refused client still sends is read and dropped
 _DRAINED: Final = 16 * BODY_LIMIT  # octets of refused content that are dropped before the line is cut
 _PIPELINED: Final = 16  # requests that may wait on a connection before no more is read from it
+_UNREAD: Final = 16 * 1024  # octets of answers that wait for the client before it counts as one that does not read
+_FIELD: Final = 200  # octets that a field takes besides its own: two objects, and where they are
 _CONTINUE: Final = b"HTTP/1.1 100 Continue\r\n\r\n"
 _NEVER: Final = math.inf
 
@@ -71,9 +74,12 @@ class HttpConnection(asyncio.Protocol):
         self._is_refused = False  # it has its answer, and its content is dropped
         self._dropped = 0
         # Those that have arrived, and how they end
-        self._waiting: deque[tuple[Request, Response | None]] = deque()
+        self._waiting: deque[tuple[Request, Response | None, int]] = deque()
         self._task: asyncio.Task[Response] | None = None
-        self._held = 0  # octets of content
+        self._held = 0  # octets of content, of what waits, and of what is not read
+        self._arriving = 0  # of them, those of the request that arrives, but for its content
+        self._unread = 0  # of them, those of answers
+        self._is_proxied = False  # by a proxy that is trusted
         self._reading = True
         self._stalled = False  # the client does not read
         self._ended = False  # the client sends no more
@@ -84,6 +90,8 @@ class HttpConnection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start the clock: a client that connects must also ask."""
         self._transport = cast("asyncio.Transport", transport)
+        self._transport.set_write_buffer_limits(_UNREAD)
+        self._is_proxied = self._port.proxies.include(transport.get_extra_info("peername"))
         self.due = self._now() + self._port.patience
         if not self._port.add(self):
             self._refuse(not_yet("too many connections"))
@@ -96,19 +104,25 @@ class HttpConnection(asyncio.Protocol):
         self._waiting.clear()
 
     def eof_received(self) -> bool:
-        """Keep the connection for the answers that are still to come."""
+        """Keep the connection for the answers that are still to come; under TLS, both sides end at once."""
         self._ended = True
-        return self._task is not None or bool(self._waiting)
+        return self._transport.can_write_eof() and (self._task is not None or bool(self._waiting))
 
     def pause_writing(self) -> None:
         """Answer no more: the client does not read."""
         self._stalled = True
         self._pause_reading()
         self.due = self._now() + self._port.patience
+        self._unread = self._transport.get_write_buffer_size()
+        self._hold(self._unread)
+        if self._port.is_full():
+            self._transport.abort()
 
     def resume_writing(self) -> None:
         """Answer what has waited."""
         self._stalled = False
+        self._hold(-self._unread)
+        self._unread = 0
         self._advance()
 
     def data_received(self, data: bytes) -> None:
@@ -127,8 +141,8 @@ class HttpConnection(asyncio.Protocol):
         except HttpParserError as error:
             self._refuse(no_request(error))
         else:
-            if self._in_head and self._head_octets > HEAD_LIMIT:
-                self._refuse(head_too_large())
+            if self._has_begun:
+                self._hold_arriving()
 
     # The parser's side: an exception is the way out of its callbacks
 
@@ -158,6 +172,8 @@ class HttpConnection(asyncio.Protocol):
         headers, parser = dict(fields), self._parser
         request = Request(parser.get_method().decode(), self._target, headers, keep_alive=parser.should_keep_alive())
         self._request = request
+        if self._is_proxied:
+            take_forwarded(request)
         try:
             if len(headers) != len(fields):
                 request.headers = headers = fields_by_name(fields)
@@ -185,19 +201,23 @@ class HttpConnection(asyncio.Protocol):
         try:
             require_bounded(len(self._content))
             if self._port.is_full():
-                raise not_yet("the robot holds as much content as it can")
+                raise _full()
         except Problem as problem:
             self._refuse_one(request, problem)
 
     def on_message_complete(self) -> None:
         """Hand the request over, and be ready for the next."""
         request, refused = self._request, self._is_refused
+        weight = self._weight()
         self._has_begun = self._is_refused = False
         self._in_head = True
         self._head_octets = 0
         self._target = b""
         self._fields = []
         self._request = None
+        if self._arriving:
+            self._hold(-self._arriving)
+            self._arriving = 0
         if request is None or refused:
             self._dropped = 0
             if not self._is_busy():
@@ -206,49 +226,56 @@ class HttpConnection(asyncio.Protocol):
         if self._content:
             request.body = bytes(self._content)
             self._content.clear()
-        self._queue(request, None)
+        self._queue(request, None, weight)
 
     # Answers, in the order of the requests
 
     def _is_busy(self) -> bool:
         return self._task is not None or self._stalled or bool(self._waiting)
 
-    def _queue(self, request: Request, response: Response | None) -> None:
+    def _queue(self, request: Request, response: Response | None, weight: int = 0) -> None:
         """Answer a request, or let it wait its turn; ``response`` is set where it has been refused already."""
         if self._leaving:
             return  # it follows one that was to be the last
         if not self._is_busy():
-            self._serve(request, response)
+            self._serve(request, response, weight)
             return
-        self._waiting.append((request, response))
+        self._hold(weight)
+        if response is None and self._port.is_full():
+            response = described(_full(), request.headers.get(b"accept"))
+        self._waiting.append((request, response, weight))
         if not self._stalled:
             self.due = _NEVER
         if len(self._waiting) >= _PIPELINED:
             self._pause_reading()
 
-    def _serve(self, request: Request, response: Response | None) -> None:
+    def _serve(self, request: Request, response: Response | None, weight: int) -> None:
         outcome = response or self._respond(request)
         if isinstance(outcome, Response):
             self._write(request, outcome)
         else:
-            self._await(request, outcome)
+            self._await(request, outcome, weight)
 
-    def _await(self, request: Request, outcome: Coroutine[Any, Any, Response]) -> None:
+    def _await(self, request: Request, outcome: Coroutine[Any, Any, Response], weight: int) -> None:
         if not self._has_begun:
             self.due = _NEVER
+        self._hold(weight)
         self._task = self._port.loop.create_task(outcome)
-        self._task.add_done_callback(partial(self._finish, request))
+        self._task.add_done_callback(partial(self._finish, request, weight))
 
-    def _finish(self, request: Request, task: asyncio.Task[Response]) -> None:
+    def _finish(self, request: Request, weight: int, task: asyncio.Task[Response]) -> None:
         self._task = None
         if task.cancelled() or self._transport.is_closing():
             return
+        self._hold(-weight)
         self._write(request, task.result())
         self._advance()
 
     def _advance(self) -> None:
         while self._waiting and self._task is None and not self._stalled:
-            self._serve(*self._waiting.popleft())
+            request, response, weight = self._waiting.popleft()
+            self._hold(-weight)
+            self._serve(request, response, weight)
         if self._is_busy():
             return
         if self._ended:
@@ -290,7 +317,7 @@ class HttpConnection(asyncio.Protocol):
         self._is_refused = True
         self._hold(-len(self._content))
         self._content.clear()
-        self._queue(request, described(problem, request.headers.get(b"accept")))
+        self._queue(request, described(problem, request.headers.get(b"accept")), self._weight())
 
     def _refuse(self, problem: Problem) -> None:
         """Refuse what is no request, or too long a one, and read no more."""
@@ -311,8 +338,9 @@ class HttpConnection(asyncio.Protocol):
         lingers = self._has_begun and not self._ended
         self._leaving = True
         self._waiting.clear()
-        if lingers and self._transport.can_write_eof():
-            self._transport.write_eof()
+        if lingers:
+            if self._transport.can_write_eof():  # TLS cannot: there the client goes, or its time is up
+                self._transport.write_eof()
             self.due = self._now() + _LINGER
         else:
             self._close()
@@ -348,6 +376,27 @@ class HttpConnection(asyncio.Protocol):
             self.due = _NEVER
             self._transport.pause_reading()
 
+    def _hold_arriving(self) -> None:
+        """Count what there is of a request that is not complete; its content counts by itself."""
+        if self._in_head:
+            if not self._head_octets:  # it began in the middle of a segment
+                self._head_octets = len(self._target) + sum(len(name) + len(value) for name, value in self._fields)
+            if self._head_octets > HEAD_LIMIT:
+                self._refuse(head_too_large())
+                return
+        weight = self._weight()
+        self._hold(weight - self._arriving)
+        self._arriving = weight
+        if self._in_head and self._port.is_full():
+            self._refuse(_full())
+
+    def _weight(self) -> int:
+        return self._head_octets + _FIELD * len(self._fields)
+
     def _hold(self, octets: int) -> None:
         self._held += octets
-        self._port.held += octets
+        self._port.held.octets += octets
+
+
+def _full() -> Problem:
+    return not_yet("clients make the robot keep as much as it can")

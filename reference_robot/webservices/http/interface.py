@@ -1,11 +1,12 @@
-"""An interface: ask for the token, answer, and never show a traceback."""
+"""An interface: see who is let in, answer, and never show a traceback."""
 
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Coroutine
 from typing import Any, Final
 
-from reference_robot.webservices.http.authorization import Authorization
+from reference_robot.webservices.http.admission import SAFE, Admission
+from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.http.negotiation import problem_format
 from reference_robot.webservices.representation.problems import Problem
@@ -16,8 +17,8 @@ _LOGGER: Final = logging.getLogger(__name__)
 class Interface(ABC):
     """What answers the requests of one port; subclasses turn a request into an answer."""
 
-    def __init__(self, authorization: Authorization) -> None:
-        self._authorization = authorization
+    def __init__(self, admission: Admission) -> None:
+        self._admission = admission
 
     @abstractmethod
     def answer(self, request: Request) -> Response | Awaitable[Response]:
@@ -25,7 +26,16 @@ class Interface(ABC):
 
     def admit(self, request: Request) -> None:
         """Raise a Problem for a request whose head already says that it is not answered."""
-        self._authorization.check(request.headers)
+        self._admission.check(request, self._needed)
+
+    @abstractmethod
+    def scope(self, request: Request) -> Scope:
+        """Return what a token must be good for to change something by this request."""
+
+    def _needed(self, request: Request) -> Scope | None:
+        if request.method in SAFE:
+            return None if request.method == "OPTIONS" else Scope.READ
+        return self.scope(request)
 
     def respond(self, request: Request) -> Response | Coroutine[Any, Any, Response]:
         """Return the answer to an admitted request: at once, unless something has to be waited for; never raises."""

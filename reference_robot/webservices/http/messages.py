@@ -21,6 +21,9 @@ class Request:
 
     Attributes:
         method: As sent, in upper case.
+        authority: Host and port that were asked for: the target's where it is absolute (RFC 9112 3.2.2), else the Host
+            field's, empty where there is none; behind a trusted proxy those that the proxy was asked for.
+        scheme: ``http`` or ``https`` where a trusted proxy says so, else empty: the port's own.
         path: The raw path, percent-encoding and all, in octets.
         query: The raw query, without its question mark.
         headers: Field values by lower-case name; several lines of one field are joined by a comma.
@@ -29,16 +32,21 @@ class Request:
         began: When the head was complete, by ``time.perf_counter``.
     """
 
-    __slots__ = ("began", "body", "headers", "keep_alive", "method", "path", "query")
+    __slots__ = ("authority", "began", "body", "headers", "keep_alive", "method", "path", "query", "scheme")
 
     def __init__(self, method: str, target: bytes, headers: dict[bytes, bytes], *, keep_alive: bool) -> None:
         """Take over a head; raises httptools' HttpParserInvalidURLError for a target that is none (RFC 9112 3.2)."""
         self.method = method
+        self.authority = headers.get(b"host", b"")
+        self.scheme = ""
         if target.startswith(b"/") and b"#" not in target:
             self.path, _, self.query = target.partition(b"?")
         else:  # the absolute form, the asterisk, or a fragment, which has no business here
             url = parse_url(target)
             self.path, self.query = url.path or b"/", url.query or b""
+            if url.host:
+                host = b"[%b]" % url.host if b":" in url.host else url.host
+                self.authority = b"%b:%d" % (host, url.port) if url.port else host
         self.headers = headers
         self.body = b""
         self.keep_alive = keep_alive

@@ -7,6 +7,7 @@ from email.utils import formatdate
 from typing import Protocol
 
 from reference_robot.webservices.http.interface import Interface
+from reference_robot.webservices.http.proxies import TrustedProxies
 
 
 class Client(Protocol):
@@ -32,7 +33,7 @@ class Limits:
         patience: Seconds that a client may take to send one request, and to read answers.
         keep_alive: Seconds that an idle connection is kept for its next request.
         connections: Of one port; two ports of them and ROS stay within the runner's 8,192 descriptors.
-        held: Octets of content that has not been answered, of all connections.
+        held: Octets that all connections together may make the robot keep.
     """
 
     patience: float
@@ -41,22 +42,41 @@ class Limits:
     held: int = 64 * 1024 * 1024
 
 
+class Held:
+    """What clients make the robot keep: half a request, one that waits, an answer that nobody reads.
+
+    Attributes:
+        octets: Of all connections that share it, those of several ports too.
+    """
+
+    def __init__(self) -> None:
+        self.octets = 0
+
+
 class Port:
     """The interface behind a port, its connections, their common clock and their common limits.
 
+    Args:
+        interface: What answers.
+        limits: What clients may use.
+        held: What is kept for clients; several ports may share it.
+        proxies: Whose word on what was asked is taken.
+
     Attributes:
-        held: Octets of content that connections hold.
         date: The Date field, less than two seconds old (RFC 9110 6.6.1).
         is_empty: Set while there are no connections.
     """
 
-    def __init__(self, interface: Interface, limits: Limits) -> None:
+    def __init__(
+        self, interface: Interface, limits: Limits, held: Held | None = None, proxies: TrustedProxies | None = None
+    ) -> None:
         self.interface = interface
         self.patience = limits.patience
         self.keep_alive = limits.keep_alive
         self._limits = limits
         self.loop = asyncio.get_running_loop()
-        self.held = 0
+        self.held = held or Held()
+        self.proxies = proxies or TrustedProxies()
         self.date = _date()
         self.is_stopping = False
         self.is_empty = asyncio.Event()
@@ -69,6 +89,10 @@ class Port:
         self.is_empty.clear()
         return len(self._clients) <= self._limits.connections
 
+    def has_room_for(self, more: int) -> bool:
+        """Tell whether so many more connections may come."""
+        return len(self._clients) + more <= self._limits.connections
+
     def remove(self, client: Client) -> None:
         """Forget a connection that is closed."""
         self._clients.discard(client)
@@ -76,8 +100,8 @@ class Port:
             self.is_empty.set()
 
     def is_full(self) -> bool:
-        """Tell whether connections hold more content than they may."""
-        return self.held > self._limits.held
+        """Tell whether more is kept for clients than may be."""
+        return self.held.octets > self._limits.held
 
     def tick(self) -> None:
         """Look at the clock."""

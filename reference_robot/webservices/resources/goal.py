@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from reference_robot.webservices.http.address import Address
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, sent, wanted_format
@@ -15,8 +16,9 @@ class Goal(Resource):
 
     path = "/robot/navigation/action/goal/"
 
-    def __init__(self, goals: Goals) -> None:
+    def __init__(self, goals: Goals, address: Address) -> None:
         self._goals = goals
+        self._location = address.location(self.path)
 
     def get(self, request: Request) -> Response:
         """Return the active goal; 404 when there is none."""
@@ -30,7 +32,7 @@ class Goal(Resource):
         """Send a goal; 201 with Location for a new one, 202 where it preempts another, 200 for a repeat."""
         media_type = wanted_format(request)
         status, goal = await self._goals.send(sent(request, GOAL))
-        location = ((b"location", self.path.encode()),) if status == _CREATED else ()
+        location = ((b"location", self._location),) if status == _CREATED else ()
         return represented(goal, GOAL.name, media_type, status, location)
 
     async def delete(self, _request: Request) -> Response:

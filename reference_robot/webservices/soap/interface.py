@@ -3,7 +3,8 @@
 from collections.abc import Awaitable, Callable, Iterable
 from typing import Final
 
-from reference_robot.webservices.http.authorization import Authorization
+from reference_robot.webservices.http.admission import Admission
+from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.representation.problems import Problem
@@ -18,11 +19,16 @@ class SoapInterface(Interface):
     """Serves SOAP services, each at its own path, and their descriptions."""
 
     def __init__(
-        self, services: Iterable[SoapService], address: Callable[[Request], str], authorization: Authorization
+        self, services: Iterable[SoapService], address: Callable[[Request], str], admission: Admission
     ) -> None:
-        super().__init__(authorization)
+        super().__init__(admission)
         self._services = {service.path.encode(): service for service in services}
         self._address = address
+
+    def scope(self, request: Request) -> Scope:
+        """Return that of the service."""
+        service = self._services.get(request.path)
+        return Scope.READ if service is None else service.scope
 
     def answer(self, request: Request) -> Response | Awaitable[Response]:
         """Return a service's answer, or its description at ``?wsdl`` and ``?xsd=1``.

@@ -7,6 +7,7 @@ from lxml import etree
 
 from conformance.contract.delivery import COFFEE, COORDINATES
 from reference_robot.deliveries import DeliveryRequest
+from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
 from reference_robot.webservices.soap.faults import SOAP, client_fault
 from reference_robot.webservices.soap.service import SoapService
@@ -16,6 +17,8 @@ PATH: Final = "/turtlesim_publisher_ws"
 
 class PublishersWebService(SoapService):
     """ExecuteDeliveryRequest and ExecuteCoffeeRequest: both return nothing (paper), the empty wrapper."""
+
+    scope = Scope.DELIVER
 
     def __init__(self, deliveries: Deliveries) -> None:
         codes = {"ExecuteDeliveryRequest": None, "ExecuteCoffeeRequest": COFFEE}

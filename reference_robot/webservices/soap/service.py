@@ -8,6 +8,7 @@ from typing import Final
 
 from lxml import etree
 
+from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem
@@ -28,7 +29,12 @@ class SoapService:
     """A service: a subclass gives the operations by local name.
 
     An operation takes the wrapper element, valid by the XSD, and returns the answering envelope.
+
+    Attributes:
+        scope: What a token must be good for to send it messages.
     """
+
+    scope: Scope
 
     def __init__(self, name: str, path: str, operations: dict[str, Operation]) -> None:
         self.path = path

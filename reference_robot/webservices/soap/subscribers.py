@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from lxml import etree
 
+from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.writing import element_of
@@ -21,6 +22,8 @@ PATH: Final = "/turtlesim_subscriber_ws"
 
 class SubscribersWebService(SoapService):
     """GetPose, GetVelocity, GetSensors, GetNavigationServices, GetGoal and GetPlan."""
+
+    scope = Scope.READ
 
     def __init__(
         self,

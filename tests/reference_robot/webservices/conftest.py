@@ -6,6 +6,8 @@ import pytest
 from web_messages import delivery_path, twist
 from web_robot import ForeignRobot, Served, eventually, running_robot
 
+NAMES = ("robot", "a", ".example")  # by which tests ask for the robot
+
 
 @pytest.fixture(scope="session")
 def foreign_session(session_domain_id: int) -> Iterator[ForeignRobot]:
@@ -21,7 +23,8 @@ def served_session(
     config = tmp_path_factory.mktemp("config") / "robot.toml"
     # A velocity of one test does not end in another one.
     config.write_text("[web]\nread_deadline = 1.0\nhold = 600.0\n")
-    with running_robot(session_domain_id, "--attach", f"--config={config}") as served:
+    names = [f"--allowed-host={name}" for name in NAMES]
+    with running_robot(session_domain_id, "--attach", f"--config={config}", *names) as served:
         # A message published before the other side is connected would be lost.
         eventually(lambda: served.call("GET", "/robot/pose/").status_code == 200)
         eventually(lambda: served.call("PUT", delivery_path()).status_code == 204)

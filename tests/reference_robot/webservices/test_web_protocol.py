@@ -4,17 +4,22 @@ import asyncio
 import functools
 import itertools
 import re
+import ssl
 from contextlib import asynccontextmanager
 
 import pytest
 import uvloop
+from web_certificate import pair
 
 from reference_robot.webservices.endpoint import bound
+from reference_robot.webservices.http.admission import Admission
 from reference_robot.webservices.http.authorization import Authorization
+from reference_robot.webservices.http.hosts import AllowedHosts
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.messages import BODY_LIMIT, content
 from reference_robot.webservices.http.port import Limits, Port
 from reference_robot.webservices.http.server import serve
+from reference_robot.webservices.http.tls import server_context
 from reference_robot.webservices.representation.problems import Problem
 
 PATIENCE = 0.6
@@ -26,9 +31,12 @@ class Steered(Interface):
     """Answers ``/now`` with the content, ``/later`` once it is let go, ``/big`` with megabytes, ``/broken`` never."""
 
     def __init__(self):
-        super().__init__(Authorization(None))
+        super().__init__(Admission(Authorization(None), AllowedHosts("a")))
         self.seen = []
         self.let_go = asyncio.Event()
+
+    def scope(self, request):
+        raise NotImplementedError(request)  # nobody asks for a token
 
     def admit(self, request):
         if request.path == b"/closed":
@@ -51,8 +59,8 @@ class Served:
     def __init__(self, interface, port, address):
         self.interface, self.port, self._address = interface, port, address
 
-    async def connect(self):
-        return await asyncio.open_connection(*self._address)
+    async def connect(self, **options):
+        return await asyncio.open_connection(*self._address, **options)
 
     async def ask(self, octets):
         """Send octets and the end of them; return all that comes back."""
@@ -65,10 +73,10 @@ class Served:
 
 
 @asynccontextmanager
-async def served(**limits):
+async def served(tls=None, **limits):
     interface, stop, started = Steered(), asyncio.Event(), asyncio.Event()
     port, listener = Port(interface, Limits(PATIENCE, **limits)), bound("127.0.0.1", 0)
-    serving = asyncio.create_task(serve(port, listener, started, stop))
+    serving = asyncio.create_task(serve(port, listener, started, stop, tls))
     await started.wait()
     try:
         yield Served(interface, port, listener.getsockname())
@@ -160,7 +168,7 @@ async def test_chunks_of_one_octet_make_one_content_and_trailers_no_fields():
         answer = await robot.ask(head + b"1\r\na\r\n" * 5000 + b"0\r\nHost: b\r\n\r\n" + request("/now?end"))
         assert statuses(answer) == [200, 200]
         assert robot.interface.seen[0] == ("PUT", b"/now", b"a" * 5000)
-        assert robot.port.held == 0
+        assert robot.port.held.octets == 0
 
 
 @pytest.mark.parametrize("declared", [True, False])
@@ -176,7 +184,7 @@ async def test_content_over_the_limit_is_refused_dropped_and_the_connection_goes
             )
         assert statuses(await robot.ask(head + request("/now?next"))) == [413, 200]
         assert robot.interface.seen == [("GET", b"/now", b"")]
-        assert robot.port.held == 0
+        assert robot.port.held.octets == 0
 
 
 @runs
@@ -186,7 +194,7 @@ async def test_refused_content_without_end_is_not_read_for_ever():
         writer.write(request("/now", "Transfer-Encoding: chunked", method="PUT"))
         with pytest.raises(ConnectionError):
             await send_for_ever(writer, b"10000\r\n" + b"x" * 0x10000 + b"\r\n")
-        assert robot.port.held == 0
+        assert robot.port.held.octets == 0
 
 
 async def send_for_ever(writer, octets):
@@ -303,17 +311,72 @@ async def test_connections_beyond_the_cap_are_told_so():
             each.close()
 
 
+HALF = request("/now", "Content-Length: 900", method="PUT") + b"x" * 800
+KEPT = {
+    "content": HALF,
+    "a head": b"GET /now HTTP/1.1\r\nX: " + b"x" * 3000,
+    "many fields": b"GET /now HTTP/1.1\r\n" + b"a:b\r\n" * 20,
+    "a head without its content": request("/now", "Content-Length: 5", "X: " + "x" * 3000, method="PUT"),
+    "what is worked on": request("/later", "X: " + "x" * 3000),
+    "what waits": request("/later") + request("/now") * 10,
+}
+
+
+@pytest.mark.parametrize("octets", KEPT.values(), ids=KEPT)
 @runs
-async def test_content_beyond_what_all_may_hold_is_refused_and_given_back():
+async def test_whatever_clients_make_the_robot_keep_is_bounded_for_all_and_given_back(octets):
     async with served(held=1000) as robot:
-        half = request("/now", "Content-Length: 900", method="PUT") + b"x" * 800
         _, holding = await robot.connect()
-        holding.write(half)
-        await until(lambda: robot.port.held == 800)
+        holding.transport.pause_reading()
+        holding.write(octets)
+        await until(robot.port.is_full)
         assert statuses(await robot.ask(request(method="PUT", body=b"y" * 300))) == [503]
-        holding.close()
-        await until(lambda: robot.port.held == 0)
+        holding.transport.abort()
+        robot.interface.let_go.set()
+        await until(lambda: robot.port.held.octets == 0)
         assert statuses(await robot.ask(request(method="PUT", body=b"y" * 300))) == [200]
+        assert robot.port.held.octets == 0
+
+
+@runs
+async def test_a_client_that_does_not_read_is_dropped_at_once_where_too_much_is_kept():
+    async with served(held=1000) as robot:
+        reader, writer = await robot.connect()
+        writer.transport.pause_reading()
+        writer.write(request("/big"))
+        await until(lambda: robot.interface.seen and not robot.port.held.octets)
+        writer.transport.resume_reading()
+        assert len(await closed(reader)) < len(BIG)
+        writer.close()
+
+
+@runs
+async def test_tls_that_is_never_agreed_on_ends_and_counts_as_a_connection(tmp_path):
+    certificate, key = pair(tmp_path, "robot")
+    trusted = ssl.create_default_context(cafile=str(certificate))
+    async with served(tls=server_context(certificate, key), connections=2) as robot:
+        for octets in (b"", b"\x16\x03\x01", request()):
+            reader, writer = await robot.connect()
+            writer.write(octets)
+            assert b"HTTP" not in await closed(reader)
+            writer.close()
+        silent = [await robot.connect() for _ in range(2)]
+        third, _ = await robot.connect()
+        assert await closed(third, PATIENCE / 2) == b""
+        for reader, writer in silent:
+            await closed(reader)
+            writer.close()
+
+        # And where it is: whoever is refused in the middle of a request can read why; half a goodbye is one.
+        reader, writer = await robot.connect(ssl=trusted)
+        writer.write(b"GET /" + b"x" * 9000)
+        assert statuses(await closed(reader)) == [414]
+        writer.close()
+        reader, writer = await robot.connect(ssl=trusted)
+        writer.write(request("/later"))
+        await until(lambda: robot.interface.seen)
+        writer.close()
+        await robot.port.is_empty.wait()
 
 
 @runs

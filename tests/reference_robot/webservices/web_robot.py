@@ -4,6 +4,7 @@ import json
 import os
 import queue
 import socket
+import ssl
 import subprocess
 import sys
 import threading
@@ -128,7 +129,7 @@ def ros_environment() -> dict[str, str]:
 
 
 @contextmanager
-def running_robot(domain_id: int, *options: str) -> Iterator[Served]:
+def running_robot(domain_id: int, *options: str, verify: ssl.SSLContext | bool = True) -> Iterator[Served]:
     command = [sys.executable, "-m", "reference_robot", f"--domain-id={domain_id}", "--rest-port=0", "--soap-port=0"]
     with subprocess.Popen(
         [*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment()
@@ -138,7 +139,7 @@ def running_robot(domain_id: int, *options: str) -> Iterator[Served]:
             assert words, process.stderr.read()
             assert words[0] == "ready"
             told = dict(word.split("=", 1) for word in words[1:])
-            with httpx.Client(timeout=_PATIENCE) as client:
+            with httpx.Client(timeout=_PATIENCE, verify=verify) as client:
                 yield Served(told["rest"], told["soap"].removesuffix("?wsdl"), process, client)
         finally:
             process.terminate()

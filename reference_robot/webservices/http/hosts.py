@@ -1,0 +1,75 @@
+"""The names by which a robot is asked: what is not one of them is somebody's trick, or a mistake.
+
+DNS rebinding: a page of evil.example lets its name point to the robot, and the browser takes the robot for the page's
+own server. The Host field is what gives it away, for it still says evil.example. An address in its place is no trick:
+whoever is asked by an address is at that address.
+"""
+
+import ipaddress
+import re
+import socket
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Final
+
+ANY: Final = "*"
+
+# RFC 3986 3.2.2 and 3.2.3: a name, an IPv4 address or an IPv6 address in brackets, and a port.
+AUTHORITY: Final = re.compile(r"(?:(?P<name>[A-Za-z0-9._~-]+)|\[(?P<ipv6>[0-9A-Fa-f:.]+)\])(?::[0-9]*)?")
+_NAME: Final = re.compile(r"\.?[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*\.?")
+
+_LOCALHOST: Final = "localhost"
+
+
+class AllowedHosts:
+    """Tells whether the robot answers to a host: loopback's names, any address, and the given names.
+
+    Args:
+        names: Further names; ``.example.org`` stands for all names below example.org, ``*`` for all there are.
+    """
+
+    def __init__(self, names: Iterable[str] = ()) -> None:
+        allowed = {name.lower().rstrip(".") for name in names}
+        self._is_open = ANY in allowed
+        self._names = {name for name in allowed if not name.startswith(".")}
+        self._endings = (f".{_LOCALHOST}", *(name for name in allowed if name.startswith(".")))
+        self.allows = lru_cache(maxsize=256)(self._allows)
+
+    def _allows(self, authority: bytes) -> bool:
+        if self._is_open or not authority:  # HTTP/1.0 names none; browsers do not speak it
+            return True
+        told = AUTHORITY.fullmatch(authority.decode("latin-1"))
+        if told is None:
+            return False
+        if told["ipv6"] is not None or _is_address(told["name"]):
+            return True
+        name = told["name"].lower().rstrip(".")
+        return name == _LOCALHOST or name in self._names or name.endswith(self._endings)
+
+
+def is_host_pattern(text: str) -> bool:
+    """Tell whether a text is what ``AllowedHosts`` takes: a name, a domain with a dot before it, or an asterisk."""
+    return text == ANY or _NAME.fullmatch(text) is not None
+
+
+def own_names() -> list[str]:
+    """Return the names that this machine gives itself: its own, and that of multicast DNS (RFC 6762)."""
+    name = socket.gethostname()
+    return [name] if "." in name else [name, f"{name}.local"]
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether all addresses of a host are this machine's alone."""
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    except OSError:
+        return False  # whoever binds it says what is wrong
+    return all(ipaddress.ip_address(str(address[0])).is_loopback for *_, address in found)
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.IPv4Address(name)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,40 @@
+"""What proxies say of the request that they were sent: taken from those that are trusted, and from nobody else."""
+
+from collections.abc import Iterable
+from ipaddress import IPv4Network, IPv6Network, ip_address
+from typing import Any, Final
+
+from reference_robot.webservices.http.messages import Request
+
+_SCHEMES: Final = {b"http": "http", b"https": "https"}
+
+
+class TrustedProxies:
+    """The networks in which trusted proxies are."""
+
+    def __init__(self, networks: Iterable[IPv4Network | IPv6Network] = ()) -> None:
+        self._networks = tuple(networks)
+
+    def include(self, peer: Any) -> bool:
+        """Tell whether a socket's peer is one; ``peer`` is its address as ``getpeername`` gives it, or None."""
+        if not self._networks or not peer:
+            return False
+        address = ip_address(str(peer[0]).partition("%")[0])
+        # A socket of both families shows clients of IPv4 in addresses of IPv6 (RFC 4291 2.5.5.2).
+        address = getattr(address, "ipv4_mapped", None) or address
+        return any(address in network for network in self._networks)
+
+
+def take_forwarded(request: Request) -> None:
+    """Let a request that comes by a trusted proxy be what the proxy was asked: X-Forwarded-Proto and X-Forwarded-Host.
+
+    Of a list, the last member is taken: that is the word of the proxy itself, which adds to what it was sent.
+    """
+    host = _last(request.headers.get(b"x-forwarded-host"))
+    if host:
+        request.authority = host
+    request.scheme = _SCHEMES.get(_last(request.headers.get(b"x-forwarded-proto")).lower(), request.scheme)
+
+
+def _last(value: bytes | None) -> bytes:
+    return (value or b"").rpartition(b",")[2].strip()

@@ -1,0 +1,107 @@
+"""TLS: the certificate that a server shows, and connections until both sides have agreed."""
+
+import asyncio
+import contextlib
+import logging
+import socket
+import ssl
+from pathlib import Path
+from typing import Final
+
+from reference_robot.webservices.http.connection import HttpConnection
+from reference_robot.webservices.http.port import Port
+
+_LOGGER: Final = logging.getLogger(__name__)
+_SHUTDOWN: Final = 2.0  # seconds for the other side's goodbye
+_PAUSE: Final = 0.1  # seconds, where no more connections can be had
+
+
+class TlsFileError(ValueError):
+    """The certificate or its key cannot be used; the message names the file and says why."""
+
+
+class _EncryptedKeyError(Exception):
+    """The key asks for a password."""
+
+
+def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
+    """Return what a server needs for TLS 1.2 and 1.3.
+
+    Args:
+        certificate: PEM, the server's own first and then those that lead to an authority.
+        key: PEM, the private key of the first; not encrypted, for nobody is there to be asked for a password.
+
+    Raises:
+        TlsFileError: A file cannot be read or holds something else, or the two do not belong together.
+    """
+    for option, path in (("--tls-cert", certificate), ("--tls-key", key)):
+        try:
+            path.read_bytes()
+        except OSError as error:
+            raise TlsFileError(f"{option} {path} cannot be read: {error.strerror}") from error
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context.options |= ssl.OP_NO_RENEGOTIATION  # a client could make the robot compute for ever
+    context.set_alpn_protocols(["http/1.1"])
+    try:
+        # By itself first: the error of both together does not say which it was.
+        ssl.create_default_context().load_verify_locations(certificate)
+    except ssl.SSLError as error:
+        raise TlsFileError(f"--tls-cert {certificate} holds no certificate in PEM: {_reason(error)}") from error
+    try:
+        context.load_cert_chain(certificate, key, password=_refuse_password)
+    except _EncryptedKeyError as error:
+        raise TlsFileError(f"--tls-key {key} is encrypted; openssl pkey -in {key} writes it in the clear") from error
+    except ssl.SSLError as error:
+        why = _reason(error)
+        if "mismatch" in why:
+            raise TlsFileError(f"--tls-key {key} is not the key of --tls-cert {certificate}") from error
+        raise TlsFileError(f"--tls-key {key} holds no private key in PEM that can be used: {why}") from error
+    return context
+
+
+def _refuse_password() -> bytes:
+    raise _EncryptedKeyError
+
+
+def _reason(error: ssl.SSLError) -> str:
+    return (error.reason or str(error)).replace("_", " ").lower()
+
+
+async def accept(port: Port, listener: socket.socket, context: ssl.SSLContext) -> None:
+    """Take connections until it is cancelled; while both sides agree, they count among the port's already.
+
+    ``create_server(ssl=...)`` would do, if it told anybody of those that never get so far.
+    """
+    handshakes: set[asyncio.Task[None]] = set()
+    try:
+        while True:
+            try:
+                client, _ = await port.loop.sock_accept(listener)
+            except OSError as error:  # no descriptor is left, or the client has gone
+                _LOGGER.warning("cannot take a connection: %s", error)
+                await asyncio.sleep(_PAUSE)
+                continue
+            if not port.has_room_for(len(handshakes) + 1):
+                client.close()  # there is no way yet to say why
+                continue
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            handshake = port.loop.create_task(_agree(port, client, context))
+            handshakes.add(handshake)
+            handshake.add_done_callback(handshakes.discard)
+    finally:
+        listener.close()
+        for handshake in handshakes:
+            handshake.cancel()
+
+
+async def _agree(port: Port, client: socket.socket, context: ssl.SSLContext) -> None:
+    # What fails is no TLS, none that both speak, or none in time: the line is cut by then.
+    with contextlib.suppress(OSError):
+        await port.loop.connect_accepted_socket(
+            lambda: HttpConnection(port),
+            client,
+            ssl=context,
+            ssl_handshake_timeout=port.patience,
+            ssl_shutdown_timeout=_SHUTDOWN,
+        )
