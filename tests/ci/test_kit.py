@@ -1,0 +1,190 @@
+"""The action's and the template's own scripts against robots that are good, broken, absent, hanging: red but for good.
+
+The services themselves are not here. What they would do with the two files is done by hand: inputs go into the
+environment, then the script to bash.
+"""
+
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from conformance.selftest.mutants import MUTANTS
+from conformance.selftest.proxy import Proxy
+from conformance.selftest.robots import running
+from reports.formats.catalogue import FORMATS
+
+CI = Path(__file__).parents[2] / "ci"
+ACTION = yaml.safe_load((CI / "github" / "action.yml").read_text(encoding="utf-8"))
+TEMPLATE = yaml.safe_load((CI / "gitlab" / "roaas.yml").read_text(encoding="utf-8"))
+FILES = {"result.json", "certificate.html", *(one.file for one in FORMATS.values())}
+_LIMIT_S = 120
+
+
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory):
+    """A folder with the two programs that an installed suite has: of the code at hand."""
+    folder = tmp_path_factory.mktemp("runner") / "roaas" / "bin"
+    folder.mkdir(parents=True)
+    (folder / "roaas").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m roaas "$@"\n', encoding="utf-8")
+    (folder / "roaas-ci").symlink_to(CI / "certify.sh")
+    (folder / "roaas").chmod(0o755)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def good(session_domain_id):
+    with running("reference", session_domain_id) as robot:
+        yield robot
+
+
+@pytest.fixture
+def broken(good):
+    proxy = Proxy(good.rest, good.soap)
+    proxy.change = next(one for one in MUTANTS if one.catches == ("rest-formats/xml",)).make()
+    yield proxy.rest
+    proxy.close()
+
+
+@pytest.fixture
+def hanging():
+    """Take connections and say nothing."""
+    with socket.create_server(("127.0.0.1", 0), backlog=64) as server:
+        yield f"http://127.0.0.1:{server.getsockname()[1]}"
+
+
+@pytest.fixture
+def absent():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    return f"http://127.0.0.1:{port}"
+
+
+def bash(script, environment, folder):
+    command = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script]
+    return subprocess.run(
+        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=_LIMIT_S, check=False
+    )
+
+
+def on_github(programs, folder, **inputs):
+    """Run the step `certify` as a runner would: the inputs go into its environment, and its script to bash."""
+    step = next(one for one in ACTION["runs"]["steps"] if one.get("id") == "certify")
+    given = {name: str(one["default"]) for name, one in ACTION["inputs"].items()} | inputs
+    environment = {
+        name: re.sub(r"\${{ inputs\.([\w-]+) }}", lambda found: given[found[1]], value)
+        for name, value in step["env"].items()
+    }
+    assert "${{" not in str(environment)
+    around = {
+        "GITHUB_ACTIONS": "true",
+        "GITHUB_ACTION_PATH": str(CI / "github"),
+        "GITHUB_OUTPUT": str(folder / "output"),
+        "GITHUB_STEP_SUMMARY": str(folder / "summary"),
+        "RUNNER_TEMP": str(programs.parents[1]),
+    }
+    return bash(step["run"], {**os.environ, **around, **environment}, folder)
+
+
+def on_gitlab(programs, folder, **variables):
+    environment = {**os.environ, **TEMPLATE["variables"], **variables, "PATH": f"{programs}:{os.environ['PATH']}"}
+    return bash("\n".join(TEMPLATE["roaas"]["script"]), environment, folder)
+
+
+CLASS = {"classes": "rest-formats", "effort": "quick"}
+
+
+def test_a_good_robot_is_green_and_a_broken_one_red(programs, good, broken, tmp_path):
+    (tmp_path / "robot.toml").write_text('[claims]\nclasses = ["rest-formats"]\n', encoding="utf-8")
+    (tmp_path / "token").write_text("leave me", encoding="utf-8")
+    given = {"statement": "robot.toml", "effort": "quick", "allow-motion": "true", "token": "s3cret"}
+    done = on_github(programs, tmp_path, rest=good.rest, **given)
+    assert done.returncode == 0, done.stdout + done.stderr
+    out = tmp_path / "roaas-results"
+    assert {path.name for path in out.iterdir()} == FILES
+    assert json.loads((out / "badge.json").read_text(encoding="utf-8"))["color"] == "brightgreen"
+    assert "Conformant" in (tmp_path / "summary").read_text(encoding="utf-8")
+    assert "::error" not in done.stdout
+    assert not any("s3cret" in path.read_text(encoding="utf-8") for path in out.iterdir())
+
+    done = on_github(programs, tmp_path, rest=broken, **given)
+    assert done.returncode == 1
+    assert {path.name for path in out.iterdir()} == FILES
+    # What a robot says comes between the two lines that keep GitHub from taking it for a command.
+    stop, guard = re.search(r"^::stop-commands::(\w{32})$", done.stdout, re.MULTILINE), "::{}::"
+    judged, annotated = done.stdout.split(guard.format(stop[1]))
+    assert "not-conformant" in judged
+    assert re.search(r"^::error file=robot\.toml,line=2,title=rest-formats/xml", annotated, re.MULTILINE)
+    assert (tmp_path / "output").read_text(encoding="utf-8") == "exit-code=0\nexit-code=1\n"
+    assert "Not conformant" in (tmp_path / "summary").read_text(encoding="utf-8")
+
+
+def test_a_robot_that_is_absent_or_hangs_or_could_not_be_judged_is_red(programs, good, absent, hanging, tmp_path):
+    codes = {}
+    for name, rest, timeout in (("absent", absent, ""), ("hanging", hanging, "0.3"), ("unjudged", good.rest, "")):
+        (tmp_path / name).mkdir()
+        done = on_github(programs, tmp_path / name, rest=rest, timeout=timeout, **CLASS)
+        codes[name] = done.returncode
+        assert {path.name for path in (tmp_path / name / "roaas-results").iterdir()} == FILES
+        assert "::error " in done.stdout
+        assert "Inconclusive" in (tmp_path / name / "summary").read_text(encoding="utf-8")
+    assert codes == {"absent": 3, "hanging": 3, "unjudged": 4}
+
+
+def test_wrong_usage_is_red_and_no_old_result_is_taken_for_new(programs, absent, tmp_path):
+    out = tmp_path / "roaas-results"
+    out.mkdir()
+    for name in FILES:
+        (out / name).write_text("of an earlier run", encoding="utf-8")
+    done = on_github(programs, tmp_path, rest=absent, statement="$(touch injected).toml")
+    assert done.returncode == 2
+    assert not (FILES & {path.name for path in out.iterdir()})
+    assert not (tmp_path / "injected").exists()
+    assert "exit code 2" in (tmp_path / "summary").read_text(encoding="utf-8")
+    assert on_github(programs, tmp_path, rest=absent, **{"allow-motion": "yes"}).returncode == 2
+
+
+def test_gitlabs_job_is_red_and_leaves_what_it_promises(programs, absent, tmp_path):
+    done = on_gitlab(programs, tmp_path, ROAAS_REST=absent, ROAAS_CLASSES="rest-formats")
+    assert done.returncode == 3, done.stdout + done.stderr
+    artifacts = TEMPLATE["roaas"]["artifacts"]
+    for promised in (*artifacts["paths"], *artifacts["reports"].values()):
+        assert (tmp_path / promised.replace("$ROAAS_OUT", TEMPLATE["variables"]["ROAAS_OUT"])).exists()
+    assert artifacts["when"] == "always"
+    assert "::" not in done.stdout
+
+
+def test_inputs_reach_scripts_by_the_environment_alone():
+    scripts = [step["run"] for step in ACTION["runs"]["steps"] if "run" in step]
+    assert len(scripts) >= 2
+    assert not any("${{" in script for script in scripts)
+    assert "$[[" not in str(TEMPLATE)
+
+
+def test_what_others_wrote_is_pinned():
+    used = [step["uses"] for step in ACTION["runs"]["steps"] if "uses" in step]
+    assert all(re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", one) for one in used)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["check-jsonschema", "--builtin-schema", "vendor.github-actions", "github/action.yml"],
+        ["check-jsonschema", "--builtin-schema", "vendor.gitlab-ci", "gitlab/roaas.yml"],
+        ["zizmor", "--offline", "--no-progress", "github/action.yml"],
+        ["shellcheck", "certify.sh"],
+        ["hadolint", "../deploy/container/Containerfile.suite"],
+        ["hadolint", "../deploy/container/Containerfile.robot"],
+    ],
+    ids=lambda command: f"{command[0]} {command[-1]}",
+)
+def test_the_files_pass_the_fields_linters(command):
+    program = Path(sys.executable).with_name(command[0])
+    done = subprocess.run([program, *command[1:]], cwd=CI, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
