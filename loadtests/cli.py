@@ -136,6 +136,8 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     show_default=True,
     help="Seconds for each step and interface.",
 )
+@click.option("--end-to-end", is_flag=True, help="Also time deliveries until the application has them.")
+@click.option("--ros-domain-id", type=click.IntRange(0, 232), help="The robot's ROS domain, for --end-to-end.")
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
 @click.option("--token-file", metavar="FILE", help="Holds the robot's bearer token.")
 @click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")

@@ -22,11 +22,13 @@ from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.engine.liveness import Liveness
 from loadtests.engine.planning import duel_plan
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
+from loadtests.measuring.end_to_end import end_to_end
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
 from loadtests.measuring.metrics import Collector, serve
 from loadtests.measuring.preflight import preflight
 from loadtests.measuring.step_load import step_load
+from loadtests.probe.client import ProbeError
 from loadtests.result.document import compose
 from loadtests.result.files import write
 from loadtests.result.outcome import Outcome, RunAborted
@@ -133,10 +135,26 @@ class Run:
             self._tell_plan(plan, executor)
             self._carry_out(plan, executor)
             self.outcome.cpu_share = busiest(executor.members)
+            self._follow_deliveries()
             if settings.steps.rates and not self.outcome.interrupted and self.outcome.dead_at is None:
                 self.outcome.steps += step_load(
                     plan, executor, settings, lambda: self.outcome.interrupted, self._number, tell
                 )
+
+    def _follow_deliveries(self) -> None:
+        """Time deliveries until the application has them, where that was asked for."""
+        wanted, outcome = self.settings.end_to_end, self.outcome
+        if wanted is None or outcome.interrupted or outcome.dead_at is not None:
+            return
+        number = self.plan.operations.index("delivery")
+        ways = tuple(name for name in self.plan.interfaces if number in self.plan.offered(name, "wire"))
+        tell(f"end to end: {wanted.rounds} rounds over {', '.join(ways)} and ROS itself")
+        try:
+            outcome.journeys = end_to_end(
+                self.robots[0], wanted, ways, self.settings.load.seed, lambda: outcome.interrupted, tell
+            )
+        except ProbeError as error:
+            outcome.invalid.append(f"deliveries could not be followed to the application: {error}")
 
     def _executor(self) -> Executor:
         generator = self.settings.generator

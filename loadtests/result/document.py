@@ -12,7 +12,7 @@ from loadtests.measuring.environment import describe
 from loadtests.result.files import FORMAT
 from loadtests.schedule.arrivals import Schedule, arrivals_due
 from loadtests.schedule.plan import GAP_S, step_operation
-from loadtests.statistics import against, figures, steps, verdict
+from loadtests.statistics import against, end_to_end, figures, steps, verdict
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.third_way import other_ways
 
@@ -60,6 +60,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "comparisons": figures.comparisons(measured),
         "noise_floor": noise_floor,
         "other_ways": other_ways(measured),
+        **_end_to_end(outcome),
         **({"against": compared} if compared else {}),
         "time_series": figures.time_series(measured),
         "steps": outcome.steps,
@@ -96,6 +97,19 @@ def _against(outcome: Outcome, measured: figures.Measured, noise_floor: list[dic
     return {
         "robot": {"rest": other.rest, "publishers": other.publishers, "subscribers": other.subscribers}
     } | against.against(measured, noise_floor, settings.tolerance)
+
+
+def _end_to_end(outcome: Outcome) -> dict[str, Any]:
+    """The `end_to_end`, where deliveries were followed to the application."""
+    settings, journeys = outcome.settings.end_to_end, outcome.journeys
+    if settings is None or not journeys:
+        return {}
+    ways = end_to_end.ways(
+        {way: one.to_application_ns for way, one in journeys.items()},
+        {way: one.answer_ns for way, one in journeys.items()},
+        {way: len(one.errors) for way, one in journeys.items()},
+    )
+    return {"end_to_end": {"domain_id": settings.domain_id, "topic": outcome.robots[0].delivery_topic, "ways": ways}}
 
 
 def _code(

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from loadtests.clients.robot import Robot
     from loadtests.measuring.distributed_executor import Executor
+    from loadtests.measuring.end_to_end import Journeys
     from loadtests.settings.settings import Settings
 
 
@@ -35,6 +36,7 @@ class Outcome:
         elapsed_s: how much of the plan was carried out.
         cpu_share: the busiest worker's share of a core in the duel.
         steps: results of the stepped load.
+        journeys: deliveries from the request to the application, by way.
     """
 
     settings: Settings
@@ -49,3 +51,4 @@ class Outcome:
     elapsed_s: float = 0.0
     cpu_share: float | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
+    journeys: dict[str, Journeys] = field(default_factory=dict)

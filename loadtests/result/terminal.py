@@ -35,6 +35,7 @@ def summary(document: dict[str, Any]) -> str:
                 f"{entry['operation']} ({entry['client']}): {entry['interface']} takes {entry['ratio']:.3f}{between} "
                 f"times as long as REST at the median, {entry['minus_rest_ms']:+.3f} ms"
             )
+    lines += _end_to_end(document.get("end_to_end"))
     lines += _against(document.get("against"))
     for entry in document["knee"]:
         highest = entry["highest_rate"]
@@ -68,3 +69,18 @@ def _against(compared: dict[str, Any] | None) -> list[str]:
     told = {"slower": "slower", "not slower": "shown not to be slower", "unclear": "it cannot be told: measure longer"}
     tolerance = f"{compared['tolerance']:.3g}"
     return [*lines, f"against the other robot, tolerance {float(tolerance):.1%}: {told[compared['verdict']]}"]
+
+
+def _end_to_end(found: dict[str, Any] | None) -> list[str]:
+    """How long a delivery takes over each way until the application has it."""
+    lines = []
+    for entry in (found or {"ways": []})["ways"]:
+        times, lost = entry["to_application_ms"], entry["lost"] + entry["errors"]
+        answer = entry["answer_ms"]["p50"] if entry["answer_ms"] else None
+        answered = "" if answer is None else f", the answer after {answer:.3f} ms"
+        missing = f", {lost} never arrived" if lost else ""
+        lines.append(
+            f"{entry['interface']} to the application: {_ms(times['p50']).strip()} ms at the median, "
+            f"{_ms(times['p90']).strip()} at p90{answered}{missing}"
+        )
+    return lines

@@ -22,6 +22,7 @@ class CliOptions:
         endpoints: those that were given of the statement's [endpoints], which they override.
         rosbridge: its address.
         against: what is said of the other robot.
+        ros_domain_id: the robot's, which the statement may say as well.
         tolerance: by which share the robot may be slower than that.
     """
 
@@ -41,6 +42,8 @@ class CliOptions:
     thresholds: tuple[Threshold, ...] = ()
     rosbridge: str | None = None
     against: Statement | None = None
+    end_to_end: bool = False
+    ros_domain_id: int | None = None
     tolerance: float = TOLERANCE
     out: str = ""
     command: str = ""

@@ -67,6 +67,22 @@ class Output:
 
 
 @dataclass(frozen=True)
+class EndToEnd:
+    """The measurement from the request to the application.
+
+    Attributes:
+        domain_id: the robot's ROS domain.
+        rounds: how many deliveries over each way, where they take no longer than `longest_s`.
+        most_rate: the highest rate allowed.
+    """
+
+    domain_id: int
+    most_rate: float | None
+    longest_s: float
+    rounds: int = 100
+
+
+@dataclass(frozen=True)
 class Against:
     """The robot that the one under load is compared with.
 
@@ -87,6 +103,7 @@ class Settings:
         robot: addresses of the selected interfaces only; a SOAP address that only the WSDL knows is None.
         load: rate is None in the closed model.
         against: None where no other robot takes part.
+        end_to_end: None where it was not asked for.
     """
 
     robot: Robot
@@ -98,6 +115,7 @@ class Settings:
     output: Output
     thresholds: tuple[Threshold, ...]
     against: Against | None = None
+    end_to_end: EndToEnd | None = None
 
     def to_json(self) -> str:
         """For the process that measures."""

@@ -12,7 +12,7 @@ from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS, Load
-from loadtests.settings.settings import Against, Limits, Output, Selection, Settings, Steps
+from loadtests.settings.settings import Against, EndToEnd, Limits, Output, Selection, Settings, Steps
 
 if TYPE_CHECKING:
     from conformance.contract.statement import Endpoints, Statement
@@ -72,8 +72,23 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
         ),
         output=Output(options.out, options.command, statement.robot),
         thresholds=options.thresholds or statement.load.thresholds,
+        end_to_end=_end_to_end(options, statement, operations, duration_s),
     )
     return settings if options.against is None else _compared(settings, options.against, options.tolerance)
+
+
+def _end_to_end(
+    options: CliOptions, statement: Statement, operations: tuple[str, ...], duration_s: float
+) -> EndToEnd | None:
+    """What --end-to-end needs: deliveries, and the domain in which they arrive."""
+    if not options.end_to_end:
+        return None
+    domain_id = statement.ros.domain_id if options.ros_domain_id is None else options.ros_domain_id
+    if domain_id is None:
+        raise SettingsError("--end-to-end needs the robot's ROS domain: --ros-domain-id or [ros] domain_id")
+    if "delivery" not in operations:
+        raise SettingsError("--end-to-end follows deliveries, which make the robot drive: say --allow-motion")
+    return EndToEnd(domain_id, _ceiling(statement, operations)[0], duration_s)
 
 
 def _shared(other: Endpoints, interfaces: tuple[str, ...]) -> tuple[str, ...]:

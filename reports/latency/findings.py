@@ -78,7 +78,14 @@ def headline(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Se
 
 def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[str]:
     """Further findings, a sentence each: noise floor, stalls, knee, failures."""
-    return [*_noise(result), *_other_ways(result), *_stalled(result), *_knees(result), *_failed(result, series)]
+    return [
+        *_noise(result),
+        *_other_ways(result),
+        *_followed(result),
+        *_stalled(result),
+        *_knees(result),
+        *_failed(result, series),
+    ]
 
 
 def _leading(result: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -146,6 +153,19 @@ def _other_ways(result: Mapping[str, Any]) -> list[str]:
         for way in result.get("other_ways", [])
         if way["quantile"] == "p50" and way["ci95"]
     ]
+
+
+def _followed(result: Mapping[str, Any]) -> list[str]:
+    """How long a delivery takes over each way until the application has it."""
+    ways = result.get("end_to_end", {}).get("ways", [])
+    told = [
+        f"{ms(way['to_application_ms']['p50'])} ms over {way['interface'].upper()}"
+        for way in ways
+        if way["to_application_ms"]["p50"] is not None
+    ]
+    lost = sum(way["lost"] for way in ways)
+    missing = f" {lost:,} answered well never arrived." if lost else ""
+    return [f"The application has a delivery after {', '.join(told)} at the median.{missing}"] if told else []
 
 
 def _stalled(result: Mapping[str, Any]) -> list[str]:

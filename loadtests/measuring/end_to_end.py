@@ -1,0 +1,166 @@
+"""From the request to the message in the application: what an operator waits for is not the 204.
+
+Deliveries are sent one at a time over every way that there is, in rounds whose order is drawn by lot, and a probe in
+the application's place says when each arrived. Its clock is the generator's: both run on one machine, wherever the
+robot is. Publishing with rclpy, without any web service, is the floor.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import gevent
+import numpy as np
+
+from conformance.contract.delivery import COURIER, EXAMPLE, MESSAGE_FIELDS
+from loadtests.clients.endpoint import Endpoint
+from loadtests.clients.failures import CallError, answer_error
+from loadtests.clients.payloads import BUILDERS
+from loadtests.clients.rosbridge import bridge_requests
+from loadtests.clients.wire import now_ns
+from loadtests.probe.client import Probe
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from loadtests.clients.payloads import Values
+    from loadtests.clients.robot import Robot
+    from loadtests.clients.rosbridge import Bridge
+    from loadtests.clients.wire import Connection, Request
+    from loadtests.settings.settings import EndToEnd
+
+#: What publishes without a web service.
+NATIVE = "ros"
+_DELIVERY = "delivery"
+_NS = 1_000_000_000
+_WARMING = 5  # rounds that open connections, and are not counted
+_LOST_S = 2.0  # what has not arrived by then is lost
+_FEWEST = 20  # rounds, however long they take
+_MOST_RATE = 50.0  # deliveries per second
+
+
+@dataclass
+class Journeys:
+    """The deliveries over one way that were counted, in their rounds.
+
+    Attributes:
+        to_application_ns: from the request's start to the message in the application; None where it never came.
+        answer_ns: from the request's start to its answer; None where the way has none.
+        errors: of requests that brought no good answer.
+    """
+
+    to_application_ns: list[int | None] = field(default_factory=list)
+    answer_ns: list[int | None] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+
+
+class Courier:
+    """Sends deliveries over each way, one at a time."""
+
+    def __init__(self, robot: Robot, ways: tuple[str, ...], publisher: Probe) -> None:
+        self._robot = robot
+        self._publisher = publisher
+        self._connections: dict[str, Connection | Bridge] = {
+            way: robot.bridge() if way == "rosbridge" else robot.http(way, _DELIVERY) for way in ways if way != NATIVE
+        }
+
+    def send(self, way: str, values: Values) -> tuple[int, int | None]:
+        """Send a delivery; returns when that began, and when its answer was there.
+
+        Raises:
+            CallError: there is no good answer.
+            ProbeError: the publisher has ended.
+        """
+        if way == NATIVE:
+            return self._publisher.publish(in_order(values)), None
+        request = self._request(way, values)
+        began = now_ns()
+        answer = self._connections[way].call(request)
+        failure = answer_error(answer.status, None, answer.body, request.expects)
+        if failure is not None:
+            raise failure
+        return began, answer.received_ns
+
+    def _request(self, way: str, values: Values) -> Request:
+        if way == "rosbridge":
+            return bridge_requests([values], self._robot.delivery_topic)[0]
+        endpoint = Endpoint.parse(self._robot.address(way, _DELIVERY) or "")
+        return BUILDERS[way](endpoint, _DELIVERY, values, self._robot.token)
+
+    def close(self) -> None:
+        """Close the connections."""
+        for connection in self._connections.values():
+            connection.close()
+
+
+def in_order(values: Values) -> tuple[float, ...]:
+    """A delivery's values in the order of the ROS message."""
+    return tuple(float(values[name]) for name in MESSAGE_FIELDS)
+
+
+def end_to_end(
+    robot: Robot,
+    settings: EndToEnd,
+    ways: tuple[str, ...],
+    seed: int,
+    stopped: Callable[[], bool],
+    tell: Callable[[str], None],
+) -> dict[str, Journeys]:
+    """Measure every way, the native one too; returns their journeys.
+
+    Raises:
+        ProbeError: there is no ROS here, or nobody publishes deliveries in the domain.
+    """
+    with ExitStack() as stack:
+        listener = Probe("listen", settings.domain_id, robot.delivery_topic)
+        stack.callback(listener.close)
+        listener.await_ready()  # before there is a publisher of ours, which it would take for the robot's
+        publisher = Probe("publish", settings.domain_id, robot.delivery_topic)
+        stack.callback(publisher.close)
+        publisher.await_ready()
+        courier = Courier(robot, ways, publisher)
+        stack.callback(courier.close)
+        return _rounds(courier, listener, (*ways, NATIVE), settings, seed, stopped, tell)
+
+
+def _rounds(
+    courier: Courier,
+    listener: Probe,
+    ways: tuple[str, ...],
+    settings: EndToEnd,
+    seed: int,
+    stopped: Callable[[], bool],
+    tell: Callable[[str], None],
+) -> dict[str, Journeys]:
+    lot = np.random.default_rng([seed, 8])
+    found = {way: Journeys() for way in ways}
+    pause_s = 1 / min(_MOST_RATE, settings.most_rate or _MOST_RATE)
+    began_ns = told_ns = now_ns()
+    for number in range(_WARMING + settings.rounds):
+        for way in lot.permutation(ways).tolist():
+            if stopped() or (number > _WARMING + _FEWEST and now_ns() - began_ns > settings.longest_s * _NS):
+                return found
+            values = {name: value + float(lot.uniform(-5, 5)) for name, value in EXAMPLE.items()}
+            _journey(courier, listener, way, values | {"message_code": COURIER}, found[way])
+            gevent.sleep(pause_s)
+        if number == _WARMING - 1:  # connections are open and DDS has matched by now
+            found = {way: Journeys() for way in ways}
+        if now_ns() - told_ns > _NS:
+            told_ns = now_ns()
+            tell(f"end to end: round {max(0, number + 1 - _WARMING)} of {settings.rounds}")
+    return found
+
+
+def _journey(courier: Courier, listener: Probe, way: str, values: Values, journeys: Journeys) -> None:
+    try:
+        began, answered = courier.send(way, values)
+    except CallError as error:
+        journeys.errors.append(str(error))
+        journeys.to_application_ns.append(None)
+        journeys.answer_ns.append(None)
+        return
+    arrived = listener.arrival_ns(in_order(values), _LOST_S)
+    journeys.to_application_ns.append(None if arrived is None else arrived - began)
+    journeys.answer_ns.append(None if answered is None else answered - began)

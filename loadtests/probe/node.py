@@ -1,0 +1,99 @@
+"""The probe's ROS node: hears deliveries as the application does, or publishes them without any web service."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import rclpy
+from mybot_delivery_app.msg import DeliveryRequestMsg
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from conformance.contract.delivery import MESSAGE_FIELDS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_DISCOVERY_S = 6.0
+_STEP_S = 0.02
+_DEPTH = 1000
+
+
+class DeliveryNode:
+    """A node on the topic of deliveries.
+
+    Args:
+        domain_id: the robot's ROS domain.
+        topic: full name.
+        say: told of each delivery that comes, on the executor's thread.
+    """
+
+    def __init__(self, domain_id: int, topic: str, say: Callable[[dict[str, Any]], None]) -> None:
+        self._topic = topic
+        self._say = say
+        self._publisher: Any = None
+        self._context = Context()
+        rclpy.init(args=[], context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node("roaas_load", context=self._context, start_parameter_services=False, enable_rosout=False)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name="ros", daemon=True)
+        self._thread.start()
+
+    def listen(self) -> str | None:
+        """Take the application's place, once somebody publishes deliveries; returns the problem, if there is one."""
+        if not self._found(lambda: self._node.count_publishers(self._topic)):
+            return f"nobody publishes {self._topic} in ROS domain {self._context.get_domain_id()}"
+        publishers = self._node.get_publishers_info_by_topic(self._topic)
+        best_effort = any(one.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for one in publishers)
+        reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
+        self._node.create_subscription(
+            DeliveryRequestMsg, self._topic, self._came, QoSProfile(depth=_DEPTH, reliability=reliability)
+        )
+        return None
+
+    def publish_to(self) -> str | None:
+        """Become a publisher, once somebody listens; returns the problem, if there is one."""
+        self._publisher = self._node.create_publisher(DeliveryRequestMsg, self._topic, QoSProfile(depth=_DEPTH))
+        if not self._found(self._publisher.get_subscription_count):
+            return f"nobody listens to {self._topic} in ROS domain {self._context.get_domain_id()}"
+        return None
+
+    def publish(self, values: list[str]) -> int:
+        """Publish a delivery; returns when that began."""
+        code, *places = (float.fromhex(value) for value in values)
+        message = DeliveryRequestMsg(**dict(zip(MESSAGE_FIELDS, (int(code), *places), strict=True)))
+        began = time.monotonic_ns()
+        self._publisher.publish(message)
+        return began
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._thread.join(2)
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def _came(self, message: Any) -> None:
+        at = time.monotonic_ns()
+        self._say({"at_ns": at, "values": [float(getattr(message, name)).hex() for name in MESSAGE_FIELDS]})
+
+    @staticmethod
+    def _found(count: Callable[[], int]) -> bool:
+        until = time.monotonic() + _DISCOVERY_S
+        while not count():
+            if time.monotonic() > until:
+                return False
+            time.sleep(_STEP_S)
+        return True
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except (ExternalShutdownException, ShutdownException):
+            return
