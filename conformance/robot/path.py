@@ -31,6 +31,10 @@ _OFF_TURN: Final = 0.06
 # A window's share of the way, and what the noise at its ends comes to on the whole way.
 _WINDOW: Final = 0.25
 _NOISES: Final = 8.0
+# Between readings that are so far apart, and so many times as far as others, nobody knows what the robot did, s: an
+# answer was held up, and a velocity may have ended in the meantime and begun again.
+_HELD_UP_S: Final = 0.5
+_HELD_UP_TIMES: Final = 3.0
 
 
 class _Sum(NamedTuple):
@@ -123,10 +127,22 @@ def judge_path(judge: Judge, trace: Sequence[Odometry], measured: Sequence[Veloc
     """
     if len(trace) < _FEWEST:
         return
+    unbroken = _longest_unbroken(trace)
+    trace, measured = trace[unbroken], measured[unbroken]
+    if len(trace) < _FEWEST:
+        return
     sources = ([one.velocity for one in trace], measured)
     sums = [_summed(trace, source, by_stamp=by_stamp) for source in sources for by_stamp in (True, False)]
     _judge_way(judge, [one for one in sums if one.each[-1].length >= _SHORTEST], noise)
     _judge_turn(judge, [one for one in sums if one.each[-1].turned >= _LEAST_TURN], noise)
+
+
+def _longest_unbroken(trace: Sequence[Odometry]) -> slice:
+    """The longest part of the readings in which none is held up."""
+    steps = [two.sent - one.sent for one, two in itertools.pairwise(trace)]
+    most = max(_HELD_UP_S, _HELD_UP_TIMES * median(steps))
+    ends = [0, *(index for index, step in enumerate(steps, 1) if step > most), len(trace)]
+    return max((slice(one, two) for one, two in itertools.pairwise(ends)), key=lambda part: part.stop - part.start)
 
 
 def _judge_way(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:

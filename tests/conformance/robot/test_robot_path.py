@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -57,6 +58,21 @@ def test_a_robot_that_does_what_its_velocity_says_is_not_refuted(v, w):
 )
 def test_a_pose_that_moves_otherwise_is_refuted(change, v, w, found):
     assert found in refuted(v, w, change)
+
+
+def test_what_nobody_saw_is_not_judged():
+    """A robot that stood still while its answers were held up for two seconds, and drove on."""
+    first, measured = drive(0.5, 0.5, _START)
+    gap = 2.0
+    then, more = drive(0.5, 0.5, first[-1].pose)
+    late = [
+        replace(one, sent=one.sent + 1 + gap, received=one.received + 1 + gap, stamp=one.stamp + 1 + gap)
+        for one in then
+    ]
+    judge = Judge(_IDS)
+    judge_path(judge, first + late, measured + more, Noise())
+    assert judge.evidence["rest-resources/pose-motion"].cases
+    assert not judge.refuted()
 
 
 def test_a_robot_that_did_not_move_is_not_judged():
