@@ -5,12 +5,15 @@ robot by all the same (contract.md, the statement): the reference robot's limits
 follow.
 """
 
-from typing import Annotated
+from typing import Annotated, Final
 
 import msgspec
 from msgspec import Meta
 
 from conformance.contract.toml_file import NotNegative, Positive
+
+#: Octets of content that every robot takes, over REST and over SOAP (contract.md#sizes).
+TAKEN_OCTETS: Final = 64 * 1024
 
 
 class Noise(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -84,8 +84,7 @@ def certify(
     if run.interrupted:
         run.aborted = "the run was interrupted"
         remarks.append("The run was interrupted; what follows is what was judged until then.")
-    if run.effort.speed.remark:
-        remarks.append(run.effort.speed.remark)
+    remarks += run.remarks
     seen = draw_verdicts(run)
     if run.requirement_set is not None:
         seen = score(seen, run.requirement_set.requirements, f"requirement set {run.requirement_set.name}")

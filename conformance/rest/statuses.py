@@ -2,11 +2,10 @@
 
 from http import HTTPStatus
 
+from conformance.contract.limits import TAKEN_OCTETS
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered
 from conformance.verdict.evidence import Judge
 
-#: Octets of content that every robot takes (contract, fine print).
-TAKEN = 64 * 1024
 # These refuse the request for another reason than its content.
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
 
@@ -27,7 +26,7 @@ def is_cut_off(attempt: Attempt) -> bool:
 
     A gateway in front of it, which finds it closed, answers 502 in its place (RFC 9110 15.6.3).
     """
-    if len(attempt.request.body) <= TAKEN:
+    if len(attempt.request.body) <= TAKEN_OCTETS:
         return False
     if isinstance(attempt, Unanswered):
         return attempt.kind is NoAnswer.CLOSED

@@ -131,7 +131,8 @@ class Observer(Listener):
             "an orientation of unit length within 1e-3",
             found=f"length {length:.6g}",
         )
-        now = time.monotonic()
+        # Of several clients' answers one is told after another, when all have come.
+        now = exchange.response.received_s or time.monotonic()
         sent = now - elapsed_ms / 1000
         stamp = (int(odometry["header"]["stamp"]["sec"]), int(odometry["header"]["stamp"]["nanosec"]))
         # Two answers that crossed on their way say nothing of order.
@@ -157,7 +158,7 @@ class Observer(Listener):
             )
         self._clock.take(now - elapsed_ms / 2000, stamp[0] + stamp[1] / 1e9)
         self._last_stamp = max(stamp, self._last_stamp) if self._last_stamp else stamp
-        self._last_received = now
+        self._last_received = max(self._last_received, now)
 
     def _limits(self, samples: _Samples, twist: Any, exchange: Exchange) -> None:
         """The measured speed is within the declared limits at any time, also on the robot's own missions."""

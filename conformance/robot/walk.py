@@ -9,6 +9,8 @@ from conformance.robot.drive import Drive
 from conformance.robot.robot import Robot
 from conformance.transport.exchange import NoAnswerError
 
+_TIME_IS_UP = "the time is up"
+
 
 class Walk:
     """What all walks of one check share.
@@ -18,6 +20,7 @@ class Walk:
         drive: its velocity.
         ended: why no further step is made: a requirement was refuted, the time is up, the robot is busy.
         unreachable: the request that was not answered, if that ended it.
+        left_out: how many steps were not made because the time was up.
     """
 
     def __init__(self, robot: Robot, budget_s: float) -> None:
@@ -25,14 +28,15 @@ class Walk:
         self.drive = Drive(robot)
         self.ended = ""
         self.unreachable: NoAnswerError | None = None
+        self.left_out = 0
         self._until = time.monotonic() + budget_s
 
     def step(self, act: Callable[[], bool]) -> None:
         """Make one step, unless the walk has ended; ``act`` tells whether all was well."""
+        if not self.ended and time.monotonic() > self._until:
+            self.ended = _TIME_IS_UP
         if self.ended:
-            return
-        if time.monotonic() > self._until:
-            self.ended = "the time is up"
+            self.left_out += self.ended == _TIME_IS_UP
             return
         try:
             if not act():

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
 
 
+def padded(document: bytes, octets: int) -> bytes:
+    """A document of so many octets: blanks before its last end tag are no part of what it says."""
+    end = document.rindex(b"</")
+    return document[:end] + b" " * (octets - len(document)) + document[end:]
+
+
 def ordinary(element: Element, *, optional: bool = False) -> Node:
     """One valid message with ordinary values, with optional elements or without.
 

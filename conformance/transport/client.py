@@ -13,7 +13,7 @@ import httpcore
 
 from conformance.transport.deadlines import MAX_ANSWER, DeadlineBackend, set_deadline, tls_context
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, NoAnswerError, Request, Response, Unanswered
-from conformance.transport.pace import Pace, time_for
+from conformance.transport.pace import Pace, time_to_arrive
 
 Headers = tuple[tuple[str, str], ...]
 # An endpoint that has let this many deadlines pass within this time, s, is not asked until that is over: a hang costs
@@ -134,13 +134,14 @@ class HttpClient:
         if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
             problem = f"not asked: {endpoint} has not answered {_HANGS} times"
             raise NoAnswerError(Unanswered(request, problem, NoAnswer.CIRCUIT_OPEN))
-        deadline = (timeout_s or self.connection.timeout_s) + time_for(len(body))
+        deadline = timeout_s or self.connection.timeout_s
+        started = time.monotonic()
         try:
             response = self._exchange(method, path, sent, body, deadline, fresh=fresh)
         except _SilenceError as none:
             if none.kind is NoAnswer.TIMEOUT:
                 self._hangs[endpoint].append(time.monotonic())
-                self.connection.pace.took(deadline, len(body))
+                self.connection.pace.took(time.monotonic() - started, len(body))
             unanswered = Unanswered(request, str(none), none.kind)
             for listener in self.connection.listeners:
                 listener.unanswered(unanswered)
@@ -178,7 +179,7 @@ class HttpClient:
         opened: list[str] = []
         for attempt in (1, 2):
             self.connection.take_slot()
-            set_deadline(deadline)
+            set_deadline(deadline, len(body))
             opened.clear()
             started = time.perf_counter()
             pool = self._new_pool() if fresh or attempt > 1 else self._pool
@@ -190,7 +191,8 @@ class HttpClient:
                         headers=request_headers,
                         content=body,
                         extensions={
-                            "timeout": dict.fromkeys(("connect", "read", "write", "pool"), deadline),
+                            # A read ends at the deadline of the exchange.
+                            "timeout": dict.fromkeys(("connect", "write", "pool"), deadline),
                             "trace": lambda event, _info: opened.append(event) if "connect_tcp" in event else None,
                         },
                     )
@@ -203,9 +205,10 @@ class HttpClient:
                     content,
                     (time.perf_counter() - started) * 1000,
                     answer.extensions.get("http_version", b"HTTP/1.1").decode("latin-1"),
+                    time.monotonic(),
                 )
             except Exception as error:
-                none = _no_answer(error, deadline)
+                none = _no_answer(error, deadline + time_to_arrive(len(body)))
                 if none.kind is NoAnswer.CLOSED and not opened and attempt == 1 and not self._drops_requests():
                     continue
                 raise none from error

@@ -13,16 +13,23 @@ from typing import Any
 
 import httpcore
 
-from conformance.transport.pace import time_for
+from conformance.transport.pace import time_for, time_to_arrive
 
 # An answer longer than this is no answer to any request of the contract.
 MAX_ANSWER = 32 * 1024 * 1024
+# Octets that are handed to the network at once.
+_PIECE = 256 * 1024
 _clock = threading.local()
 
 
-def set_deadline(seconds: float) -> None:
-    """Give the exchange that this thread starts now ``seconds`` until its last octet, and more for each that comes."""
-    _clock.at = time.monotonic() + seconds
+def set_deadline(seconds: float, octets: int = 0) -> None:
+    """Give the exchange that this thread starts now ``seconds`` until its last octet, and more for each that comes.
+
+    And for the ``octets`` of content that go out: as long as they do. When they have gone, or none does for so many
+    seconds, there is nothing to give more time for.
+    """
+    _clock.at = time.monotonic() + seconds + time_for(octets)
+    _clock.seconds, _clock.unsent, _clock.octets = seconds, octets, octets
 
 
 def _left(timeout: float | None, error: type[Exception]) -> float:
@@ -44,7 +51,11 @@ class _DeadlineStream(httpcore.NetworkStream):
         return octets
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
-        self._stream.write(buffer, _left(timeout, httpcore.WriteTimeout))
+        for start in range(0, len(buffer), _PIECE):
+            self._stream.write(buffer[start : start + _PIECE], _left(timeout, httpcore.WriteTimeout))
+        _clock.unsent = getattr(_clock, "unsent", 0) - len(buffer)
+        if _clock.unsent <= 0 and getattr(_clock, "octets", 0):
+            _clock.at = min(_clock.at, time.monotonic() + _clock.seconds + time_to_arrive(_clock.octets))
 
     def close(self) -> None:
         self._stream.close()

@@ -3,7 +3,7 @@
 import base64
 import gzip
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 _CURL_PLAIN_LIMIT = 4000
@@ -90,6 +90,7 @@ class Response:
         body: octets, after transfer coding and before content coding.
         elapsed_ms: from the first octet sent to the last one received.
         http_version: ``HTTP/1.1`` or ``HTTP/1.0``.
+        received_s: when its last octet came, s on the monotonic clock; 0 where nobody looked.
     """
 
     status: int
@@ -97,6 +98,7 @@ class Response:
     body: bytes
     elapsed_ms: float
     http_version: str = "HTTP/1.1"
+    received_s: float = field(default=0.0, compare=False)
 
     def header(self, name: str) -> str | None:
         """The value of a field, several joined by commas (RFC 9110 5.3); None where there is none."""

@@ -5,6 +5,8 @@ import time
 
 # A link that carries fewer octets a second is none; so much longer may an exchange take, octet by octet.
 _SLOWEST_OCTETS_PER_S = 256 * 1024
+# Of what has been handed to the network, so much may still be under way: buffers on both sides and between, octets.
+_UNDER_WAY = 1024 * 1024
 # An answer is late when it takes twice the usual time and this much more, s: a segment that was lost and sent again.
 _LATE_S = 0.1
 # A robot that is always late does not get all the time in the world, s.
@@ -14,6 +16,11 @@ _MOST_GIVEN_BACK_S = 5.0
 def time_for(octets: int) -> float:
     """How long so many octets may take on their way, s: for so much longer no answer is overdue."""
     return octets / _SLOWEST_OCTETS_PER_S
+
+
+def time_to_arrive(octets: int) -> float:
+    """How long the last of so many octets may take on their way, once all of them have been handed over, s."""
+    return time_for(min(octets, _UNDER_WAY))
 
 
 class Pace:

@@ -23,12 +23,20 @@ if TYPE_CHECKING:
 
 
 class Explorer:
-    """Runs properties with cases that depend on nothing but the run's seed and the check's name."""
+    """Runs properties with cases that depend on nothing but the run's seed and the check's name.
 
-    def __init__(self, run_seed: int, name: str, effort: Effort) -> None:
+    Args:
+        run_seed: seed of the run.
+        name: of the check.
+        effort: how much is tried, and for how long.
+        cut_short: takes down, by check, how many cases were made for which no time was left.
+    """
+
+    def __init__(self, run_seed: int, name: str, effort: Effort, cut_short: dict[str, int] | None = None) -> None:
         self._run_seed = run_seed
         self._name = name
         self._effort = effort
+        self._cut_short = {} if cut_short is None else cut_short
         self._count = 0
 
     def __call__(self, strategy: SearchStrategy[Any], try_case: Callable[[Any], None], *, cases: int) -> None:
@@ -44,14 +52,23 @@ class Explorer:
         """
         until = time.monotonic() + self._effort.budget_s
         silence: list[NoAnswerError] = []
+        refuted: list[bool] = []
 
         def bounded(value: Any) -> None:
-            if time.monotonic() > until or silence:
+            if silence:
+                return
+            if time.monotonic() > until:
+                # After a failure, what is left are attempts to make it smaller, and no cases.
+                if not refuted:
+                    self.left_out(1)
                 return
             try:
                 try_case(value)
             except NoAnswerError as none:
                 silence.append(none)
+            except RefutedError:
+                refuted.append(True)
+                raise
 
         prop = seed(self._next_seed())(self._settings(cases)(given(strategy)(bounded)))
         _swallow_refuted(prop)
@@ -69,6 +86,11 @@ class Explorer:
         # A factory that may be a class, which is not to carry this walk's seed to the next one.
         seeded: Any = seed(self._next_seed())(partial(factory))
         _swallow_refuted(lambda: run_state_machine_as_test(seeded, settings=chosen))
+
+    def left_out(self, cases: int) -> None:
+        """Take down that cases which were made were not tried for want of time."""
+        if cases:
+            self._cut_short[self._name] = self._cut_short.get(self._name, 0) + cases
 
     def _next_seed(self) -> int:
         self._count += 1

@@ -59,6 +59,7 @@ class Run:
         aborted: why the robot cannot be asked any more, or empty.
         interrupted: whether somebody broke the run off.
         unreachable: why an interface was not reached at the start.
+        cut_short: by check, how many of the cases that were made for it were not tried for want of time.
     """
 
     statement: Statement = field(default_factory=Statement)
@@ -73,9 +74,22 @@ class Run:
     aborted: str = ""
     interrupted: bool = False
     unreachable: dict[Interface, str] = field(default_factory=dict)
+    cut_short: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.judge = Judge(set(self.contract.ledger))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader has to know of how much was tried: what was left out because answers, or cases, took long."""
+        found = [self.effort.speed.remark] if self.effort.speed.remark else []
+        if self.cut_short:
+            checks = ", ".join(f"{name} ({count} cases)" for name, count in sorted(self.cut_short.items()))
+            found.append(
+                f"For want of time ({self.effort.budget_s:g} s for each exploration at {self.effort.name} effort), "
+                f"cases that were made were not tried: {checks}."
+            )
+        return tuple(found)
 
     @property
     def undeclared(self) -> dict[str, str]:

@@ -4,12 +4,13 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from conformance.contract.limits import TAKEN_OCTETS
 from conformance.documents.writing import json_text
 from conformance.rest.applicable import answered, applicable_operations
 from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.interface import RestInterface
 from conformance.rest.number_forms import at_integer_ends, with_numbers
-from conformance.rest.statuses import TAKEN, is_cut_off, is_taken, judge_status
+from conformance.rest.statuses import is_cut_off, is_taken, judge_status
 from conformance.robot.stopping import stop_robot
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
@@ -90,7 +91,7 @@ def test_sizes(api: RestInterface, judge: Judge) -> None:
     """64 KiB are taken; more than 10 MiB are answered 413, or the connection is closed."""
     judge.at_risk = ("http/content-too-large",)
     for call in _valid(api, judge, ("http/content-too-large",)):
-        padded = call.carrying(call.body[:1] + b" " * (TAKEN - len(call.body)) + call.body[1:])
+        padded = call.carrying(call.body[:1] + b" " * (TAKEN_OCTETS - len(call.body)) + call.body[1:])
         exchange = padded.send(api)
         judge.check("http/content-too-large", is_taken(exchange), exchange, "a body of 64 KiB taken")
         huge = call.carrying(call.body[:1] + b" " * (_TOO_LARGE - len(call.body)) + call.body[1:])
@@ -125,8 +126,14 @@ def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple
 def test_chunked_content(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Content in chunks of one octet, of a few, and of all is what it is in one piece; also 64 KiB of it."""
     for call in _valid(api, judge, ("http/chunked",)):
-        large = call.body[:1] + b" " * (TAKEN - len(call.body)) + call.body[1:]
-        for body, size in ((call.body, 1), (call.body, 7), (call.body, len(call.body)), (large, 1000), (large, TAKEN)):
+        large = call.body[:1] + b" " * (TAKEN_OCTETS - len(call.body)) + call.body[1:]
+        for body, size in (
+            (call.body, 1),
+            (call.body, 7),
+            (call.body, len(call.body)),
+            (large, 1000),
+            (large, TAKEN_OCTETS),
+        ):
             fields = (f"Content-Type: {call.media_type}", "Transfer-Encoding: chunked")
             octets = raw.head(rest, call.operation.method, call.path, *fields) + raw.chunked(body, size)
             attempt, _ = raw.read_one(rest, octets, raw.talk(rest, octets, answers=1), call.operation.method)

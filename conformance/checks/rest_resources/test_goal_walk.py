@@ -27,5 +27,6 @@ def test_goal_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
     walk = Walk(robot, 0.4 * effort.budget_s)
     poses = choose_goals(walk.robot, 1.5, 2)
     explore.machine(lambda: GoalMachine(walk, poses), cases=20, steps=effort.cases(12))
+    explore.left_out(walk.left_out)
     if walk.unreachable:
         raise walk.unreachable

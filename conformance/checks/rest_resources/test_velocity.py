@@ -27,6 +27,7 @@ def test_velocity_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
     make_room(robot)
     walk = Walk(robot, 0.8 * effort.budget_s)
     explore.machine(lambda: VelocityMachine(walk), cases=10, steps=effort.cases(12))
+    explore.left_out(walk.left_out)
     walk.drive.judge_motion()
     if walk.unreachable:
         raise walk.unreachable

@@ -163,3 +163,25 @@ def test_media_types(soap: SoapServices, judge: Judge, effort: Effort) -> None:
         for media_type in types * repetitions(effort, 3):
             answer = send(service, body, content_type=media_type)
             judge_answer(judge, "soap-basic-profile/R1115", answer.status == 415, answer, f"415 for {media_type}")
+
+
+@pytest.mark.requirement("soap-basic-profile/media-type-case")
+def test_case_of_media_types(soap: SoapServices, judge: Judge) -> None:
+    """text/xml is the same in other letters."""
+    for service in callable_services(soap, "soap-basic-profile/media-type-case"):
+        good = quiet_example(service)
+        if good is None:
+            judge.note(
+                "soap-basic-profile/media-type-case", f"the {service.name} service took none of the messages tried"
+            )
+            continue
+        body = envelope([good[1]]).written()
+        for media_type in ("Text/XML; charset=utf-8", "TEXT/XML; CHARSET=UTF-8"):
+            answer = send(service, body, content_type=media_type)
+            judge_answer(
+                judge,
+                "soap-basic-profile/media-type-case",
+                answer.accepted,
+                answer,
+                f"2xx for Content-Type: {media_type}",
+            )

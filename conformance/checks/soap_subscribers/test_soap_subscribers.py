@@ -6,15 +6,20 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from conformance.contract.limits import TAKEN_OCTETS
 from conformance.documents.xml import text_of
 from conformance.documents.xml_names import clark, local
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.robot import delivery_messages
-from conformance.robot.soap_services import declared_return
+from conformance.robot.soap_services import declared_return, outgoing
 from conformance.soap import content
-from conformance.soap.calls import SoapResponse, call, judge_answer
+from conformance.soap.calls import SoapResponse, call, judge_answer, read_exchange, send
+from conformance.soap.envelope import envelope
+from conformance.soap.messages import padded
 from conformance.soap.service import SoapService
+from conformance.transport.exchange import Exchange
+from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
@@ -23,6 +28,7 @@ if TYPE_CHECKING:
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
 _VALID = "soap-subscribers/response-valid"
+_READ = ("GetPose", "GetVelocity", "GetSensors", "GetNavigationServices")
 
 
 def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapResponse) -> etree._Element | None:
@@ -134,3 +140,27 @@ def test_goal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
         judge.check(
             "soap-subscribers/goal", not problem, answer.exchange, "an empty response or a complete goal", found=problem
         )
+
+
+@pytest.mark.requirement("soap-subscribers/size")
+def test_64_kib(subscribers: SoapService, judge: Judge) -> None:
+    """A valid question of 64 KiB is answered."""
+    for operation in _READ:
+        question = envelope((Node(clark(delivery_messages.NAMESPACE, operation)),)).written()
+        answer = send(subscribers, padded(question, TAKEN_OCTETS))
+        expected = f"2xx for a message of {TAKEN_OCTETS:,} octets"
+        judge_answer(judge, "soap-subscribers/size", answer.accepted, answer, expected, cause=answer.describe())
+
+
+@pytest.mark.requirement("soap-subscribers/concurrent-answers")
+def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """Clients that ask for different states at one moment are each told the one that they asked for."""
+    asked = [_READ[client % len(_READ)] for client in range(MOST_CLIENTS)]
+    questions = [outgoing(subscribers, Node(clark(delivery_messages.NAMESPACE, name))) for name in asked]
+    for came in send_together([questions] * effort.cases(30)):
+        for operation, attempt in zip(asked, came, strict=True):
+            if isinstance(attempt, Exchange) and not is_busy(attempt):
+                answer = read_exchange(attempt)
+                expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
+                own = not answer.accepted or answer.payload == expected
+                judge_answer(judge, "soap-subscribers/concurrent-answers", own, answer, f"the answer to {operation}")

@@ -283,6 +283,12 @@ MUTANTS = (
         "concurrent-answers",
         lambda: _Mixed(posted, _exchanged, 1),
     ),
+    of_class("soap-subscribers", "soap")(
+        "clients-soap-states-crossed",
+        "Two clients that ask at one moment get each other's answers.",
+        "concurrent-answers",
+        lambda: _Mixed(posted, _exchanged, 1),
+    ),
     _order(
         "soap-small-messages",
         "A message over 32 KiB is 413.",

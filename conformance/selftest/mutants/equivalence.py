@@ -98,14 +98,15 @@ def _again_by_rest(request: Request, forward: Forward) -> Response:
 
 
 class _Deduplicating:
-    """The same delivery within a minute is taken for one that was sent again by mistake."""
+    """The same delivery is taken for one sent again by mistake: any, or any that has a key."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, keyed: bool = False) -> None:
+        self._keyed = keyed
         self._seen: set[str] = set()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
         """See messages.Change."""
-        if deliveries(request):
+        if deliveries(request) and (not self._keyed or request.field("Idempotency-Key")):
             if request.target in self._seen:
                 return plain(204)(request)
             self._seen.add(request.target)
@@ -152,6 +153,12 @@ MUTANTS = (
         "The same REST delivery sent again is accepted and forgotten.",
         "delivery-repeated",
         _Deduplicating,
+    ),
+    _rest_delivery(
+        "same-rest-any-key",
+        "The same REST delivery with another Idempotency-Key is accepted and forgotten.",
+        "idempotency-other-key",
+        lambda: _Deduplicating(keyed=True),
     ),
     _rest_delivery(
         "same-rest-no-subnormals",

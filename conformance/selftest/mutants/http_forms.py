@@ -1,15 +1,17 @@
 """Robots that take a request in one form and not in another that says the same."""
 
 import re
+import threading
 from collections.abc import Callable
 
-from conformance.selftest.messages import Request
+from conformance.selftest.messages import Forward, Request, Response
 from conformance.selftest.mutants.changes import altered, anything, header, instead, problem, rest, rewritten
 from conformance.selftest.mutants.mutant import of_class
 
 _HEAD = rest("HEAD")
 _CUT = 1024
 _MUCH = 4096
+_MOST = 100
 
 
 def _having(test: Callable[[Request], bool]) -> Callable[[Request], bool]:
@@ -37,7 +39,22 @@ def _shortened(request: Request) -> None:
     request.body = request.body[:_CUT]
 
 
+class _Hundred:
+    """What comes after a hundred requests on one connection, which has a thread of its own, is 400."""
+
+    def __init__(self) -> None:
+        self._connection = threading.local()
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        self._connection.requests = getattr(self._connection, "requests", 0) + 1
+        if request.side == "rest" and self._connection.requests > _MOST:
+            return problem(400, "enough of you")(request)
+        return forward(request)
+
+
 MUTANTS = (
+    _mutant("http-hundred-requests", "On one connection a hundred requests are answered.", "many-requests", _Hundred),
     _mutant(
         "http-no-chunks", "Chunked content is 411.", "chunked", instead(_chunked, problem(411, "a length, please"))
     ),

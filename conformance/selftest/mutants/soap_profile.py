@@ -11,8 +11,10 @@ from conformance.selftest.mutants.changes import (
     anything,
     becomes,
     header,
+    instead,
     page,
     posted,
+    problem,
     soap,
     status,
     text,
@@ -136,6 +138,15 @@ MUTANTS = (
     _mutant("bp-malformed-fine", "Malformed XML is 200.", "R1125", altered(_is_malformed, page(200), anything)),
     _mutant("bp-get-200", "GET of the service is 200 with a page.", "R1114", altered(_not_post, page(200), anything)),
     _mutant("bp-any-type", "Any media type is taken for text/xml.", "R1115", lambda: _any_type),
+    _mutant(
+        "bp-type-case",
+        "A media type with a capital letter is 415.",
+        "media-type-case",
+        instead(
+            lambda request: posted(request) and not (request.field("Content-Type") or "").startswith("text/xml"),
+            problem(415, "text/xml, please"),
+        ),
+    ),
     _mutant("bp-fault-200", "Faults are 200.", "R1126", _faults(becomes(200))),
     _mutant("bp-fault-400", "Faults are 400.", "R1126", _faults(becomes(400))),
     _mutant(

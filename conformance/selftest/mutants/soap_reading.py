@@ -5,11 +5,12 @@ from collections.abc import Callable
 from typing import Any
 
 from conformance.selftest.messages import Request
-from conformance.selftest.mutants.changes import altered, rewritten, soap, text
+from conformance.selftest.mutants.changes import altered, instead, posted, problem, rewritten, soap, text
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.xml_trees import each, gone, named, says, tree
 
 _POSE, _VELOCITY, _PLAN = soap("GetPose"), soap("GetVelocity"), soap("GetPlan")
+_SMALL = 32 * 1024
 
 
 def _first_is(parent: str, child: str, value: str) -> Callable[[Any], None]:
@@ -75,4 +76,10 @@ MUTANTS = (
     ),
     _mutant("soap-plan-elsewhere", "GetPlan plans to another place.", "plan", rewritten(_PLAN, _elsewhere)),
     _mutant("soap-plan-any-frame", "GetPlan takes any frame for map.", "plan-none", rewritten(_PLAN, _in_map)),
+    _mutant(
+        "soap-small-questions",
+        "A question over 32 KiB is 413.",
+        "size",
+        instead(lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")),
+    ),
 )

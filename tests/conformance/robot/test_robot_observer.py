@@ -35,6 +35,17 @@ def opened(statement: Statement) -> RestInterface:
     return api
 
 
+@pytest.mark.parametrize(("received_s", "refuted"), [(100.001, set()), (100.1, {"rest-resources/pose-stamp"})])
+def test_answers_of_several_clients_that_crossed_say_nothing_of_order(api, received_s, refuted):
+    request = Request("GET", _BASE + "/robot/pose/", (("Host", "robot:7003"), ("Accept", "*/*")))
+    json_type = (("Content-Type", "application/json"),)
+    for second, at in ((2, 100.0), (1, received_s)):
+        answer = Response(200, json_type, json.dumps(odometry(second)).encode(), 5.0, received_s=at)
+        for listener in api.client.connection.listeners:
+            listener.answered(Exchange(request, answer))
+    assert set(api.run.judge.refuted()) == refuted
+
+
 @pytest.fixture
 def api() -> RestInterface:
     return opened(Statement(declared=DeclaredLimits(linear_m_s=0.5, angular_rad_s=2.0)))

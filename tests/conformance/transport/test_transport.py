@@ -36,6 +36,24 @@ def test_an_answer_that_drips_ends_at_the_deadline(listening):
     assert time.monotonic() - started < 5 * _DEADLINE
 
 
+@pytest.mark.parametrize("reads", [False, True])
+def test_much_content_gives_time_while_it_goes_out_and_none_to_who_hangs(listening, monkeypatch, reads):
+    monkeypatch.setattr("conformance.transport.pace._UNDER_WAY", 0)
+    content = b" " * (8 * 1024 * 1024)
+
+    def hang(connection):
+        _head(connection)
+        while reads and connection.recv(1 << 20):
+            pass
+        time.sleep(20)
+
+    started = time.monotonic()
+    with pytest.raises(NoAnswerError) as error:
+        _client(listening(hang)).send("PUT", "/", body=content)
+    assert error.value.kind == "timeout"
+    assert time.monotonic() - started < 8 * _DEADLINE
+
+
 def test_a_hanging_endpoint_costs_its_deadline_twice_at_most(listening):
     client = _client(listening(lambda connection: (_head(connection), time.sleep(5))))
     for _ in range(2):
