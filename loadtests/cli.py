@@ -19,7 +19,7 @@ from conformance.contract.statement import Endpoints, Statement, load_statement
 from conformance.contract.thresholds import load_thresholds
 from conformance.contract.toml_file import TomlFileError
 from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
-from loadtests.settings.cli_options import CliOptions
+from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
 from loadtests.settings.settings import STEP_S, Settings
 from loadtests.settings.settle import DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, SettingsError, settle
 
@@ -70,6 +70,13 @@ def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[fl
         return tuple(float(part) for part in value.split(","))
     except ValueError:
         raise click.BadParameter(f"{value!r} is no list of rates such as 100,200,400") from None
+
+
+def _counts(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, ...]:
+    try:
+        return tuple(sorted({int(part) for part in value.split(",")})) if value else ()
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is no list of numbers such as 1,8,32,128,512") from None
 
 
 def _share(_: click.Context, __: click.Parameter, value: str) -> float:
@@ -128,6 +135,11 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 @click.option("--metrics-port", type=click.IntRange(1, 65535), help="Serve the histograms to Prometheus on this port.")
 @click.option("--steps", is_flag=True, help="Then step the load up to find where the robot gives way.")
 @click.option("--step-rates", callback=_rates, metavar="R,R,…", help="The rates to step through.")
+@click.option("--knee", is_flag=True, help="Search by bisection where REST, SOAP and both at once give way.")
+@click.option(
+    "--knee-searches", type=click.IntRange(1, 50), default=KNEE_SEARCHES, show_default=True, help="How often to search."
+)
+@click.option("--connections", callback=_counts, metavar="N,N,…", help="Then keep so many connections busy.")
 @click.option(
     "--step-duration",
     "step_s",

@@ -70,7 +70,7 @@ def users(settings: Settings, workers: int) -> int:
     """How many users come up in all."""
     load, steps = settings.load, settings.steps
     if load.users is not None and not steps.rates:
-        return load.users
+        return max(load.users, *steps.connections, 0)
     rate = max(load.rate or 0.0, *steps.rates, 0.0)
     each = min(_MOST_USERS, max(_LEAST_USERS, int(rate / workers * _STALL_S)))
-    return each * workers
+    return max(each * workers, *steps.connections, 0)

@@ -25,6 +25,7 @@ from loadtests.measuring.distributed_executor import DistributedExecutor, Execut
 from loadtests.measuring.end_to_end import end_to_end
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
+from loadtests.measuring.knee import Ladder
 from loadtests.measuring.metrics import Collector, serve
 from loadtests.measuring.preflight import preflight
 from loadtests.measuring.step_load import step_load
@@ -59,6 +60,7 @@ class Run:
         self.collector: Collector | None = None
         self._liveness = Liveness(REPORT_S if settings.generator.expect else 0.0)
         self._told = 0.0
+        self._numbered: dict[int, int] = {}
         self._parent = os.getppid()
 
     def interrupt(self) -> None:
@@ -136,10 +138,22 @@ class Run:
             self._carry_out(plan, executor)
             self.outcome.cpu_share = busiest(executor.members)
             self._follow_deliveries()
-            if settings.steps.rates and not self.outcome.interrupted and self.outcome.dead_at is None:
-                self.outcome.steps += step_load(
-                    plan, executor, settings, lambda: self.outcome.interrupted, self._number, tell
-                )
+            if settings.steps.asked and not self.outcome.interrupted and self.outcome.dead_at is None:
+                self._load_more(plan, executor)
+
+    def _load_more(self, plan: Plan, executor: Executor) -> None:
+        """What comes after the duel: the stepped load, the searches for the knee, more and more connections."""
+        outcome, settings = self.outcome, self.settings
+
+        def stopped() -> bool:
+            return outcome.interrupted
+
+        outcome.steps += step_load(plan, executor, settings, stopped, self._number, tell)
+        used = max(plan.first_segment + len(plan.segments), *(number + 1 for number in self._numbered))
+        ladder = Ladder(plan, executor, settings, stopped, self._number, tell, used)
+        if settings.steps.knee_searches:
+            outcome.knee_searches += ladder.knees()
+        outcome.over_connections += ladder.over_connections()
 
     def _follow_deliveries(self) -> None:
         """Time deliveries until the application has them, where that was asked for."""
@@ -196,6 +210,7 @@ class Run:
 
     def _number(self, plan: Plan) -> None:
         """Have the metrics know a plan's segments."""
+        self._numbered.update(plan.series_of())
         if self.collector is not None:
             self.collector.series_of.update(plan.series_of())
 

@@ -14,6 +14,7 @@ from loadtests.clients.payloads import VARIANTS
 from loadtests.measuring.locust_feed import LocustFeed
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Arrival, Pacer
+from loadtests.schedule.plan import BOTH
 from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from loadtests.schedule.plan import Plan, Segment
 
 _NS = 1_000_000_000
+_SIDES = ("rest", "soap")
 _AFTER_ERROR_S = 0.02  # closed model: users of a dead robot would spin on refused connections
 
 
@@ -79,7 +81,7 @@ class Session:
                 try:
                     succeeded = performs[segment.robot](
                         number,
-                        segment.interface,
+                        segment.interface if segment.interface != BOTH else _SIDES[arrival.payload % 2],
                         segment.client,
                         arrival.operation,
                         arrival.payload % VARIANTS,

@@ -65,6 +65,8 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "time_series": figures.time_series(measured),
         "steps": outcome.steps,
         "knee": _knee(outcome, plan),
+        "knee_search": outcome.knee_searches,
+        "over_connections": outcome.over_connections,
         "errors": figures.errors(recorder, plan.operations) + _early_errors(outcome.findings),
         "thresholds": judged,
     }
@@ -210,6 +212,7 @@ def _plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
         "processes": plan.workers,
         "connections": plan.connections,
         "pacing": pacing,
+        "connection_steps": list(settings.steps.connections),
         "limits": {"max_rate": settings.limits.max_rate, "max_duration_s": settings.limits.max_duration_s},
         "step_rates": list(settings.steps.rates),
         "step_s": settings.steps.step_s if settings.steps.rates else None,

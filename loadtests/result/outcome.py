@@ -36,6 +36,7 @@ class Outcome:
         elapsed_s: how much of the plan was carried out.
         cpu_share: the busiest worker's share of a core in the duel.
         steps: results of the stepped load.
+        knee_searches: results of the searches for the knee; over_connections: of more and more connections.
         journeys: deliveries from the request to the application, by way.
     """
 
@@ -51,4 +52,6 @@ class Outcome:
     elapsed_s: float = 0.0
     cpu_share: float | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
+    knee_searches: list[dict[str, Any]] = field(default_factory=list)
+    over_connections: list[dict[str, Any]] = field(default_factory=list)
     journeys: dict[str, Journeys] = field(default_factory=dict)

@@ -43,6 +43,15 @@ def summary(document: dict[str, Any]) -> str:
             "no rate offered meets" if highest is None else f"{highest:g}/s is the highest rate offered that meets"
         )
         lines.append(f"{entry['interface']}: {reached}: {entry['criterion']}")
+    for entry in document["knee_search"]:
+        found = entry["rate"] is not None
+        between = (
+            f" ({entry['interval'][0]:.0f} to {entry['interval'][1]:.0f}, {entry['searches']} searches)"
+            if found
+            else ""
+        )
+        held = f"held up to {entry['held_up_to'] or 0:.0f}/s and on"
+        lines.append(f"{entry['interface']}: " + (f"gives way at {entry['rate']:.0f}/s{between}" if found else held))
     for entry in document["thresholds"]:
         reason = f": {entry['reason']}" if entry["reason"] else ""
         lines.append(f"threshold {entry['outcome']}: {entry['name']}{reason}")

@@ -28,7 +28,7 @@ class Schedule:
     def _counted(self) -> list[int]:
         """Arrivals of each segment over all workers. Constant: rounding errors do not add up over segments."""
         plan = self.plan
-        if not plan.open_model and plan.step_rate is None:
+        if not plan.open_model:
             return [0] * len(plan.segments)
         if plan.load.arrivals == "poisson":
             return [
@@ -64,6 +64,10 @@ class Schedule:
         """The operations that a segment's interface and client offer, by number."""
         found = self.plan.segments[segment]
         return self.plan.offered(found.interface, found.client)
+
+    def users(self) -> int:
+        """How many users of the closed model are this worker's."""
+        return len(range(self.worker, self.plan.load.users or 0, self.workers))
 
     def total(self, segment: int) -> int:
         """A segment's arrivals over all workers."""

@@ -187,7 +187,8 @@ class Pacer:
             self._next_segment()
             return
         self._closes = self._origin + schedule.ends_ns(self._segment)
-        waiting, self._idle = self._idle, []
+        wanted = schedule.users()
+        waiting, self._idle = self._idle[:wanted], self._idle[wanted:]
         for waiter in waiting:
             waiter.switch(self._in_turn(schedule, now_ns()))
         self._arm(schedule)

@@ -21,6 +21,8 @@ import numpy as np
 from conformance.contract.thresholds import ApiStyle, Client, Operation
 
 INTERFACES = tuple(map(str, ApiStyle))
+#: REST and SOAP at once, in steps of the load: every other request goes over the other.
+BOTH = "both"
 CLIENTS = tuple(map(str, Client))
 OPERATIONS = tuple(map(str, Operation))
 MOVES = frozenset({"delivery", "coffee"})
@@ -91,7 +93,8 @@ class Plan:
         offers: operation numbers by `interface/client`, where not all are offered.
         robots: 2 where two robots meet in place of two interfaces.
         first_segment: numbers the segments on from those of the plan before it.
-        step_rate: a step of the stepped load instead of a duel: arrivals per second.
+        step_rate: a step of the stepped load instead of a duel: arrivals per second; 0 in the closed model.
+        connections: users that are up in all; in the closed model as many take part as the load says.
     """
 
     operations: tuple[str, ...]
@@ -134,7 +137,7 @@ class Plan:
     @property
     def open_model(self) -> bool:
         """Requests start at their times, whether or not earlier ones have come back."""
-        return self.load.users is None or self.step_rate is not None
+        return self.load.users is None
 
     @cached_property
     def blocks(self) -> int:
@@ -252,7 +255,7 @@ class Plan:
 SERIES = [
     (phase, interface, client)
     for phase in ("warmup", "duel", "aa", "step", "against")
-    for interface in INTERFACES
+    for interface in (*INTERFACES, BOTH)
     for client in CLIENTS
 ]
 

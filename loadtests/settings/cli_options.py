@@ -9,6 +9,7 @@ from conformance.contract.statement import Endpoints, Statement
 from loadtests.settings.settings import STEP_S, Generator, Selection
 
 TOLERANCE = 0.05
+KNEE_SEARCHES = 5
 
 if TYPE_CHECKING:
     from conformance.contract.thresholds import Threshold
@@ -38,6 +39,9 @@ class CliOptions:
     steps: bool = False
     step_rates: tuple[float, ...] = ()
     step_s: float = STEP_S
+    knee: bool = False
+    knee_searches: int = KNEE_SEARCHES
+    connections: tuple[int, ...] = ()
     allow_motion: bool = False
     thresholds: tuple[Threshold, ...] = ()
     rosbridge: str | None = None

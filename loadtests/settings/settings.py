@@ -23,10 +23,26 @@ class Selection:
 
 @dataclass(frozen=True)
 class Steps:
-    """The stepped load after the duel: arrivals per second, none where it is not asked for; seconds for each."""
+    """The loads after the duel.
+
+    Attributes:
+        rates: of the stepped load, arrivals per second; none where it is not asked for.
+        step_s: seconds for each step.
+        most_rate: the highest rate that is allowed for the operation that is stepped.
+        knee_searches: how often the knee is searched by bisection; 0: not at all.
+        connections: numbers of connections that are always busy.
+    """
 
     rates: tuple[float, ...] = ()
     step_s: float = STEP_S
+    most_rate: float | None = None
+    knee_searches: int = 0
+    connections: tuple[int, ...] = ()
+
+    @property
+    def asked(self) -> bool:
+        """Whether there is anything to do after the duel."""
+        return bool(self.rates or self.knee_searches or self.connections)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ MOTION_RATE = 500.0
 MOTION_DURATION_S = 120.0
 _MOST_RATE = 1_000_000.0
 _MOST_USERS = 10_000
+_MOST_CONNECTIONS = 4096
 _MOST_TOLERANCE = 10.0
 _MOST_DURATION_S = 24 * 3600.0
 
@@ -65,7 +66,7 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
             arrivals=options.arrivals,
             seed=options.seed,
         ),
-        steps=Steps(_step_rates(options, statement, operations), options.step_s),
+        steps=_steps(options, statement, operations),
         limits=Limits(_ceiling(statement, operations)[0], _longest(statement, operations)[0]),
         generator=replace(
             generator, expect=max(generator.expect, generator.processes if generator.processes > 1 else 0)
@@ -106,8 +107,10 @@ def _shared(other: Endpoints, interfaces: tuple[str, ...]) -> tuple[str, ...]:
 def _compared(settings: Settings, other: Statement, tolerance: float) -> Settings:
     """The settings of a run against another robot, whose own limits hold as well."""
     _check_endpoints(other.endpoints)
-    if settings.steps.rates:
-        raise SettingsError("--against compares two robots, and --steps loads one: run them one after the other")
+    if settings.steps.asked:
+        raise SettingsError(
+            "--against compares two robots; --steps, --knee and --connections load one: run them one after the other"
+        )
     if not 0 < tolerance <= _MOST_TOLERANCE:
         raise SettingsError(f"--tolerance {tolerance:.3%} is out of range: above 0, at most {_MOST_TOLERANCE:.0%}")
     operations, load = settings.selection.operations, settings.load
@@ -196,8 +199,8 @@ def _operations(options: CliOptions) -> tuple[str, ...]:
 def _check_numbers(options: CliOptions) -> None:
     if options.rate is not None and options.users is not None:
         raise SettingsError("--rate (open model) and --users (closed model) exclude each other")
-    if options.users is not None and (options.steps or options.step_rates):
-        raise SettingsError("--steps offers rates, which is an open model: give --rate instead of --users")
+    if options.users is not None and (options.steps or options.step_rates or options.knee):
+        raise SettingsError("--steps and --knee offer rates, which is an open model: give --rate instead of --users")
     if options.generator.processes + options.generator.expect < 1:
         raise SettingsError("--processes 0 leaves the work to others: say how many with --expect-workers")
     ranges: list[tuple[str, Any, float, float]] = [
@@ -206,6 +209,7 @@ def _check_numbers(options: CliOptions) -> None:
         ("--duration", options.duration_s, 0.0, _MOST_DURATION_S),
         ("--timeout", options.endpoints.get("timeout_s"), 0.0, 3600.0),
         ("--step-duration", options.step_s, 0.0, 600.0),
+        *(("--connections", users, 0, _MOST_CONNECTIONS) for users in options.connections),
         *(("--step-rates", rate, 0.0, _MOST_RATE) for rate in options.step_rates),
     ]
     for name, value, low, high in ranges:
@@ -252,10 +256,16 @@ def _bounded(options: CliOptions, statement: Statement, operations: tuple[str, .
     return rate, duration_s
 
 
-def _step_rates(options: CliOptions, statement: Statement, operations: tuple[str, ...]) -> tuple[float, ...]:
-    """The rates of the stepped load, which is one of reads where there is one; empty when it was not asked for."""
+def _steps(options: CliOptions, statement: Statement, operations: tuple[str, ...]) -> Steps:
+    """The loads after the duel, which are of reads where there are some."""
     reads = tuple(name for name in operations if name not in MOVES)
     ceiling = _ceiling(statement, reads or operations)[0]
+    searches = options.knee_searches if options.knee else 0
+    return Steps(_step_rates(options, ceiling), options.step_s, ceiling, searches, options.connections)
+
+
+def _step_rates(options: CliOptions, ceiling: float | None) -> tuple[float, ...]:
+    """The rates of the stepped load below a ceiling; empty when it was not asked for."""
     if options.step_rates:
         above = [rate for rate in options.step_rates if ceiling is not None and rate > ceiling]
         if above:

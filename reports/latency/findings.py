@@ -84,6 +84,7 @@ def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         *_followed(result),
         *_stalled(result),
         *_knees(result),
+        *_searched(result),
         *_failed(result, series),
     ]
 
@@ -208,6 +209,26 @@ def _knees(result: Mapping[str, Any]) -> list[str]:
         because = f": {knee['reason']}" if knee.get("reason") else ""
         limit = " The generator, not the robot, was the limit." if knee.get("limited_by") == "generator" else ""
         told.append(f"{sentence}; it gave way at {rate(missed)} requests/s{because}.{limit}")
+    return told
+
+
+def _searched(result: Mapping[str, Any]) -> list[str]:
+    """Where the robot gives way, by bisection."""
+    told = []
+    for knee in result.get("knee_search", []):
+        name = "REST and SOAP at once" if knee["interface"] == "both" else knee["interface"].upper()
+        if knee["rate"] is None:
+            held = knee.get("held_up_to")
+            told.append(f"{name}: no knee up to {rate(held)} requests/s." if held else f"{name}: no knee was found.")
+            continue
+        low, high = knee["interval"]
+        limit = " The generator, not the robot, was the limit." if knee.get("limited_by") == "generator" else ""
+        first = knee.get("errors_from")
+        failing = "" if first is None else f" Requests failed from {rate(first)} requests/s on."
+        told.append(
+            f"{name}: gives way at {rate(knee['rate'])} requests/s ({rate(low)} to {rate(high)}, "
+            f"{knee['searches']} searches).{failing}{limit}"
+        )
     return told
 
 

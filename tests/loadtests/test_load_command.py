@@ -214,3 +214,23 @@ def test_usage_errors_touch_no_robot(load, options, message):
     assert run.code == 2
     assert message in run.err
     assert not (run.folder / "latency.json").exists()
+
+
+def test_the_knee_is_searched_and_connections_are_added(toy, load):
+    robot = toy("--busy", "0.01")  # answers 100 a second and no more
+    run = load(
+        *robot.both(),
+        "--rate 20 --duration 0.5 --warmup 0.1 --client wire --knee --knee-searches 1 --step-duration 0.4",
+        "--connections 1,4",
+    )
+    result = run.result
+    found = {entry["interface"]: entry for entry in result["knee_search"]}
+    assert list(found) == ["rest", "soap", "both"]
+    for entry in found.values():
+        assert entry["rate"] is None or 20 < entry["rate"] < 160
+        assert entry["brackets"][0][1] is not None, "it gave way"
+    one, more = ([e for e in result["over_connections"] if e["connections"] == number] for number in (1, 4))
+    assert len(one) == len(more) == 2
+    assert all(before["p50_ms"] >= 10 for before in one)
+    assert all(after["p50_ms"] > 2 * before["p50_ms"] for before, after in zip(one, more, strict=True))
+    assert all(entry["rate"] < 110 for entry in (*one, *more))

@@ -112,6 +112,7 @@ class Robot:
         if target.endswith("/hang-up"):
             self.count += 1
             return False
+        time.sleep(options.busy)  # noqa: ASYNC251 -- the whole robot is busy: it answers 1 / busy a second
         status, content, kind = await self.answer(method, target, headers, body)
         return await self.write(writer, status, content, kind)
 
@@ -158,6 +159,7 @@ async def main():
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--tls", nargs=2)
     parser.add_argument("--delay", type=float, default=0.0)
+    parser.add_argument("--busy", type=float, default=0.0)
     parser.add_argument("--stall", type=float, default=0.0)
     parser.add_argument("--stall-at", type=float, default=0.0)
     parser.add_argument("--ready-after", type=int, default=20)

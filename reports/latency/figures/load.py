@@ -1,26 +1,26 @@
-"""Latency and throughput over the offered load, up to where the robot gives way."""
+"""Latency over the load: the offered rate, up to where the robot gives way, and the number of busy connections."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from reports.latency.figures.canvas import COLOUR, MARK, SOFT, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.canvas import COLOUR, MARK, Panel, Picture, drawing, gather, log_time_axis
 
 
 def load(result: Mapping[str, Any]) -> Picture | None:
-    """Two panels: latency over the offered rate, and achieved over offered rate; the knee as a vertical line."""
+    """Latency over the offered rate, the knee as a vertical line; and over the number of busy connections."""
     steps = [step for step in result.get("steps", []) if step["offered_rate"] > 0]
-    if not steps:
-        return None
-    knees = result.get("knee", [])
+    crowds = result.get("over_connections", [])
     with drawing():
+        panels = [_latency(steps, result.get("knee", []))] if steps else []
+        panels += [_crowd(crowds)] if crowds else []
         return gather(
             "load",
-            "A load that rises in steps. Latency: response time, 99th percentile as a line, median dashed. "
-            "Throughput: what came through of what was offered; on the grey line everything did. "
-            "Vertical lines: the highest rate that met the criterion. Hollow: a step that did not meet it.",
-            [_latency(steps, knees), _throughput(steps, knees)],
+            "Response time under more and more load, 99th percentile as a line, median dashed. Over the offered rate: "
+            "vertical lines are the highest rate that met the criterion, hollow is a step that did not meet it. Over "
+            "the number of connections that are always busy: where latency doubles with it, the robot gives no more.",
+            panels,
         )
 
 
@@ -45,24 +45,29 @@ def _latency(steps: Sequence[Mapping[str, Any]], knees: Sequence[Mapping[str, An
     return panel
 
 
-def _throughput(steps: Sequence[Mapping[str, Any]], knees: Sequence[Mapping[str, Any]]) -> Panel:
-    panel = Panel("throughput over load", "Achieved over offered rate; the table of steps holds its figures.")
-    rates = sorted({step["offered_rate"] for step in steps})
-    panel.axes.plot(rates, rates, color=SOFT, linewidth=0.9, linestyle=":", label="all offered")
-    for interface, own in _by_interface(steps).items():
-        panel.axes.plot(
-            [step["offered_rate"] for step in own],
-            [step["achieved_rate"] for step in own],
-            color=COLOUR[interface],
-            linewidth=1.6,
-            label=interface.upper(),
-        )
-        for step in own:
-            _mark(panel, step, step["achieved_rate"], interface)
-    panel.axes.set_yscale("log")
-    panel.axes.set_ylabel("achieved requests/s")
-    _plain(panel.axes.yaxis)
-    _finish(panel, knees)
+def _crowd(crowds: Sequence[Mapping[str, Any]]) -> Panel:
+    told = "; ".join(f"{one['interface'].upper()}, {one['connections']}: {one['rate']:,.0f}/s" for one in crowds)
+    panel = Panel("latency over connections", f"Response time over the number of busy connections. Answered: {told}.")
+    for interface in dict.fromkeys(one["interface"] for one in crowds):
+        for key, style, label in (("p99_ms", "-", "99 %"), ("p50_ms", "--", "median")):
+            shown = [one for one in crowds if one["interface"] == interface and one[key] is not None]
+            panel.axes.plot(
+                [one["connections"] for one in shown],
+                [one[key] for one in shown],
+                style,
+                marker=MARK[interface],
+                markersize=5,
+                color=COLOUR[interface],
+                linewidth=1.6,
+                label=f"{interface.upper()} {label}",
+            )
+    log_time_axis(panel.axes, "y", "response time, ms")
+    panel.axes.set_xscale("log")
+    panel.axes.set_xlabel("connections that are always busy")
+    panel.axes.set_xticks(sorted({one["connections"] for one in crowds}))
+    panel.axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    panel.axes.xaxis.set_minor_formatter(NullFormatter())
+    panel.legend()
     return panel
 
 

@@ -66,7 +66,7 @@ def test_everything_is_in_it(latency, example):
 def test_every_figure_tells_what_it_shows(example):
     document = html.document_fromstring(example)
     drawings = document.xpath("//figure//*[local-name()='svg']")
-    assert len(drawings) == 21
+    assert len(drawings) == 20
     assert all(len(drawing.get("aria-label")) > 20 for drawing in drawings)
     assert all(text(caption) for caption in document.iter("figcaption"))
 

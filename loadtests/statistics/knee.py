@@ -1,0 +1,119 @@
+"""Where a robot gives way, found by bisection and found again: the `knee_search` of latency.json.
+
+A search brackets the knee between a rate that was kept and one that was not. It is repeated, because a single search
+ends where chance lets one step fail. Of n searches' estimates the lowest and the highest enclose the median with
+probability 1 - 2^(1 - n) (the sign test's interval); the brackets' own ends make it no narrower.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from loadtests.statistics.figures import rounded, rounded_interval
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+RESOLUTION = 1.08  # a bracket whose ends differ by no more is narrow enough
+_GROWTH = 2.0
+_NEAR = 1.5  # how far from an earlier search's bracket the next one begins
+_BUSY = 0.9
+
+Trial = dict[str, Any]
+
+
+@dataclass
+class Search:
+    """One search for the highest rate that is kept.
+
+    Attributes:
+        lowest, highest: rates to stay within.
+        kept: the highest rate that was kept so far; None: none yet.
+        missed: the lowest rate that was not.
+        trials: everything that was tried, by rate.
+    """
+
+    lowest: float
+    highest: float
+    near: tuple[float, float] | None = None
+    kept: float | None = None
+    missed: float | None = None
+    trials: dict[float, Trial] = field(default_factory=dict)
+
+    def next_rate(self) -> float | None:
+        """The rate to try next; None when the bracket is narrow enough, or an end of what is allowed is reached."""
+        if self.kept is None and self.missed is None:
+            return self._within(self.near[0] / _NEAR if self.near else self.lowest)
+        if self.missed is None:
+            kept = self.kept or self.lowest
+            return None if kept >= self.highest else self._within(kept * (_NEAR if self.near else _GROWTH))
+        if self.kept is None:
+            return None if self.missed <= self.lowest else self._within(self.missed / _GROWTH)
+        return None if self.missed / self.kept <= RESOLUTION else math.sqrt(self.kept * self.missed)
+
+    def learn(self, rate: float, trial: Trial, *, kept: bool) -> None:
+        """Take a trial in."""
+        self.trials[rate] = trial
+        if kept:
+            self.kept = max(rate, self.kept or rate)
+        else:
+            self.missed = min(rate, self.missed or rate)
+
+    def estimate(self) -> float | None:
+        """The knee: between the ends of the bracket; None where one of them was not found."""
+        return None if self.kept is None or self.missed is None else math.sqrt(self.kept * self.missed)
+
+    def _within(self, rate: float) -> float:
+        return min(max(rate, self.lowest), self.highest)
+
+
+def knee_search(interface: str, criterion: str, searches: list[Search]) -> dict[str, Any]:
+    """One interface's searches, put together."""
+    found = [(search, estimate) for search in searches if (estimate := search.estimate()) is not None]
+    estimates = [estimate for _, estimate in found]
+    trials = [trial for search in searches for trial in search.trials.values()]
+    missed = [search.trials[search.missed] for search, _ in found if search.missed in search.trials]
+    busy = sum((trial["cpu_share"] or 0.0) > _BUSY for trial in missed)
+    kept = [search.kept for search in searches if search.kept is not None]
+    return {
+        "interface": interface,
+        "criterion": criterion,
+        "searches": len(searches),
+        "rate": rounded(math.exp(sum(map(math.log, estimates)) / len(estimates))) if estimates else None,
+        "interval": rounded_interval(_enclosing([search for search, _ in found])) if estimates else None,
+        "confidence": rounded(1 - 2.0 ** (1 - len(estimates))) if estimates else None,
+        "brackets": [[rounded(search.kept), rounded(search.missed)] for search in searches],
+        "held_up_to": rounded(max(kept, default=None)) if not estimates and kept else None,
+        "errors_from": rounded(min(_failing(trials), default=None)),
+        "reason": missed[0]["reason"] if missed else None,
+        "limited_by": None if not missed else ("generator" if 2 * busy > len(missed) else "robot"),
+        "trials": len(trials),
+    }
+
+
+def _enclosing(searches: list[Search]) -> tuple[float, float]:
+    return min(search.kept or 0.0 for search in searches), max(search.missed or 0.0 for search in searches)
+
+
+def _failing(trials: list[Trial]) -> list[float]:
+    """The rates at which requests failed, or were never started."""
+    return [trial["offered_rate"] for trial in trials if trial["errors"] or trial["dropped"]]
+
+
+def search_again(searches: int, limits: tuple[float, float], attempt: Callable[[float], Trial | None]) -> list[Search]:
+    """Search so often within the limits; `attempt` offers a rate, and returns None when there is no more time."""
+    found: list[Search] = []
+    near: tuple[float, float] | None = None
+    for _ in range(searches):
+        search = Search(*limits, near=near)
+        while (rate := search.next_rate()) is not None:
+            trial = attempt(rate)
+            if trial is None:
+                return found
+            search.learn(rate, trial, kept=trial["meets"])
+        found.append(search)
+        if search.kept is not None and search.missed is not None:
+            near = (search.kept, search.missed)
+    return found

@@ -1,0 +1,48 @@
+"""The search for the knee, on a robot whose knee is known."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from loadtests.statistics.knee import RESOLUTION, knee_search, search_again
+
+
+def robot(knee, tried=None):
+    """What an attempt finds on a robot that gives way at a rate."""
+
+    def attempt(rate):
+        if tried is not None:
+            tried.append(rate)
+        meets = rate < knee
+        return {"offered_rate": rate, "meets": meets, "errors": 0 if rate < 2 * knee else 3, "dropped": 0} | {
+            "cpu_share": 0.2,
+            "reason": None if meets else "too slow",
+        }
+
+    return attempt
+
+
+@given(st.floats(60, 40_000))
+def test_every_search_encloses_the_knee_in_few_steps(knee):
+    tried = []
+    found = knee_search("rest", "p99 below 50 ms", search_again(5, (50, 50_000), robot(knee, tried)))
+    assert found["interval"][0] <= knee <= found["interval"][1]
+    for kept, missed in found["brackets"]:
+        assert kept < knee <= missed
+        assert missed / kept <= RESOLUTION + 1e-6
+    assert found["confidence"] == pytest.approx(0.9375)
+    assert len(tried) <= 16 + 4 * 8
+    assert found["limited_by"] == "robot"
+
+
+def test_what_lies_beyond_the_limits_is_not_guessed():
+    above = knee_search("rest", "…", search_again(2, (50, 400), robot(1e6)))
+    assert (above["rate"], above["interval"], above["held_up_to"]) == (None, None, 400)
+    below = knee_search("rest", "…", search_again(2, (50, 400), robot(1)))
+    assert (below["rate"], below["held_up_to"], below["brackets"]) == (None, None, [[None, 50]] * 2)
+
+
+def test_the_end_of_the_time_ends_the_searches():
+    left = iter(range(4))
+    searches = search_again(3, (50, 400), lambda rate: robot(170)(rate) if next(left, None) is not None else None)
+    assert searches == []
