@@ -112,6 +112,11 @@ def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> Comma
     if options["fleet"]:
         from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
 
+        # What each run would refuse is told once, before the first.
+        if options["nonce"] is not None:
+            _check_nonce(options["nonce"])
+        if options["key"]:
+            door.notary(Path(options["key"]))
         return certify_fleet(Path(options["fleet"]), options)
     if options["parallel"] is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")

@@ -25,7 +25,17 @@ if TYPE_CHECKING:
 LOG_NAME = "certify.log"
 RESULT_NAME = "result.json"
 # What a certification writes: of an earlier run nothing may stay that looks like this one's.
-_WRITTEN = (RESULT_NAME, LOG_NAME, "certificate*", "junit.xml", "badge.json", "*.sarif", "ctrf*.json", "gl-*.json")
+_WRITTEN = (
+    RESULT_NAME,
+    LOG_NAME,
+    "certificate*",
+    "junit.xml",
+    "badge.json",
+    "*.sarif",
+    "ctrf*.json",
+    "gl-*.json",
+    "annotations.txt",
+)
 # A run that is told to end stops the robot, and writes what it has.
 _GRACE_S = 30.0
 _PROGRESS = re.compile(rb"(\d+/\d+) checks[^\n]*\n[^\n]*\Z")

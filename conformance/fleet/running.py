@@ -60,7 +60,10 @@ class FleetRun:
             name = run.member.name
             self._under_way[name] = run
             self._tell(f"{name}: started")
-            result = await run.judge(self._stop)
+            try:
+                result = await run.judge(self._stop)
+            except Exception as error:  # noqa: BLE001 - whatever breaks is this robot's end, and none of the others'
+                result = MemberResult(run.member, Outcome.NOT_JUDGED, reason=f"{type(error).__name__}: {error}")
             del self._under_way[name]
             self._results[name] = result
             self._done += 1

@@ -41,6 +41,7 @@ class Job:
         token: bearer token to send, or empty.
         endpoints: further endpoint options (ca_file, request_rate).
         timeout_s: after which the run is given up.
+        out: folder in which result.json is kept, or None.
     """
 
     statement: Path
@@ -55,6 +56,7 @@ class Job:
     token: str = ""
     endpoints: dict[str, Any] = field(default_factory=dict)
     timeout_s: float = 120.0
+    out: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def _run(job: Job, pipe: Pipe) -> None:
     """Certify, in the child, and send what came of it."""
     with tempfile.TemporaryDirectory() as folder, Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(io.StringIO()):
-            certification = certify(robot_of(job, Path(folder)), Path(folder), progress=None)
+            certification = certify(robot_of(job, Path(folder)), job.out or Path(folder), progress=None)
         document = certification.document
         items = document["requirements"]
         pipe.send(
