@@ -5,14 +5,14 @@ Rooms are imported when their command is used, so that ``roaas certify`` needs n
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import click
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _COMMANDS = {
     "robot": ("reference_robot.cli", "robot"),
@@ -47,6 +47,22 @@ _SUMMARIES = {
 }
 _EXTRAS = {"robot": "robot", "load": "load"}
 _ROOMS = {"conformance", "loadtests", "reference_robot", "reports"}
+_INSTALLED = Path(__file__).with_name("roaas_rooms")
+
+
+def open_rooms() -> None:
+    """Let this process, and those that it starts, import the rooms.
+
+    In a checkout they lie beside this file. A wheel has them in a folder of its own, because nobody else's module
+    named `reports` or `conformance` should be shadowed by ours, nor ours by theirs.
+    """
+    folder = str(_INSTALLED)
+    if folder in sys.path or not _INSTALLED.is_dir():
+        return
+    sys.path.insert(0, folder)
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (folder, os.environ.get("PYTHONPATH"))))
+    # `python -m`, by which rooms start processes, would look into the working directory first.
+    os.environ["PYTHONSAFEPATH"] = "1"
 
 
 class _Rooms(click.Group):
@@ -62,6 +78,7 @@ class _Rooms(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
+        open_rooms()
         module, name = _COMMANDS[cmd_name]
         try:
             command = getattr(import_module(module), name)
@@ -108,6 +125,12 @@ def main() -> None:
     """Conformance and load tests for robots that are web services."""
     # What ends a command in a container or a CI job cleans up like Ctrl-C; some commands have a handler of their own.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def load_node() -> None:
+    """The command ``roaas-load-node``: a load test's master or one of its workers, on a machine of its own."""
+    open_rooms()
+    import_module("loadtests.node").main(sys.argv[1:])
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""The pytest plugin for a project of one's own: ``pytest --pyargs conformance --robot-rest URL``.
+"""The pytest plugin for a project of one's own: ``pytest -p roaas_pytest --pyargs conformance --robot-rest URL``.
 
-It is loaded in every pytest run where the suite is installed, and so imports the suite only when there is a check.
+It imports the suite only when there is a check.
 """
 
 from __future__ import annotations

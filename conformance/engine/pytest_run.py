@@ -1,4 +1,4 @@
-"""A robot from pytest's own options, for ``pytest --pyargs conformance`` in somebody's project."""
+"""A robot from pytest's own options, for ``pytest -p roaas_pytest --pyargs conformance`` in somebody's project."""
 
 from __future__ import annotations
 

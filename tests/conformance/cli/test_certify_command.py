@@ -200,7 +200,7 @@ def test_an_interrupted_run_keeps_what_it_has_and_stops_the_robot(tmp_path):
 def test_the_suite_runs_in_somebody_elses_project(tmp_path):
     (tmp_path / "test_own.py").write_text("def test_own(): pass\n", encoding="utf-8")
     with _independent_robot("plain") as (_, rest, _):
-        command = [sys.executable, "-m", "pytest", "-q", "--pyargs", "conformance", "test_own.py"]
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "roaas_pytest", "--pyargs", "conformance", "test_own.py"]
         command += ["--robot-rest", rest, "--robot-class", "rest-formats", "--robot-effort", "quick"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stdout
