@@ -208,7 +208,11 @@ def merging(workers: int) -> bool:
     """The master's work on one report from each of so many workers."""
     reports = [_report(seed) for seed in range(min(workers, 20))]
     size = sum(
-        len(part) for cell in reports[0]["cells"] for form in cell[2:4] for part in form if isinstance(part, bytes)
+        len(part)
+        for cell in reports[0]["cells"]
+        for form in cell[2].values()
+        for part in form
+        if isinstance(part, bytes)
     )
     parts = [Recorder.unpack(reports[number % len(reports)]) for number in range(workers)]
     began = time.perf_counter()

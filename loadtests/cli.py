@@ -18,6 +18,7 @@ from conformance.contract.exit_codes import ExitCode
 from conformance.contract.statement import Endpoints, Statement, load_statement
 from conformance.contract.thresholds import load_thresholds
 from conformance.contract.toml_file import TomlFileError
+from loadtests.measuring.command_line import without_folders
 from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
 from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
 from loadtests.settings.settings import STEP_S, Settings
@@ -124,6 +125,16 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 )
 @click.option("--timeout", "timeout_s", type=float, help="Deadline of a request in seconds.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Fixes schedule, payloads and intervals.")
+@click.option(
+    "--repeat",
+    type=click.IntRange(1, 100),
+    default=1,
+    show_default=True,
+    help="Run the duel so often, each time over new connections; intervals then hold for another run as well.",
+)
+@click.option(
+    "--restart-command", metavar="CMD", help="Start the robot anew before each repeat by this command (no shell)."
+)
 @click.option("--processes", type=click.IntRange(0, 256), default=1, show_default=True, help="Workers on this machine.")
 @click.option(
     "--expect-workers", "expect", type=click.IntRange(0, 1000), default=0, help="Workers in all, on other machines too."
@@ -187,7 +198,7 @@ def load(statement: Path | None, **options: Any) -> CommandResult:
 
 def _command_line() -> str:
     """As it was given, without the folders of this machine."""
-    return shlex.join(["roaas", *(Path(word).name if word.startswith("/") else word for word in sys.argv[1:])])
+    return shlex.join(["roaas", *map(without_folders, sys.argv[1:])])
 
 
 def _check_folder(folder: Path) -> None:

@@ -66,8 +66,9 @@ class _Events:
         del due, queued
         self._fire(operation, (moments[2] - start) / 1e6, None)
 
-    def failed(self, _: int, operation: int, error: CallError, due_ns: int) -> None:
+    def failed(self, _: int, operation: int, error: CallError, due_ns: int, start_ns: int) -> None:
         """A failure."""
+        del start_ns
         self._fire(operation, (now_ns() - due_ns) / 1e6, error)
 
     def count(self, name: str) -> None:

@@ -105,7 +105,7 @@ class Caller:
                 done = now_ns()
                 built, received, timing = timed.built_ns, timed.received_ns, timed.timing
         except CallError as error:
-            recorder.failed(segment, operation, error, due)
+            recorder.failed(segment, operation, error, due, start)
             return False
         recorder.record(segment, operation, due, start, built, received, done, server_ns(timing), queued=queued)
         return True
@@ -126,9 +126,12 @@ class Caller:
             raise CallError("timeout", f"no complete answer within {workload.robot.timeout_s:g} s") from None
 
     def close(self) -> None:
-        """Close all connections."""
+        """Close all connections; the next calls open new ones."""
         for connection in self._wires.values():
             connection.close()
+        for library in (self._rest, self._soap):
+            if library is not None:
+                library.close()
 
 
 def _judged(status: int, location: bytes | None, body: bytes, expects: bytes) -> CallError:

@@ -71,9 +71,18 @@ class _CountingAdapter(HTTPAdapter):
         }
 
 
-def new_session(robot: Robot) -> requests.Session:
-    """A `requests` session as a user would set it up for this robot."""
-    session = requests.Session()
+class _Staying(requests.Session):
+    """A session that follows no redirect, for a request that goes elsewhere measures somebody else."""
+
+    def get_redirect_target(self, resp: requests.Response) -> str | None:
+        """Nowhere."""
+        del resp
+        return None
+
+
+def new_session(robot: Robot, *, staying: bool = False) -> requests.Session:
+    """A `requests` session as a user would set it up for this robot; `staying` where it answers itself."""
+    session = _Staying() if staying else requests.Session()
     session.trust_env = False  # a proxy from the environment would be measured in the robot's place
     session.mount("http://", _CountingAdapter())
     session.mount("https://", _CountingAdapter())
@@ -112,7 +121,7 @@ class _TimedTransport(Transport):
 
     def __init__(self, robot: Robot) -> None:
         super().__init__(  # type: ignore[no-untyped-call]  # zeep annotates the class, not its constructor
-            session=new_session(robot), timeout=robot.timeout_s, operation_timeout=robot.timeout_s
+            session=new_session(robot, staying=True), timeout=robot.timeout_s, operation_timeout=robot.timeout_s
         )
         self.timed = Timed(0, 0, None)
 
@@ -120,6 +129,10 @@ class _TimedTransport(Transport):
         self.timed.built_ns = now_ns()
         response = super().post(address, message, headers)  # type: ignore[no-untyped-call]  # as above
         self.timed.received_ns = now_ns()
+        if response.is_redirect:
+            raise answer_error(
+                response.status_code, response.headers.get("Location"), response.content, b""
+            ) or CallError("redirect", f"status {response.status_code}")
         timing = response.headers.get("Server-Timing")
         self.timed.timing = timing.encode("latin-1") if timing else None
         return response
@@ -170,6 +183,10 @@ class LibrarySoap:
             raise CallError("content", "zeep found nothing in the answer")
         return self._transport.timed
 
+    def close(self) -> None:
+        """Close its connections; the next call opens a new one."""
+        self._transport.session.close()
+
 
 def _binding(document: Document) -> str:
     """The name of the contract's binding, whatever port names the robot chose."""
@@ -184,7 +201,7 @@ class LibraryRest:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._session = new_session(robot)
+        self._session = new_session(robot, staying=True)
         self._base = (robot.rest or "").rstrip("/")
 
     def call(self, operation: str, values: Values) -> Timed:
@@ -201,7 +218,7 @@ class LibraryRest:
         )
         timed.built_ns = now_ns()
         try:
-            response = self._session.send(request, timeout=self._robot.timeout_s, allow_redirects=False)
+            response = self._session.send(request, timeout=self._robot.timeout_s)
         except requests.RequestException as error:
             raise request_error(error, self._base, self._robot.timeout_s) from None
         timed.received_ns = now_ns()
@@ -218,3 +235,7 @@ class LibraryRest:
         timing = response.headers.get("Server-Timing")
         timed.timing = timing.encode("latin-1") if timing else None
         return timed
+
+    def close(self) -> None:
+        """Close its connections; the next call opens a new one."""
+        self._session.close()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from conformance.contract.thresholds import ApiStyle
 from loadtests.clients.library import LIBRARY
-from loadtests.schedule.plan import Plan
+from loadtests.schedule.plan import LIBRARY_RATE, Plan
 
 ROSBRIDGE = ApiStyle.ROSBRIDGE
 
@@ -25,10 +25,19 @@ _STALL_S = 3.0  # the stall that the users of an open model outlast before arriv
 def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
     """The plan of the duel, between interfaces or two robots, and notes on what cannot be measured."""
     wanted = settings.selection
+    workers = max(1, settings.generator.expect)
     interfaces, offers, missing = [], {}, set()
     both = " on both robots" if len(robots) > 1 else ""
+    chosen = wanted.clients
+    if (settings.load.rate or 0.0) > LIBRARY_RATE * workers and len(chosen) > 1:
+        chosen = tuple(name for name in chosen if name != LIBRARY)
+        missing.add(
+            f"zeep is not measured: at {settings.load.rate:g} requests/s it would take the generator's whole "
+            f"processor; at up to {LIBRARY_RATE * workers:g}/s, or with more --processes, it runs at the wire "
+            "client's rate"
+        )
     for interface in wanted.interfaces:
-        for client in wanted.clients:
+        for client in chosen:
             numbers = [
                 number
                 for number, name in enumerate(wanted.operations)
@@ -40,15 +49,14 @@ def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
                 if number not in numbers and (interface, client) != (ROSBRIDGE, LIBRARY)
             }
             offers[f"{interface}/{client}"] = numbers
-        if any(offers[f"{interface}/{client}"] for client in wanted.clients):
+        if any(offers[f"{interface}/{client}"] for client in chosen):
             interfaces.append(interface)
     clients = tuple(
         client
-        for client in wanted.clients
+        for client in chosen
         if all(offers[f"{interface}/{client}"] for interface in interfaces if interface != ROSBRIDGE)
         and any(offers[f"{interface}/{client}"] for interface in interfaces)
     )
-    workers = max(1, settings.generator.expect)
     plan = Plan(
         operations=wanted.operations,
         interfaces=tuple(interfaces),

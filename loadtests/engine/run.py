@@ -27,12 +27,14 @@ from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
 from loadtests.measuring.knee import Ladder
 from loadtests.measuring.metrics import Collector, serve
+from loadtests.measuring.pauses import after_pauses
 from loadtests.measuring.preflight import preflight
+from loadtests.measuring.restart import start_anew
 from loadtests.measuring.step_load import step_load
 from loadtests.probe.client import ProbeError
 from loadtests.result.document import compose
 from loadtests.result.files import write
-from loadtests.result.outcome import Outcome, RunAborted
+from loadtests.result.outcome import Carried, Outcome, RunAborted
 from loadtests.result.terminal import summary
 
 if TYPE_CHECKING:
@@ -135,10 +137,20 @@ class Run:
                     ExitCode.INTERRUPTED if self.outcome.interrupted else ExitCode.USAGE, str(error)
                 ) from None
             self._tell_plan(plan, executor)
-            self._carry_out(plan, executor)
-            self.outcome.cpu_share = busiest(executor.members)
+            plan = self._repeat(plan, executor)
+            if self._over:
+                return
+            tell("measuring what requests cost after a pause")
+            self.outcome.paused = after_pauses(
+                self.robots[0],
+                plan.series_names(),
+                settings.load.seed,
+                settings.load.duration_s,
+                settings.limits.max_rate,
+                lambda: self.outcome.interrupted,
+            )
             self._follow_deliveries()
-            if settings.steps.asked and not self.outcome.interrupted and self.outcome.dead_at is None:
+            if settings.steps.asked and not self._over:
                 self._load_more(plan, executor)
 
     def _load_more(self, plan: Plan, executor: Executor) -> None:
@@ -155,10 +167,39 @@ class Run:
             outcome.knee_searches += ladder.knees()
         outcome.over_connections += ladder.over_connections()
 
+    @property
+    def _over(self) -> bool:
+        """Whether nothing more is to be measured."""
+        return self.outcome.interrupted or self.outcome.dead_at is not None
+
+    def _repeat(self, plan: Plan, executor: Executor) -> Plan:
+        """Carry the duel out as often as asked for; returns the last one's plan."""
+        repeats = self.settings.repeats
+        for number in range(repeats.number):
+            if number:
+                plan = plan.again()
+                tell(f"repeat {number + 1} of {repeats.number}, over new connections")
+                self._start_anew(repeats.restart_command, plan)
+            if self._over:
+                break
+            self._carry_out(plan, executor)
+            self.outcome.cpu_share = max(busiest(executor.members) or 0.0, self.outcome.cpu_share or 0.0)
+        return plan
+
+    def _start_anew(self, command: str | None, plan: Plan) -> None:
+        """Start the robot anew, where there is a command for it, and wait until it answers."""
+        if command is None:
+            return
+        names, seed = plan.series_names(), self.settings.load.seed
+        try:
+            start_anew(command, lambda: preflight(self.robots[0], names, seed), lambda: self.outcome.interrupted)
+        except GeneratorError as error:
+            raise RunAborted(ExitCode.UNREACHABLE, str(error)) from None
+
     def _follow_deliveries(self) -> None:
         """Time deliveries until the application has them, where that was asked for."""
         wanted, outcome = self.settings.end_to_end, self.outcome
-        if wanted is None or outcome.interrupted or outcome.dead_at is not None:
+        if wanted is None or self._over:
             return
         number = self.plan.operations.index("delivery")
         ways = tuple(name for name in self.plan.interfaces if number in self.plan.offered(name, "wire"))
@@ -188,12 +229,16 @@ class Run:
     def _carry_out(self, plan: Plan, executor: Executor) -> None:
         """Run a plan, watching for its end, Ctrl-C and the robot's death."""
         self._number(plan)
+        carried = Carried(plan)
+        self.outcome.carried.append(carried)
         ceiling = self.settings.limits.max_rate if not plan.open_model else None
-        executor.run(plan, ceiling, lambda elapsed: self._watch(plan, executor.recorder, elapsed))
+        executor.run(plan, ceiling, lambda elapsed: self._watch(carried, executor.recorder, elapsed))
 
-    def _watch(self, plan: Plan, recorder: Recorder, elapsed: float) -> bool:
+    def _watch(self, carried: Carried, recorder: Recorder, elapsed: float) -> bool:
         """Whether to end now."""
-        self.outcome.elapsed_s = max(0.0, min(elapsed, plan.length_s))
+        plan = carried.plan
+        carried.elapsed_s = max(0.0, min(elapsed, plan.length_s))
+        elapsed += plan.offset_s
         if os.getppid() != self._parent:  # whoever started us is gone
             self.outcome.interrupted = True
         if self.outcome.dead_at is None and self._liveness.is_due(elapsed):
@@ -205,7 +250,7 @@ class Run:
         if elapsed - self._told >= 1.0:
             self._told = elapsed
             done = sum(cell.service.total for cell in recorder.cells.values())
-            tell(f"{elapsed:6.1f} s of {plan.length_s:.0f} s: {done} requests answered")
+            tell(f"{elapsed:6.1f} s of {plan.offset_s + plan.length_s:.0f} s: {done} requests answered")
         return self.outcome.interrupted or self.outcome.dead_at is not None
 
     def _number(self, plan: Plan) -> None:

@@ -162,7 +162,7 @@ class DistributedExecutor:
         origin = now_ns() + int(LEAD_S * _NS)
         self._began = self._began or origin
         self._send_off(present, plan, origin, ceiling)
-        deadline = plan.length_s + plan.timeout_s + _GRACE_S
+        deadline = plan.length_s + 2 * plan.timeout_s + _GRACE_S
         stopped = False
         while any(not member.done for _, member in present):
             gevent.sleep(0.05)
@@ -170,7 +170,7 @@ class DistributedExecutor:
             self._look_for_lost(present, overdue=elapsed > deadline)
             if not stopped and watch(elapsed):
                 stopped = True
-                deadline = elapsed + plan.timeout_s + _GRACE_S
+                deadline = elapsed + 2 * plan.timeout_s + _GRACE_S
                 for client, member in present:
                     if member.state != "lost":
                         self.runner.send_message("roaas_stop", None, client)

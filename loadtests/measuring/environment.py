@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 
 from loadtests.clients.endpoint import Endpoint
+from loadtests.measuring.command_line import without_folders
 
 if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
@@ -113,5 +114,5 @@ def _shown(words: list[str]) -> str:
         elif _SECRET.search(word) and "=" in word:
             found.append(word.split("=", 1)[0] + "=***")
         else:
-            found.append(Path(word).name if word.startswith("/") else word)
+            found.append(without_folders(word))
     return shlex.join(found)

@@ -11,6 +11,7 @@ import gevent
 from loadtests.clients.callers import Caller, Workload
 from loadtests.clients.library import LIBRARY, Sent, read_document
 from loadtests.clients.payloads import VARIANTS
+from loadtests.clients.wire import now_ns
 from loadtests.measuring.locust_feed import LocustFeed
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Arrival, Pacer
@@ -37,9 +38,17 @@ class _Sink:
         self.record = session.recorder.record
         self.count = session.recorder.count
 
-    def failed(self, segment: int, operation: int, error: CallError, due_ns: int) -> None:
+    def failed(self, segment: int, operation: int, error: CallError, due_ns: int, start_ns: int) -> None:
         session = self._session
-        session.recorder.fail(segment, operation, error.kind, str(error), due_ns - session.origin_ns)
+        now = now_ns()
+        session.recorder.fail(
+            segment,
+            operation,
+            error.kind,
+            str(error),
+            due_ns - session.origin_ns + session.offset_ns,
+            (now - start_ns, now - due_ns),
+        )
         session.feed.failed(session.series_of.get(segment, -1), operation, error)
 
 
@@ -57,11 +66,13 @@ class Session:
         self.segments: dict[int, Segment] = {}
         self.feed = LocustFeed(environment, operations)
         self.recorder = Recorder(self.series_of, self.feed.succeeded)
-        self.origin_ns = 0
+        self.origin_ns = self.offset_ns = 0
         self.cpu_share: float | None = None
         self._first = 0
         self._busy = 0
         self._cpu: list[tuple[float, float]] = []
+        self._block: tuple[int, float, float] | None = None
+        self._callers: list[Caller] = []
         self._workloads = [
             Workload(robot, operations, seed, _documents(robot, operations) if library else {}) for robot in robots
         ]
@@ -71,6 +82,7 @@ class Session:
     def work(self) -> None:
         """What a user does until it is killed: take a request, make it, take the next."""
         callers = [Caller(workload, _Sink(self)) for workload in self._workloads]
+        self._callers += callers
         performs, take, segments = [caller.perform for caller in callers], self.pacer.take, self.segments
         try:
             while True:
@@ -95,6 +107,7 @@ class Session:
         finally:
             for caller in callers:
                 caller.close()
+                self._callers.remove(caller)
 
     def run(self, plan: Plan, worker: int, origin_ns: int, ceiling: float | None = None) -> None:
         """Carry out a worker's share of a plan, whose times count from `origin_ns` (monotonic).
@@ -105,8 +118,11 @@ class Session:
         self._first = plan.first_segment
         self.series_of.update(plan.series_of())
         self.segments.update({plan.first_segment + index: segment for index, segment in enumerate(plan.segments)})
-        self.origin_ns = origin_ns
-        self._cpu = []
+        self.origin_ns, self.offset_ns = origin_ns, int(plan.offset_s * _NS)
+        if plan.repeat and plan.step_rate is None:
+            for caller in self._callers:
+                caller.close()
+        self._cpu, self._block = [], None
         Sent.requests = Sent.calls = 0  # what was sent to look around is no call of the run
         gc.collect()
         gc.freeze()  # what exists now lives on: a collection in mid-run would look like a stall of the robot
@@ -115,25 +131,33 @@ class Session:
             schedule, origin_ns, open_model=plan.open_model, interval_ns=int(_NS / ceiling) if ceiling else 0
         )
         self.pacer.done.wait()
-        with gevent.Timeout(self._timeout_s + 1, exception=False):
-            while self._busy:
-                gevent.sleep(0.01)
+        self._look_at_processor(None)
+        self._wait_for_answers()
+        self.pacer.give_up()  # what is late by a whole deadline will not be started any more
+        self._wait_for_answers()
         self.recorder.flush()
         if Sent.requests > Sent.calls:
             self.recorder.count("resends", Sent.requests - Sent.calls)
+
+    def _wait_for_answers(self) -> None:
+        """Until no request is under way; each has its own deadline."""
+        with gevent.Timeout(self._timeout_s + 1, exception=False):
+            while self._busy:
+                gevent.sleep(0.01)
 
     def stop(self) -> None:
         """End the plan now; requests under way may finish."""
         self.pacer.stop()
 
     def _dropped(self, arrival: Arrival) -> None:
-        self.recorder.drop(arrival.segment + self._first, arrival.operation)
+        self.recorder.drop(arrival.segment + self._first, arrival.operation, now_ns() - arrival.due_ns)
 
     def _between(self, index: int) -> None:
         """In the gap before a segment: bin what was recorded, and look at the processor's time."""
+        number = index + self._first
+        now = self._look_at_processor(number)
         self.recorder.flush()
-        segment = self.segments[index + self._first]
-        now = (time.monotonic(), time.process_time())
+        segment = self.segments[number]
         if self._cpu and segment.phase != "warmup":
             spent = now[1] - self._cpu[0][1]
             elapsed = now[0] - self._cpu[0][0]
@@ -143,6 +167,15 @@ class Session:
             self._cpu = [now]
         if self.after_segment is not None:
             self.after_segment()
+
+    def _look_at_processor(self, following: int | None) -> tuple[float, float]:
+        """Note the share of a core that the segment which is over took, before one that follows, if any does."""
+        now = (time.monotonic(), time.process_time())
+        if self._block is not None and now[0] > self._block[1]:
+            segment, began, spent = self._block
+            self.recorder.was_busy(segment, min(1.0, (now[1] - spent) / (now[0] - began)))
+        self._block = None if following is None else (following, *now)
+        return now
 
 
 def _documents(robot: Robot, operations: tuple[str, ...]) -> dict[str, Any]:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from conformance.contract.exit_codes import ExitCode
 from loadtests.clients.library import LIBRARY
 from loadtests.clients.payloads import CATALOGUE
+from loadtests.measuring.command_line import without_folders
 from loadtests.measuring.environment import describe
+from loadtests.measuring.machine import Moment, conditions
+from loadtests.measuring.pauses import PAUSE_S
 from loadtests.result.files import FORMAT
 from loadtests.schedule.arrivals import Schedule, arrivals_due
 from loadtests.schedule.plan import GAP_S, step_operation
-from loadtests.statistics import against, end_to_end, figures, steps, verdict
+from loadtests.statistics import against, end_to_end, figures, over_time, steps, threshold, verdict
+from loadtests.statistics.headline import headline
+from loadtests.statistics.intervals import order_interval_ms
+from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.third_way import other_ways
 
@@ -33,51 +39,81 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     """Exit code and latency.json of a duel's plan, carried out or `aborted` before."""
     executor, settings = outcome.executor, outcome.settings
     recorder = executor.recorder if executor is not None else Recorder()
-    measured = figures.Measured(plan, recorder)
+    measured = Measured([carried.plan for carried in outcome.carried] or [plan], recorder)
     generator = _generator(outcome, measured)
     pacing = executor.pacing if executor else ""
+    comparisons = figures.comparisons(measured)
     reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
+    undecided = [] if aborted or reasons else verdict.failures(generator) + verdict.says_nothing(comparisons)
     workers, losses = _workers(outcome, plan)
-    judged = [] if aborted else verdict.judge(measured, settings.thresholds)
+    judged = [] if aborted else threshold.judge(measured, settings.thresholds)
     noise_floor = figures.noise_floor(measured)
     compared = _against(outcome, measured, noise_floor)
-    code = _code(outcome, aborted, reasons, judged, compared)
+    code = _code(outcome, aborted, Reasons(reasons, undecided), judged, compared)
+    reasons += undecided
+    machine, spoilt = conditions(outcome.before, Moment.now())
+    words = _plan_words(settings, plan, pacing)
     document = {
         "format": FORMAT,
         "valid": not reasons,
         "invalid_because": reasons,
-        "notes": outcome.notes + notes + losses,
+        "notes": outcome.notes + notes + spoilt + losses,
         "interrupted": outcome.interrupted or outcome.dead_at is not None,
         "exit_code": code,
         "started": _stamp(outcome.started),
         "finished": _stamp(datetime.now(UTC)),
-        "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers),
-        "plan": _plan_words(settings, plan, pacing),
+        "headline": headline(comparisons, words),
+        "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers) | {"machine": machine},
+        "plan": words,
         "generator": generator,
         "workers": workers,
-        "series": figures.series(measured, outcome.findings.sizes),
-        "comparisons": figures.comparisons(measured),
+        "series": [
+            entry | {"after_pause": _after_pause(outcome, entry)}
+            for entry in figures.series(measured, outcome.findings.sizes)
+        ],
+        "comparisons": comparisons,
         "noise_floor": noise_floor,
         "other_ways": other_ways(measured),
         **_end_to_end(outcome),
         **({"against": compared} if compared else {}),
-        "time_series": figures.time_series(measured),
+        "time_series": over_time.time_series(measured),
+        "blocks": over_time.blocks(measured),
         "steps": outcome.steps,
         "knee": _knee(outcome, plan),
         "knee_search": outcome.knee_searches,
         "over_connections": outcome.over_connections,
-        "errors": figures.errors(recorder, plan.operations) + _early_errors(outcome.findings),
+        "errors": over_time.errors(recorder, plan.operations) + _early_errors(outcome.findings),
         "thresholds": judged,
     }
     return code, document
 
 
-def _generator(outcome: Outcome, measured: figures.Measured) -> dict[str, Any]:
-    plan = measured.plan
-    asked = sum(arrivals_due(plan, outcome.elapsed_s, phase=phase) for phase in ("duel", "aa", "against"))
-    elapsed_s = max(0.0, outcome.elapsed_s - plan.load.warmup_s)
-    return verdict.generator_figures(measured, asked, elapsed_s, outcome.cpu_share)
+def _generator(outcome: Outcome, measured: Measured) -> dict[str, Any]:
+    phases = ("duel", "aa", "against")
+    asked, active_s = 0, 0.0
+    for carried in outcome.carried:
+        asked += sum(arrivals_due(carried.plan, carried.elapsed_s, phase=phase) for phase in phases)
+        active_s += carried.plan.active_s(carried.elapsed_s, phases)
+    return verdict.generator_figures(measured, asked, active_s, outcome.cpu_share)
+
+
+def _after_pause(outcome: Outcome, entry: dict[str, Any]) -> dict[str, Any] | None:
+    """What a series' requests cost after a pause, and behind one another; None where that was not measured."""
+    paused = outcome.paused.get((entry["operation"], entry["interface"], entry["client"]))
+    if paused is None:
+        return None
+    return {
+        "pause_s": PAUSE_S,
+        "spacing_s": figures.rounded(paused.spacing_s),
+        "failed": paused.failed,
+        "cold_count": paused.cold.total,
+        "warm_count": paused.warm.total,
+        "cold_ms": figures.plain_quantiles(paused.cold),
+        "warm_ms": figures.plain_quantiles(paused.warm),
+        "cold_ci95_ms": figures.rounded_interval(order_interval_ms(paused.cold, 0.5)),
+        "warm_ci95_ms": figures.rounded_interval(order_interval_ms(paused.warm, 0.5)),
+    }
 
 
 def _endings(outcome: Outcome, plan: Plan) -> list[str]:
@@ -86,11 +122,13 @@ def _endings(outcome: Outcome, plan: Plan) -> list[str]:
     if outcome.dead_at is not None:
         found.append(f"no request succeeded from {outcome.dead_at:.1f} s on")
     if outcome.interrupted:
-        found.append(f"interrupted after {outcome.elapsed_s:.1f} of {plan.length_s:.1f} s")
+        done = sum(carried.elapsed_s for carried in outcome.carried)
+        whole = outcome.settings.repeats.number * plan.length_s
+        found.append(f"interrupted after {done:.1f} of {whole:.1f} s")
     return found
 
 
-def _against(outcome: Outcome, measured: figures.Measured, noise_floor: list[dict[str, Any]]) -> dict[str, Any] | None:
+def _against(outcome: Outcome, measured: Measured, noise_floor: list[dict[str, Any]]) -> dict[str, Any] | None:
     """What became of the comparison with another robot, where there is one."""
     settings = outcome.settings.against
     if settings is None:
@@ -114,10 +152,22 @@ def _end_to_end(outcome: Outcome) -> dict[str, Any]:
     return {"end_to_end": {"domain_id": settings.domain_id, "topic": outcome.robots[0].delivery_topic, "ways": ways}}
 
 
+class Reasons(NamedTuple):
+    """Why a run is not valid.
+
+    Attributes:
+        worthless: its figures say nothing about the robot.
+        undecided: they do, and leave nothing to compare; a threshold that they miss is missed all the same.
+    """
+
+    worthless: list[str]
+    undecided: list[str]
+
+
 def _code(
     outcome: Outcome,
     aborted: RunAborted | None,
-    reasons: list[str],
+    reasons: Reasons,
     judged: list[dict[str, Any]],
     compared: dict[str, Any] | None,
 ) -> int:
@@ -125,12 +175,14 @@ def _code(
         return aborted.code
     if outcome.interrupted:
         return ExitCode.INTERRUPTED
-    if reasons:
+    if reasons.worthless:
         return ExitCode.INCONCLUSIVE
     outcomes = {entry["outcome"] for entry in judged}
     following = against.code_of(compared)
     if "missed" in outcomes or following == ExitCode.FAILED:
         return ExitCode.FAILED
+    if reasons.undecided:
+        return ExitCode.INCONCLUSIVE
     return ExitCode.INCONCLUSIVE if "inconclusive" in outcomes else following
 
 
@@ -207,7 +259,9 @@ def _plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
         "operations": list(plan.operations),
         "interfaces": list(plan.interfaces),
         "clients": {name: CLIENT_WORDS[name] for name in plan.clients},
-        "zeep_rate": plan.rate_of(LIBRARY) if plan.open_model and LIBRARY in plan.clients else None,
+        "zeep_rate": plan.load.rate if plan.open_model and LIBRARY in plan.clients else None,
+        "repeats": settings.repeats.number,
+        "restart_command": without_folders(settings.repeats.restart_command or "") or None,
         "methods": {name: CATALOGUE[name].element for name in plan.operations},
         "processes": plan.workers,
         "connections": plan.connections,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from loadtests.measuring.machine import Moment
 from loadtests.measuring.preflight import Findings
 
 if TYPE_CHECKING:
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
     from loadtests.measuring.distributed_executor import Executor
     from loadtests.measuring.end_to_end import Journeys
+    from loadtests.measuring.pauses import Paused
+    from loadtests.schedule.plan import Plan, SeriesName
     from loadtests.settings.settings import Settings
 
 
@@ -25,6 +28,14 @@ class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
 
 
 @dataclass
+class Carried:
+    """A plan, and how much of it was carried out."""
+
+    plan: Plan
+    elapsed_s: float = 0.0
+
+
+@dataclass
 class Outcome:
     """What became of a run so far.
 
@@ -33,7 +44,9 @@ class Outcome:
         findings: of the calls to the first before the run.
         notes: worth knowing; invalid: makes the run worthless.
         interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
-        elapsed_s: how much of the plan was carried out.
+        carried: each repeat's plan, and how many seconds of it were carried out.
+        paused: what requests cost after a pause and behind one another, by series.
+        before: the machine when the run began.
         cpu_share: the busiest worker's share of a core in the duel.
         steps: results of the stepped load.
         knee_searches: results of the searches for the knee; over_connections: of more and more connections.
@@ -49,7 +62,9 @@ class Outcome:
     interrupted: bool = False
     dead_at: float | None = None
     executor: Executor | None = None
-    elapsed_s: float = 0.0
+    carried: list[Carried] = field(default_factory=list)
+    paused: dict[SeriesName, Paused] = field(default_factory=dict)
+    before: Moment = field(default_factory=Moment.now)
     cpu_share: float | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
     knee_searches: list[dict[str, Any]] = field(default_factory=list)

@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+_JUDGED = {
+    "differs": "a difference",
+    "bounded": "a difference of which only a bound is known",
+    "noise": "cannot be told from noise",
+    "none": "says nothing",
+}
+
 
 def _ms(value: float | None) -> str:
     return "       -" if value is None else f"{value:8.3f}"
@@ -25,7 +32,7 @@ def summary(document: dict[str, Any]) -> str:
             between = f" (95 %: {interval[0]:.3f} to {interval[1]:.3f})" if interval else ""
             lines.append(
                 f"{entry['operation']} ({entry['client']}): SOAP takes {entry['ratio']:.3f}{between} times as long "
-                f"as REST at the median, {entry['soap_minus_rest_ms']:+.3f} ms"
+                f"as REST at the median, {entry['soap_minus_rest_ms']:+.3f} ms: {_JUDGED[entry['judgement']]}"
             )
     for entry in document["other_ways"]:
         if entry["quantile"] == "p50" and entry["ratio"] is not None:
@@ -36,6 +43,8 @@ def summary(document: dict[str, Any]) -> str:
                 f"times as long as REST at the median, {entry['minus_rest_ms']:+.3f} ms"
             )
     lines += _end_to_end(document.get("end_to_end"))
+    if document["headline"]:
+        lines.append(document["headline"]["sentence"])
     lines += _against(document.get("against"))
     for entry in document["knee"]:
         highest = entry["highest_rate"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from loadtests.clients.payloads import VARIANTS
-from loadtests.schedule.plan import GAP_S, Plan
+from loadtests.schedule.plan import Plan
 
 _NS = 1_000_000_000
 
@@ -26,20 +26,23 @@ class Schedule:
         self._counts = self._counted()
 
     def _counted(self) -> list[int]:
-        """Arrivals of each segment over all workers. Constant: rounding errors do not add up over segments."""
+        """Arrivals of each segment over all workers: at the rate asked for, for as long as the segment is open.
+
+        Constant: rounding errors do not add up over segments.
+        """
         plan = self.plan
         if not plan.open_model:
             return [0] * len(plan.segments)
         if plan.load.arrivals == "poisson":
             return [
-                int(self._lot(index, 2).poisson(segment.rate * (segment.end_ns - segment.start_ns) / _NS))
+                int(self._lot(index, 2).poisson(segment.rate * segment.active_s))
                 for index, segment in enumerate(plan.segments)
             ]
         owed: dict[tuple[str, str, str], float] = {}
         counts = []
         for segment in plan.segments:
             key = (segment.phase, segment.interface, segment.client)
-            owed[key] = owed.get(key, 0.5) + segment.rate * (segment.end_ns - segment.start_ns) / _NS
+            owed[key] = owed.get(key, 0.5) + segment.rate * segment.active_s
             counts.append(int(owed[key] + 1e-9))
             owed[key] -= counts[-1]
         return counts
@@ -53,8 +56,7 @@ class Schedule:
 
     def starts_ns(self, segment: int) -> int:
         """Offset at which a segment's requests may start: after the quiet gap."""
-        found = self.plan.segments[segment]
-        return found.start_ns + min(int(GAP_S * _NS), (found.end_ns - found.start_ns) // 4)
+        return self.plan.segments[segment].opens_ns
 
     def ends_ns(self, segment: int) -> int:
         """Offset of a segment's end."""

@@ -88,6 +88,11 @@ class Pacer:
         self._closes = 0
         self.done.set()
 
+    def give_up(self) -> None:
+        """Drop what nobody has started yet."""
+        while self._backlog:
+            self.on_drop(self._backlog.popleft())
+
     def close(self) -> None:
         """Stop for good."""
         self.stop()

@@ -1,9 +1,10 @@
 """What a run does when: segments of one client on one interface, a schedule that the seed fixes.
 
 A fair duel: REST and SOAP take turns in blocks of a tenth of a second or more, in quartets REST-SOAP-SOAP-REST
-or the reverse by lot (ABBA), so that a drift of the machine or the robot meets both alike. In every fifth
-quartet one interface meets itself under two names (A/A): what difference that shows is noise. The library
-clients get quartets of their own, for their CPU time would delay the wire client's starts.
+or the reverse by lot (ABBA), so that a drift of the machine or the robot meets both alike. In two quartets of
+five one interface meets itself under two names (A/A): what difference that shows is noise, and it is given as
+much time as the duel, so that it is known as well as the effect is. The library clients get quartets of their
+own, for their CPU time would delay the wire client's starts.
 
 Three interfaces take turns likewise, in sextets; two robots over one interface in each quartet.
 """
@@ -27,14 +28,15 @@ CLIENTS = tuple(map(str, Client))
 OPERATIONS = tuple(map(str, Operation))
 MOVES = frozenset({"delivery", "coffee"})
 
-#: The library clients' rate for each worker: a call costs some 1.5 ms of the generator's time, and a generator
-#: that is busy for more than a fraction of it measures itself.
-LIBRARY_RATE = 100.0
+#: The highest rate for each worker at which the library clients take part: a call costs some 1.5 ms of the
+#: generator's time, and a generator that is busy for more than a fraction of it measures itself.
+LIBRARY_RATE = 250.0
 GAP_S = 0.010
 _BLOCK_S = 0.1
 _MAX_BLOCKS = 600  # bounds memory: each block keeps its own histograms
 _ARRIVALS_PER_BLOCK = 10
-_TURNS, _LIBRARY_TURN, _AA_TURN = 5, 1, 3  # of five quartets the second and the fourth
+_TURNS, _LIBRARY_TURN = 5, 1  # of five rounds the second
+_AA_TURNS = {1: (2, 4), 2: (4,)}  # the third and the fifth; the fifth alone where two robots meet
 _NS = 1_000_000_000
 
 
@@ -64,6 +66,16 @@ class Segment:
     pair: int
     rate: float
     robot: int = 0
+
+    @property
+    def opens_ns(self) -> int:
+        """Offset at which its requests may start: after the quiet gap."""
+        return self.start_ns + min(int(GAP_S * _NS), (self.end_ns - self.start_ns) // 4)
+
+    @property
+    def active_s(self) -> float:
+        """For how long its requests may start."""
+        return (self.end_ns - self.opens_ns) / _NS
 
 
 @dataclass(frozen=True)
@@ -95,6 +107,8 @@ class Plan:
         first_segment: numbers the segments on from those of the plan before it.
         step_rate: a step of the stepped load instead of a duel: arrivals per second; 0 in the closed model.
         connections: users that are up in all; in the closed model as many take part as the load says.
+        repeat: which of several runs of the same plan this is; those after the first begin with new connections.
+        offset_s: when it starts, in seconds of load since the first one's start.
     """
 
     operations: tuple[str, ...]
@@ -109,6 +123,8 @@ class Plan:
     first_segment: int = 0
     settle_s: float = field(default=0.5)
     robots: int = 1
+    repeat: int = 0
+    offset_s: float = 0.0
 
     def as_message(self) -> dict[str, Any]:
         """A form that msgpack carries."""
@@ -151,7 +167,7 @@ class Plan:
         if self.load.rate:
             least = max(least, _ARRIVALS_PER_BLOCK / self.load.rate)
         most = int(self.load.duration_s / least + 1e-9)
-        lot = np.random.default_rng([self.load.seed, 1])
+        lot = np.random.default_rng([self.load.seed, 1, self.repeat])
         made: list[Segment] = []
         for number in count():
             turn = self._round(number, swapped=bool(lot.integers(2)))
@@ -165,15 +181,27 @@ class Plan:
         """Length of a block."""
         return self.load.duration_s / self.blocks
 
-    def rate_of(self, client: str) -> float:
-        """Arrivals per second over all workers while a client has its turn."""
-        rate = self.load.rate or 0.0
-        return rate if client == "wire" else min(rate, LIBRARY_RATE * self.workers)
-
     @cached_property
     def segments(self) -> list[Segment]:
         """All segments in order; their numbers begin at `first_segment`."""
         return self._steps() if self.step_rate is not None else [*self._warmup(), *self._duel()]
+
+    def active_s(self, elapsed_s: float, phases: tuple[str, ...]) -> float:
+        """For how long requests of some phases may have started in the segments that were over by then."""
+        return sum(
+            segment.active_s
+            for segment in self.segments
+            if segment.phase in phases and segment.end_ns <= elapsed_s * _NS + 1
+        )
+
+    def again(self) -> Plan:
+        """The same once more, after this one, with the lots drawn anew."""
+        return replace(
+            self,
+            repeat=self.repeat + 1,
+            first_segment=self.first_segment + len(self.segments),
+            offset_s=self.offset_s + self.length_s,
+        )
 
     @cached_property
     def length_s(self) -> float:
@@ -189,11 +217,12 @@ class Plan:
         if self.load.warmup_s <= 0:
             return []
         blocks = max(len(turns), round(self.load.warmup_s / _BLOCK_S))
+        rate = self.load.rate or 0.0
         made = []
         for index in range(blocks):
             client, interface, robot = turns[index % len(turns)]
             start, end = (int(self.load.warmup_s * edge / blocks * _NS) for edge in (index, index + 1))
-            made.append(Segment(start, end, "warmup", interface, client, "", -1, self.rate_of(client), robot))
+            made.append(Segment(start, end, "warmup", interface, client, "", -1, rate, robot))
         return made
 
     def _duel(self) -> list[Segment]:
@@ -207,15 +236,16 @@ class Plan:
     def _round(self, number: int, *, swapped: bool) -> list[Segment]:
         """All sides in turn, and then in reverse: four blocks of two sides, six of three.
 
-        Of five rounds the second goes to the library clients and the fourth to A/A.
+        Of five rounds the second goes to the library clients, the third and the fifth to A/A.
         """
         turn = number % _TURNS
         client = self.clients[-1] if turn == _LIBRARY_TURN else self.clients[0]
-        if turn == _AA_TURN:
-            interface = self.interfaces[(number // _TURNS) % len(self.interfaces)]
+        itself = _AA_TURNS[self.robots]
+        if turn in itself:
+            interface = self.interfaces[(number // _TURNS * len(itself) + itself.index(turn)) % len(self.interfaces)]
             sides = [("aa", interface, "a", 0), ("aa", interface, "b", 0)]
         elif self.robots > 1:
-            earlier = number - (number + _TURNS - 1 - _AA_TURN) // _TURNS  # duels before it: interfaces take turns
+            earlier = number - number // _TURNS  # duels before it: interfaces take turns
             interface = self.interfaces[earlier % len(self.interfaces)]
             sides = [("duel", interface, "", 0), ("against", interface, "", 1)]
         else:
@@ -224,7 +254,7 @@ class Plan:
             sides.reverse()
         if len(sides) == 1:
             sides *= 2  # one interface alone has as many blocks
-        rate = self.rate_of(client)
+        rate = self.load.rate or 0.0
         return [
             Segment(0, 0, phase, interface, client, label, 2 * number + half, rate, robot)
             for half, order in enumerate((sides, sides[::-1]))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from conformance.contract.statement import Endpoints, Statement
-from loadtests.settings.settings import STEP_S, Generator, Selection
+from loadtests.settings.settings import STEP_S, Generator, Repeats, Selection
 
 TOLERANCE = 0.05
 KNEE_SEARCHES = 5
@@ -42,6 +42,7 @@ class CliOptions:
     knee: bool = False
     knee_searches: int = KNEE_SEARCHES
     connections: tuple[int, ...] = ()
+    repeats: Repeats = field(default_factory=Repeats)
     allow_motion: bool = False
     thresholds: tuple[Threshold, ...] = ()
     rosbridge: str | None = None
@@ -59,7 +60,8 @@ class CliOptions:
         endpoints = {name: value for name, value in endpoints.items() if value not in {None, ""}}
         selection = Selection(**_take(given, [item.name for item in fields(Selection)]))
         generator = Generator(**_take(given, [item.name for item in fields(Generator)]))
-        return cls(endpoints, selection, generator, **given)
+        repeats = Repeats(given.pop("repeat", 1), given.pop("restart_command", None))
+        return cls(endpoints, selection, generator, repeats=repeats, **given)
 
 
 def _take(given: dict[str, Any], names: list[str] | tuple[str, ...]) -> dict[str, Any]:

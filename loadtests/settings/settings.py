@@ -46,6 +46,14 @@ class Steps:
 
 
 @dataclass(frozen=True)
+class Repeats:
+    """How often the duel is run, and the command that starts the robot anew before each time but the first."""
+
+    number: int = 1
+    restart_command: str | None = None
+
+
+@dataclass(frozen=True)
 class Limits:
     """What the statement allows, or the default for what moves a robot: requests per second, and seconds."""
 
@@ -126,6 +134,7 @@ class Settings:
     selection: Selection
     load: Load
     steps: Steps
+    repeats: Repeats
     limits: Limits
     generator: Generator
     output: Output

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -12,6 +12,7 @@ from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS, Load
+from loadtests.settings.contradictions import contradiction
 from loadtests.settings.settings import Against, EndToEnd, Limits, Output, Selection, Settings, Steps
 
 if TYPE_CHECKING:
@@ -25,11 +26,7 @@ DEFAULT_STEP_RATES = (100.0, 200.0, 400.0, 800.0, 1600.0, 3200.0, 6400.0, 12800.
 #: For anything that moves a robot, unless its statement's [load] says otherwise.
 MOTION_RATE = 500.0
 MOTION_DURATION_S = 120.0
-_MOST_RATE = 1_000_000.0
-_MOST_USERS = 10_000
-_MOST_CONNECTIONS = 4096
 _MOST_TOLERANCE = 10.0
-_MOST_DURATION_S = 24 * 3600.0
 
 
 class SettingsError(ValueError):
@@ -49,7 +46,9 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
     if "rosbridge" in interfaces:
         robot = replace(robot, rosbridge=options.rosbridge, delivery_topic=statement.ros.delivery_topic)
     operations = _operations(options)
-    _check_numbers(options)
+    wrong = contradiction(options)
+    if wrong is not None:
+        raise SettingsError(wrong)
     rate, duration_s = _bounded(options, statement, operations)
     generator = options.generator
     clients = tuple(name for name in CLIENTS if name in (options.selection.clients or CLIENTS))
@@ -67,6 +66,7 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
             seed=options.seed,
         ),
         steps=_steps(options, statement, operations),
+        repeats=options.repeats,
         limits=Limits(_ceiling(statement, operations)[0], _longest(statement, operations)[0]),
         generator=replace(
             generator, expect=max(generator.expect, generator.processes if generator.processes > 1 else 0)
@@ -196,29 +196,6 @@ def _operations(options: CliOptions) -> tuple[str, ...]:
     return tuple(name for name in OPERATIONS if name in options.selection.operations)
 
 
-def _check_numbers(options: CliOptions) -> None:
-    if options.rate is not None and options.users is not None:
-        raise SettingsError("--rate (open model) and --users (closed model) exclude each other")
-    if options.users is not None and (options.steps or options.step_rates or options.knee):
-        raise SettingsError("--steps and --knee offer rates, which is an open model: give --rate instead of --users")
-    if options.generator.processes + options.generator.expect < 1:
-        raise SettingsError("--processes 0 leaves the work to others: say how many with --expect-workers")
-    ranges: list[tuple[str, Any, float, float]] = [
-        ("--rate", options.rate, 0.0, _MOST_RATE),
-        ("--users", options.users, 0, _MOST_USERS),
-        ("--duration", options.duration_s, 0.0, _MOST_DURATION_S),
-        ("--timeout", options.endpoints.get("timeout_s"), 0.0, 3600.0),
-        ("--step-duration", options.step_s, 0.0, 600.0),
-        *(("--connections", users, 0, _MOST_CONNECTIONS) for users in options.connections),
-        *(("--step-rates", rate, 0.0, _MOST_RATE) for rate in options.step_rates),
-    ]
-    for name, value, low, high in ranges:
-        if value is not None and not low < value <= high:
-            raise SettingsError(f"{name} {value:g} is out of range: above {low:g}, at most {high:g}")
-    if options.warmup_s is not None and not 0 <= options.warmup_s <= _MOST_DURATION_S:
-        raise SettingsError(f"--warmup {options.warmup_s:g} is out of range: 0 or more")
-
-
 def _ceiling(statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, str]:
     """The highest rate allowed, and who says so."""
     found: list[tuple[float, str]] = []
@@ -251,8 +228,10 @@ def _bounded(options: CliOptions, statement: Statement, operations: tuple[str, .
     if rate is not None and most is not None and rate > most:
         raise SettingsError(f"--rate {rate:g} exceeds {most:g} requests/s ({why})")
     duration_s = options.duration_s or min(DEFAULT_DURATION_S, longest or DEFAULT_DURATION_S)
-    if longest is not None and duration_s > longest:
-        raise SettingsError(f"--duration {duration_s:g} exceeds {longest:g} s ({reason})")
+    repeats = options.repeats.number
+    if longest is not None and duration_s * repeats > longest:
+        times = f" {repeats} times" if repeats > 1 else ""
+        raise SettingsError(f"--duration {duration_s:g}{times} exceeds {longest:g} s ({reason})")
     return rate, duration_s
 
 

@@ -15,11 +15,13 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from conformance.contract.exit_codes import ExitCode
-from loadtests.statistics.figures import compared, named, plain_quantiles
+from loadtests.statistics.figures import compared, named, pair_s, plain_quantiles, rounded_interval
+from loadtests.statistics.intervals import figure_interval_ms
+from loadtests.statistics.measured import Side
 
 if TYPE_CHECKING:
     from loadtests.schedule.plan import SeriesName
-    from loadtests.statistics.figures import Measured
+    from loadtests.statistics.measured import Measured
 
 #: The median decides; a 99th percentile that is surely slower counts as well, one that nothing can be told of does not.
 DECIDING = "p50"
@@ -70,8 +72,11 @@ def against(measured: Measured, noise_floor: list[dict[str, Any]], tolerance: fl
     }
     changes = []
     for name in names:
+        # The other robot's first: the ratio is this robot's time over that one's.
+        units = measured.paired(Side("against", name), Side("duel", name))
+        length = pair_s(measured, "duel", name)
         for quantile in _SHOWN:
-            change = compared(_pairs(measured, name), quantile, measured.plan.load.seed, "difference_ms")
+            change = compared(units, quantile, measured, "difference_ms", length)
             said = judge.verdict(change["ratio"], change["ci95"], noise.get((*name, quantile)))
             changes.append(named(name) | change | {"verdict": said if quantile in JUDGED else None})
     return {
@@ -95,21 +100,18 @@ def _overall(changes: list[dict[str, Any]]) -> str:
     return NOT_SLOWER if deciding and set(deciding) == {NOT_SLOWER} else UNCLEAR
 
 
-def _pairs(measured: Measured, name: SeriesName) -> list[tuple[Any, Any]]:
-    """Neighbouring blocks, the other robot's first: the ratio is this robot's time over that one's."""
-    there, here = ({pair: cell.service for pair, cell in measured.blocks(phase, name)} for phase in ("against", "duel"))
-    return [(there[pair], here[pair]) for pair in sorted(set(there) & set(here))]
-
-
 def _series(measured: Measured, name: SeriesName) -> dict[str, Any]:
     """The other robot's figures, less than what `series` holds of this one."""
     whole = measured.total("against", name)
-    bounds = {quantile: measured.interval(name, "service", quantile, "against")[0] for quantile in ("p50", "p99")}
+    units, seed = measured.units(name, "service", "against"), measured.plan.load.seed
+    bounds = {
+        quantile: rounded_interval(figure_interval_ms(units, quantile, seed).interval) for quantile in ("p50", "p99")
+    }
     return named(name) | {
         "count": whole.service.total,
         "errors": whole.errors,
-        "service_ms": plain_quantiles(whole.service),
-        "response_ms": plain_quantiles(whole.response),
+        "service_ms": plain_quantiles(measured.whole(name, "service", "against")),
+        "response_ms": plain_quantiles(measured.whole(name, "response", "against")),
         "ci95_ms": bounds,
         "histogram": whole.service.encode(),
     }

@@ -9,7 +9,8 @@ import numpy as np
 
 from loadtests.statistics.figures import plain_quantiles, rounded, rounded_interval
 from loadtests.statistics.histogram import Histogram
-from loadtests.statistics.intervals import SHARES, at_most, order_interval_ms
+from loadtests.statistics.intervals import at_most, order_interval_ms
+from loadtests.statistics.rounds import SHARES
 
 _TAIL = 0.025
 _BASE = "rest"

@@ -1,27 +1,30 @@
-"""From cells to figures: series, comparisons, noise floor, time series and errors of latency.json."""
+"""From cells to figures: series, comparisons and noise floor of latency.json."""
 
 from __future__ import annotations
 
-from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
-from loadtests.schedule.plan import SERIES, Plan, SeriesName
+from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.intervals import (
-    LEAST_BLOCKS,
-    SHARES,
+    LEAST_ROUNDS,
+    Compared,
+    Drawn,
     Interval,
     compare,
-    quantile_interval_ms,
+    figure_interval_ms,
     samples_for_point,
+    together,
 )
-from loadtests.statistics.recorder import Cell, Recorder, Spans
+from loadtests.statistics.judgement import Judgement, judge
+from loadtests.statistics.measured import Measured, Side
+from loadtests.statistics.rounds import SHARES, Unit
 
 if TYPE_CHECKING:
-    from loadtests.statistics.histogram import Histogram
+    from loadtests.schedule.plan import SeriesName
+    from loadtests.statistics.recorder import Cell
 
-_NS = 1_000_000_000
+_COMPARED_INTERFACES = ("rest", "soap")
 COMPARED = ("mean", "p50", "p90", "p99")
-WIDTH_S = 1.0
 _DIGITS = 6  # nanoseconds
 
 
@@ -60,108 +63,159 @@ def plain_quantiles(histogram: Histogram) -> dict[str, float | None]:
     return quantiles(histogram)[0]
 
 
-class Measured:
-    """A plan's cells in order, by series."""
+def rounds_of(drawn: Drawn | None, pair_s: float) -> dict[str, Any] | None:
+    """What an interval was drawn from: how many rounds of which length, and how they hang together."""
+    if drawn is None:
+        return None
+    rounds = drawn.rounds
+    return {
+        "number": rounds.sample.size,
+        "pairs": rounds.length,
+        "length_s": rounded(rounds.length * pair_s),
+        "autocorrelation": {"pairs": rounded(rounds.unit_correlation), "rounds": rounded(rounds.correlation)},
+        "widened": rounded(drawn.widening),
+    }
 
-    def __init__(self, plan: Plan, recorder: Recorder) -> None:
-        self.plan = plan
-        self.recorder = recorder
 
-    def blocks(self, phase: str, name: SeriesName, label: str | None = None) -> list[tuple[int, Cell]]:
-        """A series' cells with the pair that each belongs to, in order of time."""
-        operation, interface, client = name
-        number = self.plan.operations.index(operation)
-        found = []
-        for index, segment in enumerate(self.plan.segments):
-            if (segment.phase, segment.interface, segment.client) != (phase, interface, client):
-                continue
-            if label is not None and segment.label != label:
-                continue
-            cell = self.recorder.cells.get((self.plan.first_segment + index, number))
-            if cell is not None:
-                found.append((segment.pair, cell))
-        return found
+def pair_s(measured: Measured, phase: str, name: SeriesName) -> float:
+    """How much of the run's time lies between one pair of a series' blocks and the next."""
+    pairs = len({place for place, _, _ in measured.blocks(phase, name)})
+    return sum(plan.load.duration_s for plan in measured.plans) / max(1, pairs)
 
-    def total(self, phase: str, name: SeriesName) -> Cell:
-        """A series' cells added up."""
-        whole = Cell()
-        for _, cell in self.blocks(phase, name):
-            whole.merge(cell)
-        return whole
 
-    def interval(
-        self, name: SeriesName, time: str, quantile: str, phase: str = "duel"
-    ) -> tuple[list[float] | None, str | None]:
-        """The 95 % interval in ms of a series' service or response time in a phase; or None, and why."""
-        histograms = [getattr(cell, time) for _, cell in self.blocks(phase, name)]
-        interval, reason = quantile_interval_ms(histograms, quantile, self.plan.load.seed)
-        return rounded_interval(interval), reason
-
-    def spans(self, phase: str, name: SeriesName) -> Spans:
-        """Where a series' time went."""
-        operation, interface, client = name
-        key = (SERIES.index((phase, interface, client)), self.plan.operations.index(operation))
-        return self.recorder.spans.get(key, Spans())
+def _beyond_answers(found: dict[str, float | None], whole: Cell, time: str) -> list[str]:
+    """Which figures stand for requests that were never answered, so that they are lower bounds."""
+    failed: Histogram = getattr(whole, f"failed_{time}")
+    answered: Histogram = getattr(whole, time)
+    if not failed.total:
+        return []
+    share = answered.total / (answered.total + failed.total)
+    names = [name for name, quantile in SHARES.items() if found[name] is not None and quantile > share]
+    return ["mean", *names, "max"]
 
 
 def series(measured: Measured, sizes: dict[SeriesName, tuple[int, int]]) -> list[dict[str, Any]]:
     """The `series` of latency.json; `sizes` are octets of request and response, as seen before the run."""
-    found = []
-    for name in measured.plan.series_names():
-        whole = measured.total("duel", name)
-        spans = measured.spans("duel", name)
-        service, reasons = quantiles(whole.service)
-        intervals: dict[str, dict[str, Any]] = {"service": {}, "response": {}}
+    return [_one_series(measured, name, *sizes.get(name, (None, None))) for name in measured.plan.series_names()]
+
+
+def _one_series(measured: Measured, name: SeriesName, request: int | None, response: int | None) -> dict[str, Any]:
+    whole = measured.total("duel", name)
+    spans = measured.spans("duel", name)
+    times = {time: measured.whole(name, time) for time in ("service", "response")}
+    service, reasons = quantiles(times["service"])
+    responses = plain_quantiles(times["response"])
+    intervals: dict[str, dict[str, Any]] = {"service": {}, "response": {}}
+    rounds: dict[str, Any] = {}
+    for time, kept in intervals.items():
+        units = measured.units(name, time)
         for quantile in ("p50", "p99"):
-            for time, kept in intervals.items():
-                kept[quantile], reason = measured.interval(name, time, quantile)
-                if reason:
-                    reasons[f"ci95 {quantile}"] = reason
-        request, response = sizes.get(name, (None, None))
+            estimate = figure_interval_ms(units, quantile, measured.plan.load.seed)
+            kept[quantile] = rounded_interval(estimate.interval)
+            if estimate.reason:
+                reasons[f"ci95 {quantile}"] = estimate.reason
+            if time == "service":
+                rounds[quantile] = rounds_of(estimate.drawn, pair_s(measured, "duel", name))
+    return named(name) | {
+        "count": whole.service.total,
+        "errors": whole.errors,
+        "late": whole.late,
+        "dropped": whole.dropped,
+        "counted": times["service"].total,
+        "at_least": _beyond_answers(service, whole, "service"),
+        "service_ms": service,
+        "response_ms": responses,
+        "ci95_ms": intervals["service"],
+        "response_ci95_ms": intervals["response"],
+        "rounds": rounds,
+        "repeats": _repeats(measured, name),
+        "spans_ms": {
+            part: plain_quantiles(getattr(spans, part)) if getattr(spans, part).total else None
+            for part in ("build", "wire", "server", "parse")
+        },
+        "reasons": reasons,
+        "request_bytes": request,
+        "response_bytes": response,
+        "histogram": whole.service.encode(),
+        "response_histogram": whole.response.encode(),
+        "failed_histogram": whole.failed_service.encode() if whole.failed_service.total else None,
+        "failed_response_histogram": whole.failed_response.encode() if whole.failed_response.total else None,
+    }
+
+
+def _repeats(measured: Measured, name: SeriesName) -> list[dict[str, Any]]:
+    """The service time's figures of each repeat alone; empty where there was one run."""
+    if len(measured.plans) == 1:
+        return []
+    found = []
+    for plan in measured.plans:
+        units = [unit for unit in measured.units(name, "service") if unit.repeat == plan.repeat]
+        whole = Histogram()
+        for unit in units:
+            whole.merge(unit.sides[0])
+        figures = plain_quantiles(whole)
+        intervals = {q: figure_interval_ms(units, q, plan.load.seed).interval for q in ("p50", "p99")}
         found.append(
-            named(name)
-            | {
-                "count": whole.service.total,
-                "errors": whole.errors,
-                "late": whole.late,
-                "dropped": whole.dropped,
-                "service_ms": service,
-                "response_ms": plain_quantiles(whole.response),
-                "ci95_ms": intervals["service"],
-                "response_ci95_ms": intervals["response"],
-                "spans_ms": {
-                    part: plain_quantiles(getattr(spans, part)) if getattr(spans, part).total else None
-                    for part in ("build", "wire", "server", "parse")
-                },
-                "reasons": reasons,
-                "request_bytes": request,
-                "response_bytes": response,
-                "histogram": whole.service.encode(),
-                "response_histogram": whole.response.encode(),
-            }
+            {"repeat": plan.repeat, "count": whole.total}
+            | {q: figures[q] for q in intervals}
+            | {"ci95_ms": {q: rounded_interval(interval) for q, interval in intervals.items()}}
         )
     return found
 
 
 def comparisons(measured: Measured) -> list[dict[str, Any]]:
-    """SOAP against REST, by operation, client and quantile, over the service time."""
+    """SOAP against REST, by operation, client and quantile, over the service time, judged by the A/A run.
+
+    The library clients have no A/A run of their own: the wire client's judges them too.
+    """
     found: list[dict[str, Any]] = []
     if measured.plan.robots > 1:
         return found  # robots took turns, not interfaces
     names = set(measured.plan.series_names())
     for operation in measured.plan.operations:
+        noise = {quantile: _noise(measured, operation, quantile) for quantile in COMPARED}
         for client in measured.plan.clients:
-            sides = [(operation, interface, client) for interface in ("rest", "soap")]
+            sides = [(operation, interface, client) for interface in _COMPARED_INTERFACES]
             if not all(side in names for side in sides):
                 continue
-            first, second = (dict(_services(measured.blocks("duel", side))) for side in sides)
-            pairs = [(first[pair], second[pair]) for pair in sorted(set(first) & set(second))]
+            units = measured.paired(Side("duel", sides[0]), Side("duel", sides[1]))
+            length = pair_s(measured, "duel", sides[0])
             found += [
                 {"operation": operation, "client": client}
-                | compared(pairs, quantile, measured.plan.load.seed, "soap_minus_rest_ms")
+                | _judged(compared(units, quantile, measured, "soap_minus_rest_ms", length), noise[quantile])
                 for quantile in COMPARED
             ]
     return found
+
+
+def _noise(measured: Measured, operation: str, quantile: str) -> Interval | None:
+    """The ratio that SOAP and REST came to against themselves, both together: its interval."""
+    client = measured.plan.clients[0]
+    parts = []
+    for interface in _COMPARED_INTERFACES:
+        name = (operation, interface, client)
+        if name in measured.plan.series_names():
+            parts.append(_enough(_against_itself(measured, name), quantile, measured.plan.load.seed))
+    known = [part for part in parts if part is not None]
+    if not known or len(known) < len(parts):
+        return None
+    whole = together(known)
+    return whole.ci95 if whole else None
+
+
+def _judged(entry: dict[str, Any], noise: Interval | None) -> dict[str, Any]:
+    """A comparison with what the A/A run lets it say."""
+    verdict = judge(entry["ratio"], entry["ci95"], noise) if entry["ratio"] is not None else Judgement("none")
+    return entry | {
+        "noise_ci95": rounded_interval(noise),
+        "judgement": verdict.verdict,
+        "bound": rounded(verdict.bound),
+        "judgement_reason": verdict.reason or entry["reason"],
+    }
+
+
+def _against_itself(measured: Measured, name: SeriesName) -> list[Unit]:
+    return measured.paired(Side("aa", name, "a"), Side("aa", name, "b"))
 
 
 def noise_floor(measured: Measured) -> list[dict[str, Any]]:
@@ -171,81 +225,41 @@ def noise_floor(measured: Measured) -> list[dict[str, Any]]:
     for interface in measured.plan.interfaces:
         for number in measured.plan.offered(interface, client):
             name = (measured.plan.operations[number], interface, client)
-            first, second = (dict(_services(measured.blocks("aa", name, label))) for label in ("a", "b"))
-            pairs = [(first[pair], second[pair]) for pair in sorted(set(first) & set(second))]
+            units, length = _against_itself(measured, name), pair_s(measured, "aa", name)
             found += [
-                named(name) | compared(pairs, quantile, measured.plan.load.seed, "difference_ms")
-                for quantile in COMPARED
+                named(name) | compared(units, quantile, measured, "difference_ms", length) for quantile in COMPARED
             ]
     return found
 
 
-def _services(blocks: list[tuple[int, Cell]]) -> list[tuple[int, Histogram]]:
-    return [(pair, cell.service) for pair, cell in blocks]
+def _samples(units: list[Unit]) -> int:
+    """How many the side with fewer has."""
+    return min((sum(unit.sides[side].total for unit in units) for side in (0, 1)), default=0)
 
 
-def compared(pairs: list[tuple[Histogram, Histogram]], quantile: str, seed: int, difference: str) -> dict[str, Any]:
-    """Two sides by their pairs of blocks, at one quantile: what latency.json says, `difference` being its key."""
-    fewest = min((sum(pair[side].total for pair in pairs) for side in (0, 1)), default=0)
-    needed = 2 if quantile == "mean" else samples_for_point(SHARES[quantile])
-    result = compare(pairs, quantile, seed) if fewest >= needed else None
+def _needed(quantile: str) -> int:
+    return 2 if quantile == "mean" else samples_for_point(SHARES[quantile])
+
+
+def _enough(units: list[Unit], quantile: str, seed: int) -> Compared | None:
+    """Compare two sides where both have enough samples."""
+    return compare(units, quantile, seed) if _samples(units) >= _needed(quantile) else None
+
+
+def compared(units: list[Unit], quantile: str, measured: Measured, difference: str, pair_s: float) -> dict[str, Any]:
+    """Two sides at one quantile: what latency.json says, `difference` being its key."""
+    result = _enough(units, quantile, measured.plan.load.seed)
     reason = None
     if result is None:
-        reason = f"{fewest} samples on one side; {quantile} needs {needed}"
+        reason = f"{_samples(units)} samples on one side; {quantile} needs {_needed(quantile)}"
     elif result.ci95 is None:
-        reason = f"no interval: fewer than {LEAST_BLOCKS} pairs of blocks"
+        reason = f"no interval: fewer than {LEAST_ROUNDS} rounds of blocks"
     return {
         "quantile": quantile,
         difference: rounded(result.difference_ms) if result else None,
         "ratio": rounded(result.ratio) if result else None,
         "ci95": rounded_interval(result.ci95) if result else None,
         "ci95_difference_ms": rounded_interval(result.ci95_difference_ms) if result else None,
+        "rounds": rounds_of(result.drawn, pair_s) if result else None,
         "reason": reason,
     }
-
-
-def time_series(measured: Measured) -> dict[str, Any]:
-    """Each series second by second (or block by block, where blocks are longer), by intended start."""
-    width = max(WIDTH_S, measured.plan.block_s)
-    found = []
-    for operation, interface, client in measured.plan.series_names():
-        number = measured.plan.operations.index(operation)
-        seconds: dict[int, Cell] = defaultdict(Cell)
-        for index, segment in enumerate(measured.plan.segments):
-            if segment.phase not in {"duel", "aa"} or (segment.interface, segment.client) != (interface, client):
-                continue
-            cell = measured.recorder.cells.get((measured.plan.first_segment + index, number))
-            if cell is not None:
-                seconds[int(segment.start_ns / _NS / width + 1e-9)].merge(cell)
-        points = [
-            {
-                "t_s": round(second * width, 3),
-                "count": cell.service.total,
-                "errors": cell.errors,
-                "p50_ms": rounded(cell.response.quantile_ms(0.5)),
-                "p99_ms": rounded(cell.response.quantile_ms(0.99)),
-                "max_ms": rounded(cell.response.highest_ns / 1e6) if cell.response.total else None,
-            }
-            for second, cell in sorted(seconds.items())
-        ]
-        found.append(named((operation, interface, client)) | {"points": points})
-    return {"width_s": width, "series": found}
-
-
-def errors(recorder: Recorder, operations: tuple[str, ...]) -> list[dict[str, Any]]:
-    """Failures, grouped, most frequent first."""
-    found = []
-    for (number, operation, kind), failure in recorder.failures.items():
-        phase, interface, client = SERIES[number]
-        found.append(
-            named((operations[operation], interface, client))
-            | {
-                "phase": phase,
-                "kind": kind,
-                "message": failure.message,
-                "count": failure.count,
-                "first_s": round(max(0.0, failure.first_ns / _NS), 3),
-                "last_s": round(max(0.0, failure.last_ns / _NS), 3),
-            }
-        )
-    return sorted(found, key=lambda entry: -int(str(entry["count"])))

@@ -103,6 +103,23 @@ class Histogram:
             self._settle()
         return self._bins, self._counts
 
+    def at_least(self, floor_ns: int) -> Histogram:
+        """The same values, each below `floor_ns` raised to it; sum to within a bin's width."""
+        made = Histogram()
+        if not self.total:
+            return made
+        bins, counts = self.arrays()
+        least = int(bins_of(np.array([floor_ns // 1000]))[0])
+        low = bins < least
+        lower, width = edges_us(bins[~low])
+        raised = int(counts[low].sum())
+        made._add(np.append(bins[~low], least), np.append(counts[~low], raised))
+        beyond = int(((lower + width / 2) * counts[~low]).sum() * 1000)
+        made._note(
+            self.total, beyond + raised * floor_ns, max(self.lowest_ns, floor_ns), max(self.highest_ns, floor_ns)
+        )
+        return made
+
     def mean_ms(self) -> float | None:
         """The mean, exact; None without values."""
         return self.sum_ns / self.total / 1e6 if self.total else None

@@ -1,8 +1,10 @@
-"""Confidence intervals of medians, p99s and other quantiles, and of their differences, by resampling blocks.
+"""Confidence intervals of medians, p99s and other quantiles, and of their ratios and differences.
 
-Requests that follow one another are not independent: a stall or a drift meets many at once. The unit that is
-drawn again is therefore the block (Carlstein 1986), and for a difference or a ratio the pair of neighbouring
-blocks, one of each side, so that a drift which met both stays in both. Percentile intervals of 1,000 draws.
+By scipy's bootstrap over rounds (see `rounds`), or over repeats and the rounds within them (Davison and Hinkley 1997,
+section 3.8) where the run was repeated often enough. Percentile intervals of few draws are too narrow; they are taken
+at the level that makes them as wide as Student's t (Hesterberg 2015), and widened by what correlation is left between
+rounds and by what the repeats differ beyond what each run's own scatter explains (Birge 1932). How often they are
+right is measured by `benchmarks/calibration.py`.
 """
 
 from __future__ import annotations
@@ -12,24 +14,29 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import stats
 
-from loadtests.statistics.histogram import Floats, Histogram, Ints, edges_us, quantiles_us
+from loadtests.statistics.histogram import Floats, Histogram, Ints
+from loadtests.statistics.rounds import SHARES, Rounds, Sample, Unit, in_rounds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-DRAWS = 1000
-LEAST_BLOCKS = 6
+DRAWS = 2000
+LEAST_ROUNDS = 6
+#: With fewer repeats the rounds of all are drawn from, and the interval is widened by what the repeats differ.
+LEAST_REPEATS = 4
 _AT_ONCE = 100  # draws held in memory together
 _TAIL = 0.025
-SHARES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
+_UPPER_TAIL = 0.99
 
 Interval = tuple[float, float]
 
 
 def samples_for_point(quantile: float) -> int:
-    """Fewest samples for a quantile to be given: two beyond it."""
-    return math.ceil(2 / (1 - quantile) - 1e-9)
+    """Fewest samples for a quantile to be given: two beyond it, and ten from p99 on (1,000 samples)."""
+    beyond = 10 if quantile >= _UPPER_TAIL else 2
+    return math.ceil(beyond / (1 - quantile) - 1e-9)
 
 
 def samples_for_interval(quantile: float) -> int:
@@ -42,98 +49,144 @@ def samples_for_interval(quantile: float) -> int:
 
 
 @dataclass(frozen=True)
-class Blocks:
-    """The histograms of several blocks on common bins.
+class Drawn:
+    """A figure of each side, and what it came to in each draw.
 
     Attributes:
-        bins: occupied bins, ascending, shape (bins,).
-        counts: shape (blocks, bins).
+        figures: of the whole, shape (sides,), milliseconds.
+        draws: shape (sides, draws).
+        rounds: what was drawn.
+        degrees: of freedom, Student's.
+        widening: factor on the width that the draws do not show.
     """
 
-    bins: Ints
-    counts: Floats
+    figures: Floats
+    draws: Floats
+    rounds: Rounds
+    degrees: int
+    widening: float
 
-    @classmethod
-    def of(cls, histograms: Sequence[Histogram]) -> Blocks:
-        """From one histogram for each block."""
-        found = [histogram.arrays() for histogram in histograms]
-        occupied = np.unique(np.concatenate([bins for bins, _ in found]))
-        counts = np.zeros((len(found), len(occupied)))
-        for row, (bins, numbers) in enumerate(found):
-            counts[row, np.searchsorted(occupied, bins)] = numbers
-        return cls(occupied, counts)
+    def interval(self, combined: Floats, estimate: float) -> Interval | None:
+        """The 95 % interval of a positive figure that was `combined` from each draw's, about its `estimate`."""
+        known = combined[np.isfinite(combined) & (combined > 0)]
+        if len(known) < DRAWS / 2 or estimate <= 0:
+            return None
+        low, high = np.log(known_quantiles(known, self.degrees)) - math.log(estimate)
+        return estimate * math.exp(low * self.widening), estimate * math.exp(high * self.widening)
 
-    def statistic_ms(self, weights: Floats, name: str) -> Floats:
-        """The mean or a quantile of weighted sums of blocks.
-
-        Args:
-            weights: how often each block counts, shape (draws, blocks).
-            name: `mean` or a key of SHARES.
-
-        Returns:
-            Shape (draws,), milliseconds; NaN for a draw without samples.
-        """
-        drawn = weights @ self.counts
-        totals = drawn.sum(axis=1)
-        if name == "mean":
-            lower, width = edges_us(self.bins)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                means: Floats = drawn @ (lower + width / 2) / totals / 1e3
-                return means
-        found = np.full(len(drawn), np.nan)
-        filled = totals > 0
-        if filled.any():
-            found[filled] = quantiles_us(self.bins, drawn[filled], SHARES[name]) / 1e3
-        return found
+    def difference_interval(self) -> Interval | None:
+        """The 95 % interval of the second side's figure less the first's."""
+        combined = self.draws[1] - self.draws[0]
+        known = combined[np.isfinite(combined)]
+        if len(known) < DRAWS / 2:
+            return None
+        estimate = float(self.figures[1] - self.figures[0])
+        low, high = known_quantiles(known, self.degrees) - estimate
+        return estimate + low * self.widening, estimate + high * self.widening
 
 
-def _weights(blocks: int, draws: int, lot: np.random.Generator) -> Floats:
-    """How often each block is drawn, in each of several draws with replacement."""
-    return lot.multinomial(blocks, np.full(blocks, 1 / blocks), size=draws).astype(np.float64)
+def known_quantiles(draws: Floats, degrees: int) -> Floats:
+    """The two quantiles of the draws between which Student's 95 % lie, for so many degrees of freedom."""
+    reach = stats.t.ppf(1 - _TAIL, degrees) * math.sqrt((degrees + 1) / degrees)
+    tail = float(stats.norm.cdf(-reach))
+    found: Floats = np.quantile(draws, [tail, 1 - tail])
+    return found
 
 
-def _interval(values: Floats) -> Interval | None:
-    known = values[np.isfinite(values)]
-    if len(known) < DRAWS / 2:
+def draw(units: Sequence[Unit], name: str, seed: int) -> Drawn | None:
+    """Draw from units again and again; None where there are fewer than LEAST_ROUNDS with samples on each side."""
+    filled = [unit for unit in units if all(side.total for side in unit.sides)]
+    if len(filled) < LEAST_ROUNDS:
         return None
-    low, high = np.quantile(known, [_TAIL, 1 - _TAIL])
-    return float(low), float(high)
+    rounds = in_rounds(Sample.of(filled), name)
+    sample, lot = rounds.sample, np.random.default_rng([seed, 6])
+    repeats = len(np.unique(sample.repeats))
+    nested = repeats >= LEAST_REPEATS
+    outer = repeats if nested else sample.size
+
+    def figures(chosen: Ints, axis: int = -1) -> Floats:
+        """The figures of draws, each given by the numbers of what was drawn, shape (draws, outer)."""
+        del axis
+        times = _times(np.atleast_2d(chosen), outer)
+        return sample.statistic_ms(_within(times, sample.repeats, lot) if nested else times, name)
+
+    found = stats.bootstrap(
+        (np.arange(outer),), figures, n_resamples=DRAWS, batch=_AT_ONCE, vectorized=True, method="percentile", rng=lot
+    )
+    whole = sample.statistic_ms(np.ones((1, sample.size)), name)[:, 0]
+    widening = rounds.widening * (1.0 if nested else birge_ratio(rounds))
+    return Drawn(whole, found.bootstrap_distribution, rounds, outer - 1, widening)
 
 
-def quantile_interval_ms(histograms: Sequence[Histogram], name: str, seed: int) -> tuple[Interval | None, str | None]:
+def _times(chosen: Ints, number: int) -> Floats:
+    """How often each of `number` things was chosen, shape (draws, number), from the choices' numbers."""
+    rows = np.arange(len(chosen))[:, None] * number
+    counted = np.bincount((chosen + rows).ravel(), minlength=len(chosen) * number)
+    return counted.reshape(len(chosen), number).astype(np.float64)
+
+
+def _within(times: Floats, repeats: Ints, lot: np.random.Generator) -> Floats:
+    """Draw rounds within repeats that were drawn so many times: how often each round counts, shape (draws, rounds)."""
+    found = np.zeros((len(times), len(repeats)))
+    for number, repeat in enumerate(np.unique(repeats).tolist()):
+        members = np.flatnonzero(repeats == repeat)
+        trials = (times[:, number] * len(members)).astype(np.int64)
+        found[:, members] = lot.multinomial(trials, np.full(len(members), 1 / len(members)))
+    return found
+
+
+def birge_ratio(rounds: Rounds) -> float:
+    """By how much the repeats scatter more than the rounds within them explain, 1 or more."""
+    numbers = np.unique(rounds.sample.repeats)
+    within = [rounds.influence[rounds.sample.repeats == number] for number in numbers]
+    within = [values for values in within if len(values) > 1]
+    if len(within) < 2:  # noqa: PLR2004 -- one run has nothing to be compared with
+        return 1.0
+    means = np.array([values.mean() for values in within])
+    errors = np.array([values.var(ddof=1) / len(values) for values in within]) * rounds.widening**2
+    errors = np.maximum(errors, 1e-18)
+    centre = float((means / errors).sum() / (1 / errors).sum())
+    return max(1.0, math.sqrt(float(((means - centre) ** 2 / errors).sum()) / (len(within) - 1)))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A figure of one series: its 95 % interval, or why there is none; and what was drawn."""
+
+    interval: Interval | None
+    reason: str | None
+    drawn: Drawn | None
+
+
+def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
     """The 95 % interval of a mean or a quantile (p50, p99, ...) of one series, as latency.json gives it.
 
+    By resampling rounds, or from the order of the samples where there are too few of these.
+
     Args:
-        histograms: one for each block.
+        units: with one side each.
         name: `mean` or a key of SHARES.
         seed: fixes the draws.
-
-    Returns:
-        The interval by resampling blocks, or from the order of the samples where there are too few blocks; or None
-        and why there is none.
     """
-    samples = sum(histogram.total for histogram in histograms)
-    needed = 2 if name == "mean" else samples_for_interval(SHARES[name])
+    samples = sum(unit.sides[0].total for unit in units)
+    needed = 2 if name == "mean" else max(samples_for_interval(SHARES[name]), samples_for_point(SHARES[name]))
     if samples < needed:
-        return None, f"{samples} samples; a 95 % interval of {name} needs {needed}"
-    interval = resampled_interval_ms(histograms, name, seed)
-    if interval is None and name in SHARES:
-        whole = Histogram()
-        for histogram in histograms:
-            whole.merge(histogram)
-        interval = order_interval_ms(whole, SHARES[name])
-    return interval, None if interval else f"fewer than {LEAST_BLOCKS} blocks"
+        return Estimate(None, f"{samples} samples; a 95 % interval of {name} needs {needed}", None)
+    drawn = draw(units, name, seed)
+    if drawn is not None:
+        interval = drawn.interval(drawn.draws[0], float(drawn.figures[0]))
+        return Estimate(interval, None if interval else "the draws say nothing", drawn)
+    if name not in SHARES:
+        return Estimate(None, f"fewer than {LEAST_ROUNDS} rounds of blocks", None)
+    whole = Histogram()
+    for unit in units:
+        whole.merge(unit.sides[0])
+    return Estimate(order_interval_ms(whole, SHARES[name]), None, None)
 
 
 def at_most(count: int, trials: int, share: float) -> float:
     """The probability that a binomial variable is at most `count`."""
-    if count >= trials:
-        return 1.0
-    steps = np.arange(1, trials + 1)
-    logs = np.concatenate([[0.0], np.cumsum(np.log(trials + 1 - steps) - np.log(steps))])
-    successes = np.arange(trials + 1)
-    logs = logs + successes * math.log(share) + (trials - successes) * math.log1p(-share)
-    return float(np.exp(logs[: count + 1]).sum())
+    return float(stats.binom.cdf(count, trials, share))
 
 
 def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
@@ -144,58 +197,58 @@ def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
     samples = histogram.total
     if samples < samples_for_interval(quantile):
         return None
-    ranks = [at_most(rank, samples, quantile) for rank in range(samples + 1)]
-    low = max(0, sum(chance <= _TAIL for chance in ranks) - 1)
-    high = min(samples, sum(chance < 1 - _TAIL for chance in ranks) + 1)
-    bounds = [histogram.quantile_ms(rank / samples) for rank in (low, high)]
+    low, high = stats.binom.ppf(_TAIL, samples, quantile) - 1, stats.binom.ppf(1 - _TAIL, samples, quantile) + 1
+    bounds = [histogram.quantile_ms(min(max(rank / samples, 0.0), 1.0)) for rank in (float(low), float(high))]
     return (bounds[0] or 0.0), (bounds[1] or 0.0)
-
-
-def resampled_interval_ms(histograms: Sequence[Histogram], name: str, seed: int) -> Interval | None:
-    """The 95 % interval of a statistic of one series, from its blocks; None with fewer than LEAST_BLOCKS."""
-    filled = [histogram for histogram in histograms if histogram.total]
-    if len(filled) < LEAST_BLOCKS:
-        return None
-    blocks, lot = Blocks.of(filled), np.random.default_rng([seed, 6])
-    values = [blocks.statistic_ms(_weights(len(filled), _AT_ONCE, lot), name) for _ in range(0, DRAWS, _AT_ONCE)]
-    return _interval(np.concatenate(values))
 
 
 @dataclass(frozen=True)
 class Compared:
-    """Two sides' statistic: the second minus the first, and over it."""
+    """Two sides' figure: the second less the first, and over it."""
 
     difference_ms: float
     ratio: float
     ci95: Interval | None
     ci95_difference_ms: Interval | None
+    drawn: Drawn | None
 
 
-def compare(pairs: Sequence[tuple[Histogram, Histogram]], name: str, seed: int) -> Compared | None:
-    """Compare two sides by pairs of neighbouring blocks; None where a side is empty.
+def compare(units: Sequence[Unit], name: str, seed: int) -> Compared | None:
+    """Compare two sides by units that hold both; None where a side is empty.
 
     Args:
-        pairs: the first side's and the second side's histogram of each pair.
+        units: with the first and the second side's histogram each.
         name: `mean` or a key of SHARES.
         seed: fixes the draws.
     """
-    whole = [pair for pair in pairs if pair[0].total and pair[1].total]
-    if not whole:
+    filled = [unit for unit in units if all(side.total for side in unit.sides)]
+    if not filled:
         return None
-    sides = [Blocks.of([pair[side] for pair in whole]) for side in (0, 1)]
-    ones = np.ones((1, len(whole)))
-    first, second = (float(side.statistic_ms(ones, name)[0]) for side in sides)
+    sample = Sample.of(filled)
+    first, second = (float(value) for value in sample.statistic_ms(np.ones((1, sample.size)), name)[:, 0])
     if first <= 0:
         return None
-    if len(whole) < LEAST_BLOCKS:
-        return Compared(second - first, second / first, None, None)
-    lot = np.random.default_rng([seed, 7])
-    drawn: tuple[list[Floats], list[Floats]] = ([], [])
-    for _ in range(0, DRAWS, _AT_ONCE):
-        weights = _weights(len(whole), _AT_ONCE, lot)
-        for side, kept in zip(sides, drawn, strict=True):
-            kept.append(side.statistic_ms(weights, name))
-    firsts, seconds = (np.concatenate(kept) for kept in drawn)
+    drawn = draw(filled, name, seed)
+    if drawn is None:
+        return Compared(second - first, second / first, None, None, None)
+    ratio = drawn.interval(drawn.draws[1] / drawn.draws[0], second / first)
+    return Compared(second - first, second / first, ratio, drawn.difference_interval(), drawn)
+
+
+def together(parts: Sequence[Compared]) -> Compared | None:
+    """The mean of several independent comparisons on the logarithmic scale; None where one has no interval."""
+    drawn = [part.drawn for part in parts if part.drawn is not None]
+    if not drawn or len(drawn) < len(parts):
+        return None
+    ratio = math.exp(float(np.mean([math.log(part.ratio) for part in parts])))
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratios = seconds / firsts
-    return Compared(second - first, second / first, _interval(ratios), _interval(seconds - firsts))
+        ratios = np.exp(np.mean([np.log(one.draws[1] / one.draws[0]) for one in drawn], axis=0))
+    whole = Drawn(
+        drawn[0].figures,
+        drawn[0].draws,
+        drawn[0].rounds,
+        sum(one.degrees for one in drawn),
+        max(one.widening for one in drawn),
+    )
+    difference = float(np.mean([part.difference_ms for part in parts]))
+    return Compared(difference, ratio, whole.interval(ratios, ratio), None, whole)

@@ -29,21 +29,39 @@ _MAX_KINDS = 100  # error messages kept apart; further ones are counted under th
 
 @dataclass(slots=True)
 class Cell:
-    """One operation in one segment: histograms of the successful requests, and counts of the others."""
+    """One operation in one segment: histograms of the successful requests, and the ages of the others.
+
+    Attributes:
+        service, response: of the requests that were answered as they should be.
+        failed_service, failed_response: of the others, until they were given up: from the actual and from the
+            intended start. One that never started has its wait in both.
+        queued: how long arrivals waited because no user was free when they were due.
+        errors: requests that failed; late: started over 1 ms after their time; dropped: never started.
+    """
 
     service: Histogram = field(default_factory=Histogram)
     response: Histogram = field(default_factory=Histogram)
+    failed_service: Histogram = field(default_factory=Histogram)
+    failed_response: Histogram = field(default_factory=Histogram)
+    queued: Histogram = field(default_factory=Histogram)
     errors: int = 0
     late: int = 0
     dropped: int = 0
 
     def merge(self, other: Cell) -> None:
         """Add another cell."""
-        self.service.merge(other.service)
-        self.response.merge(other.response)
+        for name, part in self.histograms().items():
+            part.merge(getattr(other, name))
         self.errors += other.errors
         self.late += other.late
         self.dropped += other.dropped
+
+    def histograms(self) -> dict[str, Histogram]:
+        """Its histograms by name."""
+        return {name: getattr(self, name) for name in _HISTOGRAMS}
+
+
+_HISTOGRAMS = ("service", "response", "failed_service", "failed_response", "queued")
 
 
 @dataclass(slots=True)
@@ -111,6 +129,7 @@ class Recorder:
         self.spans: defaultdict[tuple[int, int], Spans] = defaultdict(Spans)
         self.failures: dict[FailureKey, Failure] = {}
         self.counters: Counter[str] = Counter()
+        self.busy: dict[int, float] = {}
 
     def record(
         self,
@@ -132,9 +151,18 @@ class Recorder:
         if len(self._buffer) >= _BUFFERED:
             self.flush()
 
-    def fail(self, segment: int, operation: int, kind: str, message: str, due_ns: int) -> None:
-        """Record a failed request; `due_ns` counts from the run's start."""
-        self.cells[segment, operation].errors += 1
+    def fail(
+        self, segment: int, operation: int, kind: str, message: str, due_ns: int, ages_ns: tuple[int, int] = (0, 0)
+    ) -> None:
+        """Record a failed request.
+
+        `due_ns` counts from the run's start; `ages_ns` are the times from its actual and its intended start until it
+        was given up.
+        """
+        cell = self.cells[segment, operation]
+        cell.errors += 1
+        cell.failed_service.record(np.array(ages_ns[:1]))
+        cell.failed_response.record(np.array(ages_ns[1:]))
         key = (self.series_of.get(segment, -1), operation, kind)
         if key not in self.failures and len(self.failures) >= _MAX_KINDS:
             key = (key[0], operation, "other")
@@ -147,9 +175,17 @@ class Recorder:
         else:
             known.merge(failure)
 
-    def drop(self, segment: int, operation: int) -> None:
-        """Record an arrival that nobody started before its deadline."""
-        self.cells[segment, operation].dropped += 1
+    def drop(self, segment: int, operation: int, age_ns: int = 0) -> None:
+        """Record an arrival that nobody started before its deadline, `age_ns` after it was due."""
+        cell = self.cells[segment, operation]
+        cell.dropped += 1
+        age = np.array([age_ns])
+        cell.failed_service.record(age)
+        cell.failed_response.record(age)
+
+    def was_busy(self, segment: int, share: float) -> None:
+        """Record the share of a core that the generator's process used during a segment; the busiest one's counts."""
+        self.busy[segment] = max(share, self.busy.get(segment, 0.0))
 
     def count(self, name: str, number: int = 1) -> None:
         """Count something that belongs to no series."""
@@ -178,6 +214,7 @@ class Recorder:
         if self.listener is not None:
             self.listener(self.series_of.get(segment, -1), operation, response)
         cell.late += int(((start - due > LATE_NS) | queued).sum())
+        cell.queued.record(np.maximum((start - due)[queued.astype(bool)], 0))
         spans = self.spans[self.series_of.get(segment, -1), operation]
         told = np.clip(server, 0, received - built)  # the robot's clock may be coarser than ours
         spans.build.record(built - start)
@@ -195,13 +232,21 @@ class Recorder:
         for kind, failure in other.failures.items():
             self._add(kind, replace(failure))
         self.counters.update(other.counters)
+        for segment, share in other.busy.items():
+            self.was_busy(segment, share)
 
     def take(self) -> dict[str, Any]:
         """Hand over everything in a form that msgpack carries, and begin anew."""
         self.flush()
         packed = {
             "cells": [
-                [*key, cell.service.pack(), cell.response.pack(), cell.errors, cell.late, cell.dropped]
+                [
+                    *key,
+                    {name: part.pack() for name, part in cell.histograms().items() if part.total},
+                    cell.errors,
+                    cell.late,
+                    cell.dropped,
+                ]
                 for key, cell in self.cells.items()
             ],
             "spans": [
@@ -212,6 +257,7 @@ class Recorder:
                 for key, failure in self.failures.items()
             ],
             "counters": dict(self.counters),
+            "busy": list(self.busy.items()),
         }
         self._begin()
         return packed
@@ -220,13 +266,13 @@ class Recorder:
     def unpack(cls, packed: dict[str, Any]) -> Recorder:
         """Read what `take` handed over."""
         made = cls()
-        for segment, operation, service, response, errors, late, dropped in packed["cells"]:
-            made.cells[segment, operation] = Cell(
-                Histogram.unpack(service), Histogram.unpack(response), errors, late, dropped
-            )
+        for segment, operation, parts, errors, late, dropped in packed["cells"]:
+            histograms = {name: Histogram.unpack(part) for name, part in parts.items()}
+            made.cells[segment, operation] = Cell(**histograms, errors=errors, late=late, dropped=dropped)
         for series, operation, parts in packed["spans"]:
             made.spans[series, operation] = Spans(**{name: Histogram.unpack(part) for name, part in parts.items()})
         for series, operation, kind, message, count, first, last in packed["failures"]:
             made.failures[series, operation, kind] = Failure(message, count, first, last)
         made.counters.update(packed["counters"])
+        made.busy.update(packed["busy"])
         return made

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from loadtests.statistics.figures import COMPARED, compared, named
+from loadtests.statistics.figures import COMPARED, compared, named, pair_s
+from loadtests.statistics.measured import Side
 
 if TYPE_CHECKING:
-    from loadtests.statistics.figures import Measured
+    from loadtests.statistics.measured import Measured
 
 _BASE = "rest"
 _WEB_SERVICES = (_BASE, "soap")
@@ -22,7 +23,6 @@ def other_ways(measured: Measured) -> list[dict[str, Any]]:
         base = (name[0], _BASE, name[2])
         if name[1] in _WEB_SERVICES or base not in names:
             continue
-        rest, other = ({pair: cell.service for pair, cell in measured.blocks("duel", side)} for side in (base, name))
-        pairs = [(rest[pair], other[pair]) for pair in sorted(set(rest) & set(other))]
-        found += [named(name) | compared(pairs, quantile, plan.load.seed, "minus_rest_ms") for quantile in COMPARED]
+        units, length = measured.paired(Side("duel", base), Side("duel", name)), pair_s(measured, "duel", name)
+        found += [named(name) | compared(units, quantile, measured, "minus_rest_ms", length) for quantile in COMPARED]
     return found

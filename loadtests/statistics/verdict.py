@@ -1,51 +1,58 @@
-"""Whether a run is worth anything, and whether the robot kept its thresholds."""
+"""Whether a run is worth anything: gates on the generator, and on what the duel can say."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from loadtests.statistics.figures import Measured, plain_quantiles, quantiles, rounded
-from loadtests.statistics.histogram import Histogram, edges_us
-from loadtests.statistics.intervals import SHARES, at_most
+from loadtests.statistics.figures import plain_quantiles, rounded
+from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.recorder import Cell
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Sequence
 
-    from conformance.contract.thresholds import Threshold
     from loadtests.schedule.plan import Plan
+    from loadtests.statistics.measured import Measured
 
 MOST_CPU = 0.95
-MOST_LAG_MEDIAN_MS = 1.0
-MOST_LAG_P95_MS = 20.0
-MOST_LAG_P99_MS = 100.0
-_SMALL_CHANCE = 0.025
-NOTED_LAG_P99_MS = 1.0
+#: Arrivals that wait for a free connection wait for the generator where it is as busy as this in their block.
+BUSY_CPU = 0.9
+#: Of the median and of the p99 of the service time: how late requests may start.
+MOST_LAG = {"p50": 0.10, "p99": 0.20}
+#: A lag that no clock of this kind goes below is none: the wake-up of a process.
+LEAST_LAG_MS = {"p50": 0.05, "p99": 0.3}
 LEAST_ACHIEVED = 0.95
 MOST_ERRORS = 0.01
 
 
-def generator_figures(measured: Measured, asked: int, elapsed_s: float, cpu_share: float | None) -> dict[str, Any]:
+def generator_figures(measured: Measured, asked: int, active_s: float, cpu_share: float | None) -> dict[str, Any]:
     """The `generator` object: what the load generator did, over all measured phases.
 
-    `asked` arrivals should have started so far, in `elapsed_s` without the warm-up; the busiest worker has `cpu_share`.
+    `asked` arrivals should have started so far, in blocks that were open for `active_s` together; the busiest worker
+    has `cpu_share`.
     """
     plan, recorder = measured.plan, measured.recorder
-    lag, wire = Histogram(), "wire" in plan.clients
-    total = Cell()
+    lag, service = Histogram(), Histogram()
+    total, queued = Cell(), 0
     for name in measured.plan.series_names():
         for phase in ("duel", "aa", "against"):
             cell = measured.total(phase, name)
             total.merge(cell)
-            if name[2] == "wire" or not wire:
+            if name[2] == plan.clients[0]:
+                service.merge(cell.service)
                 lag.merge(measured.spans(phase, name).lag)
+                waited = _waited_for_generator(measured, phase, name)
+                queued += waited.total
+                lag.merge(waited)
     completed = total.service.total
     started = completed + total.errors
     return {
         "cpu_share": rounded(cpu_share),
         "lag_ms": plain_quantiles(lag),
-        "asked_rate": rounded(asked / elapsed_s) if plan.open_model and elapsed_s > 0 else None,
-        "achieved_rate": rounded(started / elapsed_s) if elapsed_s > 0 else None,
+        "lag_limits_ms": _lag_limits(service),
+        "queued_by_generator": queued,
+        "asked_rate": rounded(asked / active_s) if plan.open_model and active_s > 0 else None,
+        "achieved_rate": rounded(started / active_s) if active_s > 0 else None,
         "scheduled": asked if plan.open_model else started,
         "started": started,
         "completed": completed,
@@ -55,6 +62,30 @@ def generator_figures(measured: Measured, asked: int, elapsed_s: float, cpu_shar
         "error_share": rounded(total.errors / started) if started else 0.0,
         "connects": recorder.counters.get("connects", 0),
         "resends": recorder.counters.get("resends", 0),
+    }
+
+
+def _waited_for_generator(measured: Measured, phase: str, name: tuple[str, str, str]) -> Histogram:
+    """How late arrivals were for which no user was free while the generator's processor was taken up."""
+    found = Histogram()
+    for plan in measured.plans:
+        number = plan.operations.index(name[0])
+        for index, segment in enumerate(plan.segments):
+            if (segment.phase, segment.interface, segment.client) != (phase, *name[1:]):
+                continue
+            key = plan.first_segment + index
+            cell = measured.recorder.cells.get((key, number))
+            if cell is not None and measured.recorder.busy.get(key, 0.0) >= BUSY_CPU:
+                found.merge(cell.queued)
+    return found
+
+
+def _lag_limits(service: Histogram) -> dict[str, float | None]:
+    """What the lag may come to, measured by the service time."""
+    times = plain_quantiles(service)
+    return {
+        name: None if (time := times[name]) is None else rounded(max(share * time, LEAST_LAG_MS[name]))
+        for name, share in MOST_LAG.items()
     }
 
 
@@ -69,67 +100,49 @@ def invalid_because(figures: dict[str, Any], plan: Plan, pacing: str) -> tuple[l
             f"the generator was busy {cpu:.0%} of the time, so that it measured itself: "
             "use more --processes or a lower rate"
         )
-    lag = figures["lag_ms"]
-    if plan.open_model and lag["p50"] is not None:
-        limits = {"p50": MOST_LAG_MEDIAN_MS, "p95": MOST_LAG_P95_MS, "p99": MOST_LAG_P99_MS}
-        if any((lag[name] or 0.0) > limit for name, limit in limits.items()):
-            told = " and ".join(f"{lag[name]:.3f} ms ({name})" for name in limits if lag[name] is not None)
-            reasons.append(f"requests started {told} after their time: the generator's machine is overloaded")
-        elif (lag["p99"] or 0.0) > NOTED_LAG_P99_MS:
-            notes.append(f"1 % of the requests started {lag['p99']:.3f} ms or more after their time ({pacing})")
-    if plan.open_model and figures["scheduled"]:
-        share = figures["started"] / figures["scheduled"]
-        if share < LEAST_ACHIEVED:
+    if plan.open_model:
+        reasons += _late(figures, pacing)
+        if figures["scheduled"] and figures["started"] + figures["dropped"] < LEAST_ACHIEVED * figures["scheduled"]:
+            share = (figures["started"] + figures["dropped"]) / figures["scheduled"]
             reasons.append(
-                f"only {figures['started']} of {figures['scheduled']} scheduled requests were started "
-                f"and accounted for ({share:.0%})"
+                f"only {figures['started'] + figures['dropped']} of {figures['scheduled']} scheduled requests were "
+                f"accounted for ({share:.0%})"
             )
-    if figures["error_share"] > MOST_ERRORS:
-        reasons.append(f"{figures['errors']} of {figures['started']} requests failed ({figures['error_share']:.1%})")
+    if figures["queued_by_generator"]:
+        notes.append(
+            f"{figures['queued_by_generator']} requests waited for a free connection while the generator was busy: "
+            "their wait counts as its lag"
+        )
     if figures["resends"]:
         reasons.append(f"{figures['resends']} requests were silently sent again by a client library")
     return reasons, notes
 
 
-def _surely_above(histogram: Histogram, threshold: Threshold) -> bool:
-    """Whether even few samples prove a quantile to lie above its threshold.
+def _late(figures: dict[str, Any], pacing: str) -> list[str]:
+    lag, limits = figures["lag_ms"], figures["lag_limits_ms"]
+    missed = [name for name, limit in limits.items() if limit is not None and (lag[name] or 0.0) > limit]
+    if not missed:
+        return []
+    told = " and ".join(f"{lag[name]:.3f} ms ({name}, at most {limits[name]:.3f} ms)" for name in missed)
+    return [f"requests started {told} after their time: the generator's machine is overloaded ({pacing})"]
 
-    They do when, were it below, so few samples under the threshold would turn up in less than 2.5 % of all runs.
-    """
-    bins, counts = histogram.arrays()
-    below = int(counts[edges_us(bins)[0] < threshold.below_ms * 1e3].sum())
-    return histogram.total > 0 and at_most(below, histogram.total, SHARES[threshold.quantile]) < _SMALL_CHANCE
 
-
-def judge(measured: Measured, thresholds: Iterable[Threshold]) -> list[dict[str, Any]]:
-    """The `thresholds` of latency.json: each against the upper bound of its interval."""
+def failures(figures: dict[str, Any]) -> list[str]:
+    """Why the robot's failures leave nothing to compare; thresholds are judged all the same."""
     found = []
-    for threshold in thresholds:
-        entry = threshold.as_message() | {
-            "measured_ms": None,
-            "bound_ms": None,
-            "outcome": "inconclusive",
-            "reason": None,
-        }
-        name = (threshold.operation, threshold.interface, threshold.client)
-        if name not in measured.plan.series_names():
-            entry["reason"] = "not measured in this run"
-            found.append(entry)
-            continue
-        whole = getattr(measured.total("duel", name), threshold.time)
-        entry["measured_ms"] = quantiles(whole)[0][threshold.quantile]
-        if threshold.quantile == "max":
-            bound, reason = entry["measured_ms"], None if whole.total else "no samples"
-        else:
-            interval, reason = measured.interval(name, threshold.time, threshold.quantile)
-            bound = interval[1] if interval else None
-        entry["bound_ms"], entry["reason"] = bound, reason
-        if bound is None and threshold.quantile in SHARES and _surely_above(whole, threshold):
-            entry["outcome"] = "missed"
-            entry["reason"] = f"too many of the {whole.total} samples are not below {threshold.below_ms:g} ms"
-        if bound is not None:
-            met = bound < threshold.below_ms
-            entry["outcome"] = "met" if met else "missed"
-            entry["reason"] = None if met else f"{bound:.3f} ms is not below {threshold.below_ms:g} ms"
-        found.append(entry)
+    if figures["error_share"] > MOST_ERRORS:
+        found.append(f"{figures['errors']} of {figures['started']} requests failed ({figures['error_share']:.1%})")
+    if figures["dropped"] > MOST_ERRORS * max(1, figures["scheduled"]):
+        found.append(
+            f"{figures['dropped']} of {figures['scheduled']} requests never started: no connection was free in time"
+        )
     return found
+
+
+def says_nothing(comparisons: Sequence[dict[str, Any]]) -> list[str]:
+    """Why a duel carries no statement at all; empty where it carries one, or where there was no duel."""
+    medians = [entry for entry in comparisons if entry["quantile"] == "p50"]
+    if not medians or any(entry["judgement"] != "none" for entry in medians):
+        return []
+    reasons = dict.fromkeys(str(entry["judgement_reason"]) for entry in medians)
+    return [f"the duel carries no statement: {'; '.join(reasons)}"]

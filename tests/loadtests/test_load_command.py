@@ -33,7 +33,10 @@ def test_a_good_robot_is_measured(toy, load, tmp_path):
         assert entry["count"] > 0
         assert entry["errors"] == 0
         assert entry["spans_ms"]["server"]["p50"] == pytest.approx(0.015, abs=0.001)
-    assert result["generator"]["scheduled"] == result["generator"]["started"] == 120
+    assert result["generator"]["scheduled"] == result["generator"]["started"]
+    assert result["generator"]["scheduled"] == pytest.approx(
+        60 * sum(block["length_s"] for block in result["blocks"]), abs=2
+    )
     assert result["generator"]["resends"] == 0
     assert {(step["interface"], step["offered_rate"]) for step in result["steps"]} >= {("rest", 40.0), ("soap", 40.0)}
     assert {entry["interface"] for entry in result["knee"]} == {"rest", "soap"}
@@ -55,7 +58,7 @@ def test_a_slow_robot_is_seen_to_be_slow_and_misses_its_threshold(toy, load, tmp
     assert series["service_ms"]["p50"] >= 40
     assert series["spans_ms"]["server"] is None, "the robot does not say"
     assert series["service_ms"]["p99"] is None
-    assert "needs 200" in series["reasons"]["p99"]
+    assert "needs 1000" in series["reasons"]["p99"]
     assert result["thresholds"][0]["outcome"] == "missed"
     assert result["comparisons"] == []
     assert run.code == (1 if result["valid"] else 4)
@@ -165,9 +168,7 @@ def test_a_worker_that_is_killed_is_missed_and_named(toy, load, wait_for):
     assert lost["pid"] == workers[0].pid
     assert 0 < lost["arrivals_lost"] <= 216
     kept = next(worker for worker in result["workers"] if worker["state"] == "finished")
-    warmed = round(80 * 5.4)
-    assert kept["requests"] == warmed // 2
-    assert lost["requests"] + lost["arrivals_lost"] == warmed // 2, "nothing is lost without being missed"
+    assert abs(lost["requests"] + lost["arrivals_lost"] - kept["requests"]) <= 1, "nothing is lost without being missed"
     assert any("was lost" in note for note in result["notes"])
     assert run.code == 4
     assert any("accounted for" in reason for reason in result["invalid_because"])

@@ -1,5 +1,6 @@
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 
 import gevent
 import pytest
@@ -52,10 +53,13 @@ def test_a_plan_survives_its_message_and_a_seed_fixes_it():
 
 def test_the_rate_is_kept_exactly_by_constant_and_on_average_by_poisson_arrivals():
     due = [arrival for arrival in everything(PLAN) if PLAN.segments[arrival[0]].phase != "warmup"]
-    assert len(due) == 2000
+    assert len(due) == pytest.approx(100 * sum(s.active_s for s in PLAN.segments if s.phase != "warmup"), abs=2)
+    within = Counter(segment for segment, *_ in due)
+    for segment, arrivals in within.items():
+        assert arrivals / PLAN.segments[segment].active_s == pytest.approx(100, abs=100 / arrivals + 1e-6)
     plan = varied(arrivals="poisson", rate=1000.0)
     wire = [arrival for arrival in everything(plan) if plan.segments[arrival[0]].client == "wire"]
-    seconds = sum((s.end_ns - s.start_ns) / 1e9 for s in plan.segments if s.client == "wire")
+    seconds = sum(s.active_s for s in plan.segments if s.client == "wire")
     assert abs(len(wire) - 1000 * seconds) < 4 * (1000 * seconds) ** 0.5
 
 
@@ -73,8 +77,8 @@ def test_rest_and_soap_take_turns_in_random_abba_quartets():
         assert [segment.pair for segment in quartet] == [index // 2] * 2 + [index // 2 + 1] * 2
     assert min(orders["rest", ""], orders["soap", ""]) >= 5
     phases = Counter((segment.phase, segment.client) for segment in duel)
-    assert phases["duel", "wire"] == 120
-    assert phases["duel", "zeep"] == phases["aa", "wire"] == 40
+    assert phases["duel", "wire"] == phases["aa", "wire"] == 80, "noise is known as well as the effect is"
+    assert phases["duel", "zeep"] == 40
 
 
 def test_three_interfaces_take_turns_in_sextets_and_two_robots_in_quartets():
@@ -98,11 +102,8 @@ def test_three_interfaces_take_turns_in_sextets_and_two_robots_in_quartets():
 
 
 def test_no_second_passes_without_the_wire_client():
-    gap = last = 0
-    for segment in PLAN.segments:
-        if (segment.phase, segment.client) == ("duel", "wire"):
-            gap, last = max(gap, segment.start_ns - last), segment.end_ns
-    assert gap <= LOAD.warmup_s * 1e9 or gap <= 0.5e9
+    starts = [segment.start_ns for segment in PLAN.segments if (segment.phase, segment.client) == ("duel", "wire")]
+    assert max(after - before for before, after in pairwise(starts)) < 1e9
 
 
 @settings(deadline=None)
@@ -113,10 +114,16 @@ def test_the_number_of_blocks_is_bounded_whatever_the_run(duration, rate):
     assert plan.length_s == pytest.approx(plan.load.warmup_s + duration, abs=1e-6)
 
 
-def test_the_ordinary_clients_rate_is_bounded():
-    plan = varied(rate=4000.0, workers=2)
-    assert {segment.rate for segment in plan.segments if segment.client == "zeep"} == {200.0}
-    assert {segment.rate for segment in plan.segments if segment.client == "wire"} == {4000.0}
+def test_all_clients_run_at_one_rate():
+    assert {segment.rate for segment in PLAN.segments} == {100.0}
+
+
+def test_a_repeat_has_segments_of_its_own_and_lots_of_its_own():
+    again = PLAN.again()
+    assert again.first_segment == len(PLAN.segments)
+    assert again.offset_s == PLAN.length_s
+    assert [segment.interface for segment in again.segments] != [segment.interface for segment in PLAN.segments]
+    assert everything(again) != everything(PLAN)
 
 
 class Users:

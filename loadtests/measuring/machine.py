@@ -1,0 +1,103 @@
+"""What else went on on the generator's machine: time stolen by its host, quota, governor, load."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+_GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
+_GROUPS = Path("/sys/fs/cgroup")
+#: From these shares on it is worth a word.
+_NOTED_STEAL = 0.02
+_NOTED_THROTTLED = 0.01
+_STEADY = frozenset({"performance"})
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The machine's counters at one time, in seconds since it started; `at_s` is the sum over its processors."""
+
+    at_s: float
+    steal_s: float
+    throttled_s: float
+    load: tuple[float, float, float] | None
+
+    @classmethod
+    def now(cls) -> Moment:
+        """Look."""
+        times = psutil.cpu_times()
+        return cls(sum(times), getattr(times, "steal", 0.0), _throttled_s(), psutil.getloadavg())
+
+
+def conditions(before: Moment, after: Moment) -> tuple[dict[str, Any], list[str]]:
+    """The `machine` of latency.json's environment between two moments, and remarks on what spoils a run."""
+    passed = max(after.at_s - before.at_s, 1e-9)
+    cpus = os.cpu_count() or 1
+    steal = (after.steal_s - before.steal_s) / passed
+    throttled = (after.throttled_s - before.throttled_s) / (passed / cpus)
+    quota, governor = cpu_quota(), _read(_GOVERNOR)
+    load = before.load[0] if before.load else None
+    remarks = []
+    if steal > _NOTED_STEAL:
+        remarks.append(f"the machine's host took {steal:.1%} of its time (steal): a virtual machine measures its host")
+    if throttled > _NOTED_THROTTLED:
+        remarks.append(
+            f"the generator's control group was throttled for {throttled:.1%} of the run: its quota is {quota:g} CPUs"
+            if quota
+            else f"the generator's control group was throttled for {throttled:.1%} of the run"
+        )
+    if governor and governor not in _STEADY:
+        remarks.append(f"the processor's governor is {governor!r}: its clock rate follows the load")
+    if load is not None and load > cpus:
+        remarks.append(f"the machine was busy before the run: load average {load:.1f} on {cpus} CPUs")
+    found = {
+        "steal_share": round(steal, 6),
+        "throttled_share": round(throttled, 6),
+        "cpu_quota": quota,
+        "governor": governor,
+        "load_average_before": round(load, 2) if load is not None else None,
+        "load_average_after": round(after.load[0], 2) if after.load else None,
+    }
+    return found, remarks
+
+
+def _read(path: Path) -> str | None:
+    try:
+        return path.read_text("ascii").strip() or None
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+def _groups() -> list[Path]:
+    """The folders of this process's control group (cgroup v2) and of those above it."""
+    text = _read(Path("/proc/self/cgroup")) or ""
+    own = next((line[3:] for line in text.splitlines() if line.startswith("0::")), None)
+    if own is None:
+        return []
+    folder = _GROUPS / own.strip("/")
+    return [folder, *(above for above in folder.parents if above.is_relative_to(_GROUPS))]
+
+
+def cpu_quota() -> float | None:
+    """The least number of CPUs that a control group of ours may use (cpu.max); None where there is no limit."""
+    found = []
+    for folder in _groups():
+        words = (_read(folder / "cpu.max") or "").split()
+        if len(words) == 2 and words[0].isdigit() and words[1].isdigit():  # noqa: PLR2004 -- quota and period
+            found.append(int(words[0]) / int(words[1]))
+    return min(found, default=None)
+
+
+def _throttled_s() -> float:
+    """For how long our control groups have been held back, at most."""
+    found = [0.0]
+    for folder in _groups():
+        for line in (_read(folder / "cpu.stat") or "").splitlines():
+            name, _, value = line.partition(" ")
+            if name == "throttled_usec" and value.isdigit():
+                found.append(int(value) / 1e6)
+    return max(found)

@@ -1,0 +1,186 @@
+"""What is drawn again: rounds of neighbouring pairs of blocks, long enough that one says nothing about the next.
+
+Requests that follow one another are not independent, and blocks are not either: a stall or a drift meets several.
+Resampling what depends on its neighbour makes intervals too narrow (Carlstein 1986). The smallest unit is the pair of
+neighbouring blocks; units are put together, two at least where there are enough for that (a quartet, in which both
+sides have been first), until the correlation between one round and the next is gone. What is left of it then widens
+the interval by as much as it makes the mean of a first-order autoregressive series less certain.
+
+The correlation is that of each unit's influence on the figure in question: for a quantile the share of its samples
+that lie beyond, for a mean their sum. This is what the figure's error is made of (Hampel 1974), and unlike a median of
+few samples it exists for every unit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from loadtests.statistics.histogram import Floats, Histogram, Ints, edges_us, quantiles_us
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+SHARES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
+#: Putting units together ends before there are fewer rounds than this.
+_FEWEST_ROUNDS = 6
+_LENGTHS = (2, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
+#: A correlation below this is gone, as is one that so few independent values show by chance (one standard error).
+_GONE = 0.1
+#: Beyond this the formula for the variance says nothing any more; ten rounds cannot measure more either.
+_MOST = 0.8
+_LEAST_FOR_LAG = 6
+
+
+class Unit(NamedTuple):
+    """A pair of the plan's blocks: in which repeat it ran, and one histogram for each side that is compared."""
+
+    repeat: int
+    sides: tuple[Histogram, ...]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Units or rounds on common bins.
+
+    Attributes:
+        bins: occupied bins, ascending, shape (bins,).
+        counts: shape (sides, units, bins).
+        repeats: the repeat that each belongs to, ascending, shape (units,).
+    """
+
+    bins: Ints
+    counts: Floats
+    repeats: Ints
+
+    @classmethod
+    def of(cls, units: Sequence[Unit]) -> Sample:
+        """From units, of which there has to be one, in order of time."""
+        arrays = [[side.arrays() for side in unit.sides] for unit in units]
+        occupied = np.unique(np.concatenate([bins for sides in arrays for bins, _ in sides]))
+        counts = np.zeros((len(arrays[0]), len(units), len(occupied)))
+        for row, sides in enumerate(arrays):
+            for side, (bins, numbers) in enumerate(sides):
+                counts[side, row, np.searchsorted(occupied, bins)] = numbers
+        return cls(occupied, counts, np.array([unit.repeat for unit in units]))
+
+    @property
+    def size(self) -> int:
+        """How many units."""
+        return int(self.counts.shape[1])
+
+    def statistic_ms(self, weights: Floats, name: str) -> Floats:
+        """The mean or a quantile of weighted sums of units.
+
+        Args:
+            weights: how often each unit counts, shape (draws, units).
+            name: `mean` or a key of SHARES.
+
+        Returns:
+            Shape (sides, draws), milliseconds; NaN for a draw without samples.
+        """
+        return np.array([_statistic_ms(self.bins, weights @ side, name) for side in self.counts])
+
+    def influence(self, name: str) -> Floats:
+        """What each unit contributes to the figure's error, shape (units,): of two sides the second less the first."""
+        whole = self.statistic_ms(np.ones((1, self.size)), name)[:, 0]
+        lower, width = edges_us(self.bins)
+        found = []
+        for counts, figure in zip(self.counts, whole, strict=True):
+            samples = counts.sum(axis=1)
+            if name == "mean":
+                excess = counts @ ((lower + width / 2) / 1e3 / max(figure, 1e-9) - 1)
+            else:
+                beyond = np.clip((lower + width - figure * 1e3) / width, 0.0, 1.0)
+                excess = counts @ beyond - (1 - SHARES[name]) * samples
+            found.append(excess / max(samples.mean(), 1e-9))
+        result: Floats = found[-1] - found[0] if len(found) > 1 else found[0]
+        return result
+
+
+def _statistic_ms(bins: Ints, drawn: Floats, name: str) -> Floats:
+    totals = drawn.sum(axis=1)
+    if name == "mean":
+        lower, width = edges_us(bins)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            means: Floats = drawn @ (lower + width / 2) / totals / 1e3
+            return means
+    found = np.full(len(drawn), np.nan)
+    filled = totals > 0
+    if filled.any():
+        found[filled] = quantiles_us(bins, drawn[filled], SHARES[name]) / 1e3
+    return found
+
+
+@dataclass(frozen=True)
+class Rounds:
+    """How units were put together.
+
+    Attributes:
+        sample: the rounds.
+        length: units in each.
+        unit_correlation, correlation: from one unit to the next, and from one round to the next; None where there are
+            too few.
+        influence: of each round, shape (rounds,).
+    """
+
+    sample: Sample
+    length: int
+    unit_correlation: float | None
+    correlation: float | None
+    influence: Floats
+
+    @property
+    def widening(self) -> float:
+        """By how much what is left of the correlation makes an interval wider, 1 or more."""
+        left = min(max(self.correlation or 0.0, 0.0), _MOST)
+        return math.sqrt((1 + left) / (1 - left))
+
+
+def lag_correlation(values: Floats, repeats: Ints) -> float | None:
+    """The correlation of each value with the one after it, within repeats; None where there are too few values.
+
+    A short series makes it look smaller than it is; that is put right to first order (Marriott and Pope 1954).
+    """
+    number = len(values)
+    if number < _LEAST_FOR_LAG:
+        return None
+    centred = values - values.mean()
+    together = repeats[1:] == repeats[:-1]
+    spread = float((centred**2).sum())
+    if not together.any() or spread <= 0:
+        return None
+    pairs = int(together.sum())
+    raw = float((centred[1:] * centred[:-1])[together].sum()) / spread * number / pairs
+    return float(np.clip((raw * number + 1) / (number - 4), -1.0, 1.0))
+
+
+def in_rounds(sample: Sample, name: str) -> Rounds:
+    """Put units together until a round's influence on a figure says nothing about the next one's."""
+    influence = sample.influence(name)
+    alone = lag_correlation(influence, sample.repeats)
+    chosen = Rounds(sample, 1, alone, alone, influence)
+    for length in _LENGTHS:
+        gone = chosen.correlation is None or chosen.correlation < max(_GONE, 1 / math.sqrt(chosen.sample.size))
+        if gone and chosen.length > 1:
+            break
+        first = _first_of_each(sample.repeats, length)
+        if len(first) < _FEWEST_ROUNDS:
+            break
+        longer = Sample(sample.bins, np.add.reduceat(sample.counts, first, axis=1), sample.repeats[first])
+        summed = np.add.reduceat(influence, first)
+        chosen = Rounds(longer, length, alone, lag_correlation(summed, longer.repeats), summed)
+    return chosen
+
+
+def _first_of_each(repeats: Ints, length: int) -> Ints:
+    """The first unit of each round of so many; what is over at a repeat's end goes to its last round."""
+    first: list[int] = []
+    for repeat in np.unique(repeats).tolist():
+        members = np.flatnonzero(repeats == repeat)
+        rounds = max(1, len(members) // length)
+        first += members[: rounds * length : length].tolist()
+    return np.array(first)
