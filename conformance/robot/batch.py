@@ -1,6 +1,9 @@
-"""Deliveries sent one after another over both interfaces, and what arrived of each."""
+"""Deliveries sent one after another over both interfaces, and what arrived of each.
 
-import time
+Whether each has arrived is seen as soon as all have; that none comes twice is seen until the last batch has been
+watched for a while, so that the batches need no pause between them.
+"""
+
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,8 +26,9 @@ REQUIREMENT: Final = {
     "coffee": "equivalence/coffee-soap",
     "same": "equivalence/delivery-same",
     "twice": "equivalence/delivery-repeated",
+    "together": "equivalence/delivery-concurrent",
 }
-_TOGETHER: Final = "equivalence/delivery-concurrent"
+_TOGETHER: Final = "together"
 _ONLY: Final = "equivalence/delivery-only"
 # Orders of which each makes two messages.
 _TWO: Final = {"same": ["rest", "soap"], "twice": ["rest", "rest"]}
@@ -49,6 +53,8 @@ class Order:
 
 @dataclass(frozen=True)
 class _Sent:
+    """A delivery that was accepted; ``how`` as in an order, or together with those of other clients."""
+
     how: str
     interface: str
     delivery: Delivery
@@ -67,9 +73,11 @@ class Batch:
     def __init__(self, rest: HttpClient, publishers: SoapService, observer: DeliveryObserver, judge: Judge) -> None:
         self._rest, self._publishers = rest, publishers
         self._observer, self._judge = observer, judge
-        # What was sent in earlier batches, by its key; how many batches had messages that nobody asked for.
-        self._earlier: dict[bytes, Exchange] = {}
+        # What was sent in earlier batches, by its key, and how many batches had messages that nobody asked for.
+        self._earlier: dict[bytes, _Sent] = {}
         self._strange = 0
+        # Of what was sent without an answer, by its key: it may arrive, whenever.
+        self._maybe: set[bytes] = set()
         observer.mark()
 
     def run(self, orders: Sequence[Order]) -> bool:
@@ -79,29 +87,35 @@ class Batch:
         """
         sent = [one for order in orders for one in self._send(order)]
         accepted = [one for one in sent if one.exchange.response.ok]
-        seen = self._observer.collect(len(accepted))
+        seen = self._collect(accepted)
         well = self._judge_each(accepted, seen) & self._judge_order(accepted, seen)
-        return self._judge_only(accepted, seen, maybe=frozenset()) and well
+        return self._judge_only(accepted, seen) and well
 
     def run_together(self, rounds: Sequence[Sequence[tuple[str, Delivery]]]) -> bool:
         """Send deliveries by (how, values), those of a round at one moment, then judge each; whether all was well."""
         outgoing = [[self._outgoing(how, delivery) for how, delivery in turn] for turn in rounds]
         attempts = send_together(outgoing)
-        sent, maybe = [], set()
+        sent = []
         for (how, delivery), attempt in zip(chain(*rounds), chain(*attempts), strict=True):
             if not isinstance(attempt, Exchange):
                 # Nobody knows what became of it: a robot that closes a connection may have read the request.
-                maybe.add(self._key(delivery))
+                self._maybe.add(self._key(delivery))
             elif attempt.response.ok:
-                sent.append(_Sent(how, "rest" if how == "rest" else "soap", delivery, attempt))
-        seen = self._observer.collect(len(sent))
-        well = self._judge_each(sent, seen, _TOGETHER)
-        return self._judge_only(sent, seen, maybe=frozenset(maybe)) and well
+                sent.append(_Sent(_TOGETHER, "rest" if how == "rest" else "soap", delivery, attempt))
+        seen = self._collect(sent)
+        well = self._judge_each(sent, seen)
+        return self._judge_only(sent, seen) and well
 
     def finish(self, watched_s: float) -> None:
         """Judge what arrives later than it should, for so long, s."""
-        time.sleep(watched_s)
-        self._judge_only([], self._observer.collect(0), maybe=frozenset())
+        self._judge_only([], self._observer.collect(0, watched_s))
+
+    def _collect(self, sent: Sequence[_Sent]) -> list[Seen]:
+        """What arrived since this was asked last; what is not just what was sent is looked at for a little longer."""
+        seen = self._observer.collect(len(sent), 0.0)
+        if sorted(self._key(one.delivery) for one in seen) != sorted(self._key(one.delivery) for one in sent):
+            seen += self._observer.collect(0)
+        return seen
 
     def _send(self, order: Order) -> list[_Sent]:
         delivery, sent = order.delivery, []
@@ -127,7 +141,7 @@ class Batch:
             delivery = type(delivery)(delivery.message_code, *(value + 0.0 for value in delivery[1:]))
         return delivery.bits
 
-    def _judge_each(self, sent: list[_Sent], seen: list[Seen], requirement: str = "") -> bool:
+    def _judge_each(self, sent: list[_Sent], seen: list[Seen]) -> bool:
         arrived = Counter(self._key(one.delivery) for one in seen)
         asked = Counter(self._key(one.delivery) for one in sent)
         strangers = [one.delivery for one in seen if self._key(one.delivery) not in asked]
@@ -142,7 +156,7 @@ class Batch:
             elif any(interfaces) and interfaces != _TWO.get(one.how, [one.interface])[: len(interfaces)]:
                 problem = f"{count} by {' and '.join(interfaces)}"
             well &= self._judge.check(
-                requirement or REQUIREMENT[one.how],
+                REQUIREMENT[one.how],
                 not problem,
                 one.exchange,
                 f"exactly one message for each accepted request, {one.delivery}",
@@ -151,26 +165,40 @@ class Batch:
             )
         return well
 
-    def _judge_only(self, sent: list[_Sent], seen: list[Seen], maybe: frozenset[bytes]) -> bool:
+    def _judge_only(self, sent: list[_Sent], seen: list[Seen]) -> bool:
         """Judge what arrived beside that which was just sent: an earlier delivery again, or one of nobody's.
 
         A robot may have other clients: what nobody here asked for is held against it only when it comes repeatedly.
         """
-        known = {self._key(one.delivery): one.exchange for one in sent}
-        others = [one.delivery for one in seen if self._key(one.delivery) not in known.keys() | maybe]
+        known = {self._key(one.delivery): one for one in sent}
+        others = [one.delivery for one in seen if self._key(one.delivery) not in known.keys() | self._maybe]
         again = [delivery for delivery in others if self._key(delivery) in self._earlier]
         self._strange += len(again) < len(others)
         self._earlier |= known
+        self._judge_again(again)
         blamed = again or (others if self._strange >= _OFTEN else [])
-        exchange = self._earlier.get(self._key(blamed[0])) if blamed else next(iter(known.values()), None)
+        one = self._earlier.get(self._key(blamed[0])) if blamed else next(iter(known.values()), None)
         return self._judge.check(
             _ONLY,
             not blamed,
-            exchange,
+            one.exchange if one else None,
             "no message beside the one for each accepted request",
             found=f"{'once more, and later' if again else 'from nobody'}: {blamed[0]}" if blamed else "",
             cause="later" if again else "from nobody",
         )
+
+    def _judge_again(self, again: list[Delivery]) -> None:
+        """An earlier delivery that comes once more was not one message, whenever that is noticed."""
+        for delivery in again:
+            one = self._earlier[self._key(delivery)]
+            self._judge.check(
+                REQUIREMENT[one.how],
+                False,
+                one.exchange,
+                f"exactly one message for each accepted request, {delivery}",
+                found="one more, later",
+                cause=f"{one.interface} later",
+            )
 
     def _judge_order(self, sent: list[_Sent], seen: list[Seen]) -> bool:
         """What was sent over one interface arrives in that order; two interfaces may have a publisher each."""

@@ -13,9 +13,9 @@ from conformance.robot.robot import ACCEPT_JSON, DELIVERIES
 from conformance.transport.client import HttpClient
 from conformance.transport.pace import Patience
 
-# How long messages are waited for, and how long after the last one another would still be noticed, s.
+# How long messages are waited for, and how long after the last one another is still looked for, s.
 _ARRIVES_S: Final = 2.0
-_QUIET_S: Final = 0.15
+QUIET_S: Final = 0.15
 _STEP_S: Final = 0.02
 
 
@@ -44,10 +44,10 @@ class DeliveryObserver(Protocol):
     def mark(self) -> None:
         """Forget what was seen so far."""
 
-    def collect(self, count: int) -> list[Seen]:
+    def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
         """What was seen since the mark, or since this was asked last; oldest first.
 
-        Waits for ``count`` of them, and a little longer.
+        Waits for ``count`` of them, and then for so much longer, s.
         """
 
 
@@ -74,13 +74,16 @@ class ListObserver:
         """See DeliveryObserver."""
         self._before = self._listed()
 
-    def collect(self, count: int) -> list[Seen]:
+    def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
         """See DeliveryObserver."""
         patience = Patience(self._rest.connection.pace, _ARRIVES_S + 4 * self._slow_s)
-        while len(self._new(self._listed())) < count and not patience.over:
-            time.sleep(_STEP_S)
-        time.sleep(_QUIET_S)
         listed = self._listed()
+        while len(self._new(listed)) < count and not patience.over:
+            time.sleep(_STEP_S)
+            listed = self._listed()
+        if then_s:
+            time.sleep(then_s)
+            listed = self._listed()
         new = self._new(listed)
         self._before = listed
         return [Seen(Delivery.of(entry["request"]), entry["interface"]) for entry in reversed(new)]
@@ -124,19 +127,21 @@ class ProbeObserver:
     def mark(self) -> None:
         """See DeliveryObserver."""
         if not self._marked:
-            time.sleep(_QUIET_S)  # what others sent may still be on its way; later collect() has waited
+            time.sleep(QUIET_S)  # what others sent may still be on its way; later collect() has waited
             self._marked = True
         self._probe.deliveries()
 
-    def collect(self, count: int) -> list[Seen]:
+    def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
         """See DeliveryObserver."""
         until = time.monotonic() + _ARRIVES_S
-        seen: list[Delivery] = []
+        seen = self._probe.deliveries()
         while len(seen) < count and time.monotonic() < until:
-            seen += self._probe.deliveries()
             time.sleep(_STEP_S)
-        time.sleep(_QUIET_S)
-        return [Seen(delivery) for delivery in seen + self._probe.deliveries()]
+            seen += self._probe.deliveries()
+        if then_s:
+            time.sleep(then_s)
+            seen += self._probe.deliveries()
+        return [Seen(delivery) for delivery in seen]
 
 
 def observer_of(api: RestInterface, probe: RosProbe) -> DeliveryObserver:

@@ -17,7 +17,7 @@ from conformance.verdict.evidence import Judge
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)(e[+-]\d+)?")
 _IDS = {
     f"equivalence/{name}"
-    for name in ("delivery-rest", "delivery-soap", "coffee-soap", "delivery-same", "delivery-order")
+    for name in ("delivery-rest", "delivery-soap", "coffee-soap", "delivery-same", "delivery-order", "delivery-only")
 }
 
 
@@ -73,16 +73,20 @@ class Robot:
     def mark(self):
         self._seen.clear()
 
-    def collect(self, _count):
-        return list(self._seen)
+    def collect(self, _count, _then_s=0.0):
+        seen = list(self._seen)
+        self._seen.clear()
+        return seen
+
+
+def order(number, how) -> Order:
+    delivery = Delivery(3, *(1 / 3 + number + place for place in range(6)))
+    return Order(how, delivery, ("3", *map(repr, delivery[1:])))
 
 
 def found(fault) -> set[str]:
     robot, judge = Robot(fault), Judge(_IDS)
-    orders = []
-    for number, how in enumerate(("rest", "soap", "coffee", "same") * 3):
-        delivery = Delivery(3, *(1 / 3 + number + place for place in range(6)))
-        orders.append(Order(how, delivery, ("3", *map(repr, delivery[1:]))))
+    orders = [order(number, how) for number, how in enumerate(("rest", "soap", "coffee", "same") * 3)]
     well = Batch(robot, robot, robot, judge).run(orders)
     assert well is not bool(judge.refuted())
     return {id_.split("/")[1] for id_ in judge.refuted()}
@@ -120,6 +124,23 @@ def test_another_order_is_found():
         return [seen, *kept] if number == 6 else [seen]
 
     assert found(overtaken) == {"delivery-order"}
+
+
+@pytest.mark.parametrize("late", [3, 5])
+def test_a_second_message_is_found_whenever_it_comes(late):
+    first: list[Seen] = []
+
+    def again(number, seen):
+        first.append(seen)
+        return [seen, first[0]] if number == late else [seen]
+
+    robot, judge = Robot(again), Judge(_IDS)
+    batch = Batch(robot, robot, robot, judge)
+    assert batch.run([order(number, "rest") for number in range(2)])
+    for turn in (1, 2):
+        batch.run([order(number, "soap") for number in (2 * turn, 2 * turn + 1)])
+    batch.finish(0.0)
+    assert set(judge.refuted()) == {"equivalence/delivery-rest", "equivalence/delivery-only"}
 
 
 @settings(max_examples=50, deadline=None, database=None)
