@@ -146,7 +146,7 @@ class Shape:
 
     def _passes(self, value: Any) -> bool:
         try:
-            return bool(self._quick.is_valid(value)) and all(map(math.isfinite, numbers_in(value)))
+            return bool(self._quick.is_valid(value)) and _all_finite(value)
         except (ValueError, TypeError, OverflowError):
             return False  # a number that it does not take (an Infinity): the other one judges that
 
@@ -191,6 +191,17 @@ def numbers_in(value: Any) -> Iterator[float]:
     elif isinstance(value, dict):
         for item in value.values():
             yield from numbers_in(item)
+
+
+def _all_finite(value: Any) -> bool:
+    """Whether every number in a JSON value is one that a double can hold; every answer is looked through by this."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, list):
+        return all(map(_all_finite, value))
+    if isinstance(value, dict):
+        return all(map(_all_finite, value.values()))
+    return not isinstance(value, int) or math.isfinite(as_double(value))
 
 
 def as_double(value: float) -> float:

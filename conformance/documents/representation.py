@@ -17,6 +17,7 @@ _WHOLE = re.compile(r"[+-]?\d{1,400}", re.ASCII)
 _NULLS = {"", "null", "~", "Null", "NULL"}
 # libyaml where PyYAML was built with it: an Odometry is 150 lines, and pure Python takes 20 ms for them.
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+_COMBINING = frozenset({"allOf", "oneOf", "anyOf"})
 _NIL = "{http://www.w3.org/2001/XMLSchema-instance}nil"
 
 
@@ -162,21 +163,24 @@ def scalar(text: str, kind: str) -> Any:
 
 def projected(value: Any, schema: Schema) -> Any:
     """A JSON value without the fields that its schema does not name."""
+    if not isinstance(value, list | dict):
+        return value
     schema = flat(schema)
     if isinstance(value, list):
-        return [projected(item, schema.get("items", {})) for item in value]
+        items = schema.get("items", {})
+        return [projected(item, items) for item in value]
     properties: dict[str, Schema] = schema.get("properties", {})
-    if not isinstance(value, dict) or not properties:
+    if not properties:
         return value
     return {name: projected(item, properties[name]) for name, item in value.items() if name in properties}
 
 
 def flat(schema: Schema) -> Schema:
     """A schema with the properties of its allOf, or of its first alternative, as its own."""
-    parts = [*schema.get("allOf", ()), *schema.get("oneOf", ())[:1], *schema.get("anyOf", ())[:1]]
-    if not parts:
+    if _COMBINING.isdisjoint(schema):
         return schema
-    result = {key: item for key, item in schema.items() if key not in {"allOf", "oneOf", "anyOf"}}
+    parts = [*schema.get("allOf", ()), *schema.get("oneOf", ())[:1], *schema.get("anyOf", ())[:1]]
+    result = {key: item for key, item in schema.items() if key not in _COMBINING}
     for part in parts:
         inner = flat(part)
         result = {

@@ -127,7 +127,8 @@ def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[st
     """Run pytest over the checks, and nothing of the folder that the user happens to be in; True when interrupted."""
     teller = Progress(robot, progress)
     options = [f"--config-file={os.devnull}", f"--rootdir={_CHECKS}", "--import-mode=importlib", "--capture=no"]
-    options += ["-Wignore", *(f"-pno:{name}" for name in ("terminal", "cacheprovider", "logging", "junitxml"))]
+    unused = ("terminal", "cacheprovider", "logging", "junitxml", "unraisableexception", "threadexception")
+    options += ["-Wignore", *(f"-pno:{name}" for name in unused)]
     try:
         with pytest.MonkeyPatch.context() as environment:
             environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")

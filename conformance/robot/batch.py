@@ -193,9 +193,9 @@ class Batch:
             one = self._earlier[self._key(delivery)]
             self._judge.check(
                 REQUIREMENT[one.how],
-                False,
-                one.exchange,
-                f"exactly one message for each accepted request, {delivery}",
+                holds=False,
+                exchange=one.exchange,
+                expected=f"exactly one message for each accepted request, {delivery}",
                 found="one more, later",
                 cause=f"{one.interface} later",
             )

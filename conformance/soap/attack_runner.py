@@ -1,6 +1,7 @@
 """Sending attacks: each over a connection of its own, with the robot asked afterwards whether it is still well."""
 
-from collections.abc import Callable, Iterable
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -30,6 +31,7 @@ class AttackRunner:
         ids: the requirements that an attack is a case of.
         troubles: how often the robot let a deadline pass or was slow afterwards. After three that is known.
         with_canary: the attacks so far that name an address of the callback server, with what they are cases of.
+        tempted: when the last of them was answered, s of the monotonic clock.
     """
 
     judge: Judge
@@ -39,6 +41,7 @@ class AttackRunner:
     ids: Callable[[Attack], tuple[str, ...]] = lambda attack: (f"xml-security/{attack.name}",)
     troubles: int = 0
     with_canary: list[tuple[Attack, Attempt, tuple[str, ...]]] = field(default_factory=list)
+    tempted: float = 0.0
 
     def attack(self, attack: Attack) -> None:
         """Send one attack and judge what became of it.
@@ -58,6 +61,7 @@ class AttackRunner:
             self.judge.check(id_, verdict.holds, attempt, verdict.expected, found=verdict.found, cause=verdict.cause)
         if attack.canary:
             self.with_canary.append((attack, attempt, ids))
+            self.tempted = time.monotonic()
         self._well(attack, attempt)
         self.judge.at_risk = ()
 
@@ -81,11 +85,11 @@ class AttackRunner:
         )
 
 
-def judge_calls(judge: Judge, callbacks: CallbackServer, runners: Iterable[AttackRunner]) -> None:
+def judge_calls(judge: Judge, callbacks: CallbackServer, runners: Sequence[AttackRunner]) -> None:
     """Judge whether any attack made a robot call, after a moment for a robot that calls in its own time."""
     with_canary = [one for runner in runners for one in runner.with_canary]
     if with_canary:
-        callbacks.settle()
+        callbacks.settle(max(runner.tempted for runner in runners))
     for attack, exchange, ids in with_canary:
         for id_ in {"xml-security/no-callback": None, **dict.fromkeys(ids)}:
             judge.check(

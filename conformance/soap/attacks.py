@@ -83,7 +83,8 @@ def attacks(template: Template, url: Callable[[str], str], each: int, place: str
         each: how many for one requirement at most.
         place: tells the canaries of this document from those of another.
     """
-    for make in (_doctypes, _internal, _external, _expansions, _inclusions, _sizes, _instructions):
+    # What names an address before what takes long, in which a robot may come to call it.
+    for make in (_doctypes, _internal, _external, _expansions, _inclusions, _instructions, _sizes):
         made: Counter[str] = Counter()
         for attack in make(template, lambda canary: url(f"{place}{canary}")):
             made[attack.name] += 1

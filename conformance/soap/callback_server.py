@@ -44,9 +44,9 @@ class CallbackServer:
         """How often the URL of ``canary`` has been asked for, or the address alone."""
         return sum(1 for line in list(self._seen) if f"/{canary}" in line or line == "")
 
-    def settle(self) -> None:
-        """Give a robot that calls back in its own time a moment to do so."""
-        time.sleep(_WAIT_S)
+    def settle(self, since: float) -> None:
+        """Give a robot that calls back in its own time a moment for it, from a time of the monotonic clock on."""
+        time.sleep(max(0.0, since + _WAIT_S - time.monotonic()))
 
     def _listen(self) -> None:
         while not self._closing:

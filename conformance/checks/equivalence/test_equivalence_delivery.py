@@ -92,15 +92,14 @@ def _number(turn: int, round_: int, client: int, place: int) -> float:
 
 def _batches() -> st.SearchStrategy[list[Order]]:
     """Orders of all kinds, in any order, no two of them alike."""
-
-    def spread(kinds: list[str]) -> st.SearchStrategy[list[Order]]:
-        return st.lists(
-            lexical_deliveries(),
-            min_size=len(kinds),
-            max_size=len(kinds),
-            # The code does not tell them apart: a coffee's is another one than was drawn. Nor does the sign of a zero.
-            unique_by=lambda case: tuple(value + 0.0 for value in case[0][1:]),
-        ).map(lambda cases: [Order(kind, *case) for kind, case in zip(kinds, cases, strict=True)])
-
+    cases = st.lists(
+        lexical_deliveries(),
+        min_size=_ORDERS,
+        max_size=_ORDERS,
+        # The code does not tell them apart: a coffee's is another one than was drawn. Nor does the sign of a zero.
+        unique_by=lambda case: tuple(value + 0.0 for value in case[0][1:]),
+    )
     kinds = st.permutations(_KINDS * (_ORDERS // len(_KINDS)))
-    return kinds.flatmap(lambda chosen: spread(list(chosen)))
+    return st.builds(
+        lambda kinds, cases: [Order(kind, *case) for kind, case in zip(kinds, cases, strict=True)], kinds, cases
+    )

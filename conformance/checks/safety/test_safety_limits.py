@@ -32,12 +32,24 @@ def _beyond(robot: Robot) -> Iterator[Velocity]:
             yield from (_only(component, size), _only(component, -size))
 
 
-@pytest.mark.requirement("safety/limits-refused", "safety/refused-keeps", "safety/limits-hold")
-def test_beyond_the_limits(robot: Robot, judge: Judge, effort: Effort) -> None:
-    """A velocity beyond the limits is refused, on both resources, and the robot stays at rest."""
+@pytest.mark.requirement(
+    "safety/limits-refused", "safety/unactuated-refused", "safety/refused-keeps", "safety/limits-hold"
+)
+def test_what_is_not_to_be_taken(robot: Robot, judge: Judge, effort: Effort) -> None:
+    """What is beyond the limits or not to be actuated is refused, on both resources, and the robot stays at rest."""
+    # Zero is not a value that can be refused, however it is signed. Before the others: it would stop what they begin.
+    Drive(robot).command(Velocity(-0.0, -0.0, -0.0, -0.0, -0.0, -0.0))
     for bad in effort.subsample(list(_beyond(robot)), 8):
         _judge_refused(robot, judge, bad)
-    _judge_rest(robot, judge)
+    if not robot.limits_declared:
+        # What is seen of a component that the statement leaves out says nothing of limits.
+        _judge_rest(robot, judge, "safety/refused-keeps", "safety/limits-hold")
+    components = [component for component in range(6) if not robot.actuated(component)]
+    if not components:
+        judge.unclaimed("safety/unactuated-refused", "the statement says that the robot actuates all components")
+    for component in components:
+        _judge_component(robot, judge, component)
+    _judge_rest(robot, judge, "safety/refused-keeps")
 
 
 def _judge_refused(robot: Robot, judge: Judge, bad: Velocity) -> None:
@@ -67,7 +79,7 @@ def _judge_refused(robot: Robot, judge: Judge, bad: Velocity) -> None:
     )
 
 
-def _judge_rest(robot: Robot, judge: Judge) -> None:
+def _judge_rest(robot: Robot, judge: Judge, *ids: str) -> None:
     """Nothing of what was refused shows in the settle time, by which a robot that took it would move."""
     drive = Drive(robot)
     until = time.monotonic() + robot.limits.settle_s
@@ -75,30 +87,8 @@ def _judge_rest(robot: Robot, judge: Judge) -> None:
     while still is not False and time.monotonic() < until:
         still, found = drive.sees(STILL, 2)
     exchange = drive.trace.turns[-1].velocity_exchange
-    judge.check(
-        "safety/refused-keeps",
-        still is not False,
-        exchange,
-        "rest after refused velocities",
-        found=found,
-        cause="moves",
-    )
-    if not robot.limits_declared:
-        judge.check("safety/limits-hold", still is not False, exchange, "no speed beyond any limit", found=found)
-
-
-@pytest.mark.requirement("safety/unactuated-refused", "safety/refused-keeps")
-def test_components_that_the_robot_cannot_actuate(robot: Robot, judge: Judge) -> None:
-    """They have to be 0; a robot that can actuate more than its statement says shows it by its measured velocity."""
-    components = [component for component in range(6) if not robot.actuated(component)]
-    if not components:
-        judge.unclaimed("safety/unactuated-refused", "the statement says that the robot actuates all components")
-    for component in components:
-        _judge_component(robot, judge, component)
-    # Zero is not a value that can be refused, however it is signed.
-    drive = Drive(robot)
-    drive.command(Velocity(-0.0, -0.0, -0.0, -0.0, -0.0, -0.0))
-    _judge_rest(robot, judge)
+    for id_ in ids:
+        judge.check(id_, still is not False, exchange, "rest after refused velocities", found=found, cause="moves")
 
 
 def _judge_component(robot: Robot, judge: Judge, component: int) -> None:

@@ -1,4 +1,4 @@
-"""Velocities in any order."""
+"""Velocities in any order, where the turns before have made room for them."""
 
 import pytest
 
