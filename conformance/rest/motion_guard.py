@@ -1,17 +1,22 @@
 """Random requests made harmless: what a robot accepts of them stays slow, near and seldom."""
 
+from __future__ import annotations
+
 from collections import Counter
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.writing import json_text
 from conformance.rest.applicable import allowed
 from conformance.rest.calls import JSON, example_call
-from conformance.rest.generated import GeneratedRequest
 from conformance.rest.interface import RestInterface
 from conformance.rest.validity import INVALID, VALID, Validity, validity
+
+if TYPE_CHECKING:
+    # Schemathesis takes a quarter of a second to import, and quick effort does without it.
+    from conformance.rest.generated import GeneratedRequest
 
 # How many valid requests of one moving operation are sent: each may start a mission.
 _ACCEPTED = 3

@@ -52,18 +52,22 @@ def _turned(goal: Pose, part: int) -> Pose:
     return Pose(goal.x, goal.y, math.remainder(goal.yaw + part, math.tau))
 
 
-def make_room(robot: Robot) -> None:
+def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
     """Drive a robot that stands close to something to where it can be driven about by its velocity.
 
     A simulated robot's wheels go on turning against a wall, and its pose then moves otherwise than its velocity says.
     Where the robot stays if it knows of no such place, or does not go there, is for the checks to find out.
+
+    Args:
+        robot: at rest.
+        ahead_m: how far ahead or back it may get; more than a few decimetres aside is no check's affair.
     """
     here = robot.map_pose()
-    if here is None or _is_open(robot, here):
+    if here is None or _is_open(robot, here, min(max(ahead_m, _NEAR_M), _FAR_M)):
         return
     for distance in (0.8, 1.5, 2.5):
         for pose in reachable(robot, here, distance, _PLACES):
-            if _is_open(robot, pose):
+            if _is_open(robot, pose, _FAR_M):
                 exchange = put_goal(robot, goal_body(pose, robot.statement.motion.frame))
                 if exchange.response.ok:
                     await_none(robot, _ARRIVES_S)
@@ -72,10 +76,10 @@ def make_room(robot: Robot) -> None:
                 return
 
 
-def _is_open(robot: Robot, pose: Pose) -> bool:
-    """Whether the robot knows plain ways from a pose into all directions, and farther ones ahead and back."""
+def _is_open(robot: Robot, pose: Pose, ahead_m: float) -> bool:
+    """Whether the robot knows plain ways from a pose into all directions, of another length ahead and back."""
     around = [pose.ahead(_NEAR_M, math.radians(angle)) for angle in range(60, 360, 60)]
-    for there in (pose.ahead(_FAR_M), pose.ahead(-_FAR_M), *around):
+    for there in (pose.ahead(ahead_m), pose.ahead(-ahead_m), *around):
         _, plan, _ = ask(robot, there, pose)
         if plan is None or plan.length > 1.2 * pose.distance(there) + 0.1 or not robot.in_arena(there):
             return False

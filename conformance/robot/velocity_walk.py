@@ -3,6 +3,7 @@
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
+from conformance.contract.limits import Limits
 from conformance.robot.robot import STILL, Velocity
 from conformance.robot.walk import Walk
 
@@ -12,6 +13,11 @@ _ANGULAR_SHARE = 0.6
 # Farther than this from where the walk began, the next way leads back, m.
 _LEASH_M = 0.25
 _SHARES = st.floats(0.15, 1.0)
+
+
+def room_for(limits: Limits) -> float:
+    """How far from where it began a walk may take a robot, m: off its leash by one more velocity."""
+    return _LEASH_M + _LINEAR_SHARE * limits.linear_m_s * limits.settle_s
 
 
 class VelocityMachine(RuleBasedStateMachine):

@@ -3,14 +3,15 @@
 Its requests are judged by what they are on the wire: valid ones by the statuses of the contract, invalid ones by 4xx.
 """
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis.errors import Unsatisfiable
 
 from conformance.documents.openapi import operations_of
 from conformance.rest.applicable import allowed
-from conformance.rest.generated import GeneratedRequest, Target
 from conformance.rest.interface import RestInterface
 from conformance.rest.motion_guard import MotionGuard
 from conformance.rest.refusals import judge_refusal
@@ -19,6 +20,9 @@ from conformance.robot.stopping import stop_robot
 from conformance.transport.client import HttpClient
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
+
+if TYPE_CHECKING:
+    from conformance.rest.generated import GeneratedRequest, Target
 
 pytestmark = pytest.mark.needs("rest")
 _IDS = ("http/declared-status", "http/declared-body", "http/no-server-error")

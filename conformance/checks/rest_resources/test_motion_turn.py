@@ -21,6 +21,8 @@ _KEEP_S: Final = 1.3
 _ENDS_S: Final = 10.0
 # What could not be seen in time is tried so often.
 _TRIES: Final = 3
+# By its arcs a robot gets at most as far as in this time at its greatest speed, s.
+_LONGEST_ARC_S: Final = 0.5
 _LINEAR: Final = slice(0, 3)
 _ANGULAR: Final = slice(3, 6)
 # A robot that drops its angular velocity needs so long to show it, s.
@@ -46,7 +48,7 @@ def test_turn(robot: Robot, judge: Judge) -> None:
     """One turn of about three seconds; the robot ends it by itself."""
     if not robot.actuated(5):
         pytest.skip("the statement says that the robot cannot turn on the spot")
-    make_room(robot)
+    make_room(robot, _LONGEST_ARC_S * robot.limits.linear_m_s)
     drive = Drive(robot)
     _turn(robot, drive, judge)
     drive.judge_motion()

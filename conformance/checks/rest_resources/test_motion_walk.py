@@ -4,7 +4,7 @@ import pytest
 
 from conformance.robot.goals import make_room
 from conformance.robot.robot import Robot
-from conformance.robot.velocity_walk import VelocityMachine
+from conformance.robot.velocity_walk import VelocityMachine, room_for
 from conformance.robot.walk import Walk
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
@@ -24,7 +24,7 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
 )
 def test_velocity_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
     """Whatever is asked for, in whatever order, is what the robot does, and its pose follows."""
-    make_room(robot)
+    make_room(robot, room_for(robot.limits))
     walk = Walk(robot, 0.8 * effort.budget_s)
     explore.machine(lambda: VelocityMachine(walk), cases=10, steps=effort.cases(12))
     explore.left_out(walk.left_out)
