@@ -8,6 +8,7 @@ from typing import Final
 import click
 
 from conformance.contract.exit_codes import ExitCode
+from reference_robot.ros_arguments import RosCommand
 
 _HIGHEST_DOMAIN_ID: Final = 101
 _FILE: Final = click.Path(exists=True, dir_okay=False, path_type=Path)
@@ -26,7 +27,7 @@ _NEEDED: Final = {
 }
 
 
-@click.command()
+@click.command(cls=RosCommand)
 @click.option("--config", type=_FILE, help="TOML file of names, limits and deadlines.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option("--insecure", is_flag=True, help="Let everybody who reaches --host drive the robot, without a token.")
@@ -75,10 +76,14 @@ _NEEDED: Final = {
     help="Believe X-Forwarded-Proto and -Host from this address or network. Repeatable.",
 )
 @click.option("--attach", is_flag=True, help="Start no simulation; serve the robot on the ROS graph.")
+@click.option(
+    "--delivery-only", is_flag=True, help="Run the delivery application alone, beside the robot on the ROS graph."
+)
 def robot(**options: object) -> None:
     """Run the reference robot.
 
-    When both interfaces answer, one line on stdout says where. SIGINT and SIGTERM stop the robot.
+    When both interfaces answer, one line on stdout says where. SIGINT and SIGTERM stop the robot. What follows
+    --ros-args goes to ROS: namespaces, remappings, parameters such as use_sim_time, enclaves.
     """
     for module, remedy in _NEEDED.items():
         try:

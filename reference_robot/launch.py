@@ -1,4 +1,7 @@
-"""Starts a whole robot: the simulation as a child process, unless a robot is there already, and the web services."""
+"""Starts a whole robot: the simulation as a child process, unless a robot is there already, and the web services.
+
+Or the delivery application alone.
+"""
 
 import contextlib
 import logging
@@ -16,7 +19,10 @@ from rclpy.logging import get_logging_directory
 
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.toml_file import TomlFileError
+from reference_robot.ending import Ending
+from reference_robot.ros import RosArgumentsError, RosRuntime
 from reference_robot.simulated import SimulatedRobot, SimulationError
+from reference_robot.simulation.delivery import Delivery
 from reference_robot.webservices.assembly import Endpoints
 from reference_robot.webservices.configuration import load_configuration
 from reference_robot.webservices.endpoint import PortInUseError
@@ -70,6 +76,8 @@ class Options:
     attach: bool
     realistic: bool
     seed: int
+    delivery_only: bool
+    ros_arguments: tuple[str, ...]
 
 
 def run(options: Options) -> None:
@@ -81,6 +89,10 @@ def run(options: Options) -> None:
     """
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
 
+    if options.delivery_only:
+        _deliver(options)
+        return
+
     def ready(endpoints: Endpoints) -> None:
         wsdl = f"{endpoints.soap}{PUBLISHERS_PATH}?wsdl"
         sys.stdout.write(f"ready rest={endpoints.rest} soap={wsdl} domain={options.domain_id}\n")
@@ -88,10 +100,12 @@ def run(options: Options) -> None:
 
     try:
         configuration = load_configuration(options.config)
-        runner = RobotWebServiceNodesRunner(configuration, _listening(options), options.domain_id)
+        listening = _listening(options)
+        RosRuntime(options.domain_id, options.ros_arguments).close()  # whether ROS takes them, before anything starts
+        runner = RobotWebServiceNodesRunner(configuration, listening, options.domain_id, options.ros_arguments)
         with contextlib.suppress(_Stopped), _stopped_by_signals(), _simulation(options):
             runner.run(ready, wait_for_robot=not options.attach)
-    except (TomlFileError, TokenFileError, TlsFileError, ListeningError, PortInUseError) as error:
+    except (TomlFileError, TokenFileError, TlsFileError, ListeningError, PortInUseError, RosArgumentsError) as error:
         raise UnusableError(str(error)) from error
     except (SimulationError, RobotNotFoundError) as error:
         raise RobotLostError(str(error)) from error
@@ -124,6 +138,21 @@ def _listening(options: Options) -> Listening:
     )
 
 
+def _deliver(options: Options) -> None:
+    """Run the delivery application until SIGINT or SIGTERM: it drives whatever robot takes NavigateToPose goals."""
+    ending = Ending()
+    try:
+        names = load_configuration(options.config)
+        with RosRuntime(options.domain_id, options.ros_arguments) as ros:
+            Delivery(ros.create_node("delivery"), names)
+            ros.start()
+            sys.stdout.write(f"ready delivery={names.topics.delivery} domain={options.domain_id}\n")
+            sys.stdout.flush()
+            ending.wait()
+    except (TomlFileError, RosArgumentsError) as error:
+        raise UnusableError(str(error)) from error
+
+
 class _Stopped(BaseException):
     """A signal came while no event loop was there to take it."""
 
@@ -148,4 +177,6 @@ def _simulation(options: Options) -> contextlib.AbstractContextManager[None]:
     seed = options.seed if options.realistic else None
     log = get_logging_directory() / f"robot-{os.getpid()}.log"
     click.echo(f"The simulated robot's log is {log}", err=True)
-    return SimulatedRobot(options.domain_id, options.time_scale, options.config, seed, log).running()
+    return SimulatedRobot(
+        options.domain_id, options.time_scale, options.config, seed, log, options.ros_arguments
+    ).running()

@@ -24,6 +24,7 @@ from typing import Final, Self
 import rclpy
 from rclpy.action import ActionClient, ActionServer
 from rclpy.context import Context
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, ShutdownException
 from rclpy.impl.implementation_singleton import rclpy_implementation as rclpy_c
 from rclpy.logging import get_logger
@@ -86,9 +87,15 @@ class RosRuntime:
         """Make a node that this runtime spins and destroys; ``apart``, in a thread of its own.
 
         What comes to a node apart, however much, does not wait in one queue with what the other nodes have to do.
+
+        Raises:
+            RosArgumentsError: A parameter among ROS's arguments is none that a node can have.
         """
-        # Its parameter services would stand among the robot's own services.
-        node = Node(name, context=self.context, start_parameter_services=False)
+        try:
+            # Its parameter services would stand among the robot's own services.
+            node = Node(name, context=self.context, start_parameter_services=False)
+        except ParameterException as error:
+            raise RosArgumentsError(f"a node does not take its parameter: {error}") from error
         self._nodes.append(node)
         if apart:
             self._executors.append(RosExecutor(context=self.context))

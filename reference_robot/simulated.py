@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, Final
 
@@ -23,11 +23,17 @@ class SimulationError(RuntimeError):
 class SimulatedRobot:
     """The simulation in a process of its own, with a watch on its end; like a real robot where a seed says which.
 
-    What it has to say of goals and missions goes to the file ``log``.
+    What it has to say of goals and missions goes to the file ``log``; ``ros_arguments`` are for its nodes.
     """
 
     def __init__(
-        self, domain_id: int, time_scale: float, config: Path | None, realistic_seed: int | None, log: Path
+        self,
+        domain_id: int,
+        time_scale: float,
+        config: Path | None,
+        realistic_seed: int | None,
+        log: Path,
+        ros_arguments: Sequence[str] = (),
     ) -> None:
         self._log = log
         self._command = [
@@ -38,6 +44,7 @@ class SimulatedRobot:
             f"--time-scale={time_scale}",
             *([f"--names={config}"] if config else []),
             *([] if realistic_seed is None else ["--realistic", f"--seed={realistic_seed}"]),
+            *ros_arguments,
         ]
         self._ending = threading.Event()
 

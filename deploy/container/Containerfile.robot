@@ -1,6 +1,8 @@
 # The reference robot with ROS 2 Jazzy from PyPI (x86-64): REST on 7003, SOAP on 5555. No compiler, no root.
 # From the repository's root: docker build -f deploy/container/Containerfile.robot -t roaas-robot:0.1.0 .
 # To run it: docker run --rm -p 127.0.0.1:7003:7003 -p 127.0.0.1:5555:5555 roaas-robot:0.1.0
+# In front of a robot on the network: docker run --rm --network host --ipc host -e ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET \
+#   -v $PWD/token:/token:ro roaas-robot:0.1.0 --attach --token-file /token, see docs/robots.md.
 # The full image has the compiler that the interface packages are built with.
 FROM python:3.11.14-bookworm AS build
 COPY . /src
@@ -8,6 +10,7 @@ RUN python -m venv /opt/roaas \
     && /opt/roaas/bin/python -m pip install --no-cache-dir --no-compile --constraint /src/constraints.txt '/src[robot,ros]' \
     && /opt/roaas/bin/python -m pip install --no-cache-dir --no-compile --no-deps \
        /src/reference_robot/interfaces/mybot_delivery_app /src/reference_robot/interfaces/nav2_msgs \
+       /src/reference_robot/interfaces/tf2_msgs \
     && /opt/roaas/bin/python -m pip uninstall --yes pip setuptools
 
 FROM python:3.11.14-slim-bookworm

@@ -6,7 +6,6 @@ the end of its standard input where that is a pipe: a robot does not outlive the
 
 import contextlib
 import os
-import signal
 import stat
 import sys
 import threading
@@ -16,21 +15,31 @@ from typing import Final
 import click
 
 from conformance.contract.toml_file import TomlFileError
+from reference_robot.ending import Ending
 from reference_robot.names import load_names
 from reference_robot.ros import RosRuntime
+from reference_robot.ros_arguments import RosCommand
 from reference_robot.simulation.realism import Realism
 from reference_robot.simulation.runner import Simulation
 
 _NICENESS: Final = 5  # the web layer answers first: a real robot's motors do not wait for this machine
 
 
-@click.command()
+@click.command(cls=RosCommand)
 @click.option("--domain-id", type=click.IntRange(0, 101), help="ROS domain; ROS_DOMAIN_ID by default.")
 @click.option("--time-scale", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True)
 @click.option("--names", "names_file", type=click.Path(path_type=Path), help="Names of topics and actions.")
 @click.option("--realistic", is_flag=True, help="With slipping wheels, noise, delays; --seed chooses which.")
 @click.option("--seed", type=int, default=0, show_default=True)
-def main(domain_id: int | None, time_scale: float, names_file: Path | None, *, realistic: bool, seed: int) -> None:
+def main(
+    domain_id: int | None,
+    time_scale: float,
+    names_file: Path | None,
+    *,
+    realistic: bool,
+    seed: int,
+    ros_arguments: tuple[str, ...],
+) -> None:
     """Run the simulated robot until it is told to stop."""
     # Seen on this machine only, unless the user wants it otherwise.
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
@@ -39,20 +48,14 @@ def main(domain_id: int | None, time_scale: float, names_file: Path | None, *, r
     except TomlFileError as error:
         raise click.UsageError(str(error)) from error
     os.nice(_NICENESS)
-    # A handler in Python runs when the main thread runs again, which an event that it waits for does not bring about;
-    # the octet that the interpreter writes for each signal, in whatever thread it arrives, does.
-    told, tell = os.pipe()
-    os.set_blocking(tell, False)
-    signal.set_wakeup_fd(tell)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda _number, _frame: None)
+    ending = Ending()
     if _stdin_is_pipe():
-        threading.Thread(target=_tell_end_of_stdin, args=(tell,), daemon=True).start()
-    with RosRuntime(domain_id) as ros:
+        threading.Thread(target=_await_end_of_stdin, args=(ending,), daemon=True).start()
+    with RosRuntime(domain_id, ros_arguments) as ros:
         Simulation(ros, names, time_scale, Realism(seed) if realistic else None)
         ros.start()
         click.echo("ready")
-        os.read(told, 1)
+        ending.wait()
 
 
 def _stdin_is_pipe() -> bool:
@@ -62,11 +65,11 @@ def _stdin_is_pipe() -> bool:
         return False
 
 
-def _tell_end_of_stdin(tell: int) -> None:
+def _await_end_of_stdin(ending: Ending) -> None:
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             pass
-    os.write(tell, b"\0")
+    ending.bring()
 
 
 if __name__ == "__main__":

@@ -1,15 +1,21 @@
 """The paper's delivery application: a request on a topic makes the robot drive a mission.
 
 A mission goes source → destination → depot, each leg a NavigateToPose goal. It waits while navigation
-has somebody else's goal. A leg that is refused fails its mission, and the next one begins; a leg that is
-cancelled or displaced from outside fails its mission and drops the queue, and so does cancelling somebody
-else's goal while missions wait: an operator who stops the robot wants it to stay stopped.
+has somebody else's goal. A leg that is refused or cannot be driven fails its mission, and the next one begins,
+and so does a leg whose navigation is gone; a leg that is cancelled or displaced from outside fails its mission
+and drops the queue, and so does cancelling somebody else's goal while missions wait: an operator who stops the
+robot wants it to stay stopped.
+
+It drives any robot with Nav2's action, for it asks for nothing else.
 """
 
 import itertools
 import json
 import math
 import time
+import uuid
+from collections import deque
+from functools import partial
 from operator import attrgetter
 from typing import Any, Final
 
@@ -18,11 +24,13 @@ from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header, String
+from unique_identifier_msgs.msg import UUID
 
 from conformance.contract.delivery import COFFEE, COURIER
 from reference_robot.deliveries import DeliveryRequest
+from reference_robot.goal_statuses import GoalStatuses
 from reference_robot.names import RosNames
 from reference_robot.simulation.messages import MISSION_REPORTS, stamped_pose
 from reference_robot.simulation.missions import Missions, MissionState
@@ -35,10 +43,8 @@ _RETRY_PERIOD_S: Final = 0.2  # after a refused leg, and while navigation's acti
 _REQUESTS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 _FIELDS_OF: Final = attrgetter(*DeliveryRequest._fields)
 
-# Latched as its publisher's, but deep enough that a goal's canceling is not overwritten by its end.
-_CURRENT_GOALS: Final = QoSProfile(
-    depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
+_CANCELED: Final = frozenset({GoalStatus.STATUS_CANCELING, GoalStatus.STATUS_CANCELED})
+_REMEMBERED: Final = 100  # legs, and goals of others that were cancelled
 
 
 class Delivery:
@@ -49,7 +55,10 @@ class Delivery:
         self._frames = names.frames
         self._missions = Missions()
         self._legs: list[tuple[float, float, float]] = []
-        self._navigation_is_busy = False
+        self._leg = ""  # the id of the goal that is being driven
+        self._own: deque[str] = deque(maxlen=_REMEMBERED)
+        self._seen_canceled: deque[str] = deque(maxlen=_REMEMBERED)
+        self._losses = 0
         self._reported_at = -math.inf
         self._report_is_due = False
         self._reports = node.create_publisher(String, names.topics.missions, MISSION_REPORTS)
@@ -57,7 +66,7 @@ class Delivery:
         self._begin_later = node.create_timer(_RETRY_PERIOD_S, self._begin)
         self._begin_later.cancel()
         self._navigate = ActionClient(node, NavigateToPose, names.actions.navigate_to_pose)
-        node.create_subscription(String, names.topics.current_goal, self._note_current_goal, _CURRENT_GOALS)
+        self._goals = GoalStatuses(node, names.actions.navigate_to_pose, self._note_goals)
         node.create_subscription(DeliveryRequestMsg, names.topics.delivery, self._take, _REQUESTS)
 
     def _take(self, message: DeliveryRequestMsg) -> None:
@@ -72,19 +81,32 @@ class Delivery:
             self._begin()
         self._changed()
 
-    def _note_current_goal(self, message: String) -> None:
-        self._navigation_is_busy = bool(message.data)
-        is_canceling = message.data and json.loads(message.data)["status"] == GoalStatus.STATUS_CANCELING
+    def _note_goals(self) -> None:
+        """Take up what the navigation tells of its goals, others' among them."""
+        canceled = [
+            goal.identity
+            for goal in self._goals.reported
+            if goal.status in _CANCELED and goal.identity not in self._own and goal.identity not in self._seen_canceled
+        ]
+        self._seen_canceled.extend(canceled)
         # A leg of ours that is cancelled drops the queue when it ends.
-        if is_canceling and self._missions.active is None:
+        if canceled and self._missions.active is None:
             self._missions.abandon()
             self._changed()
+        if self._goals.losses != self._losses:
+            self._losses = self._goals.losses
+            if self._leg and self._leg not in {goal.identity for goal in self._goals.active()}:
+                self._fail("the navigation went away")
         self._begin()
+
+    def _is_busy(self) -> bool:
+        """Tell whether navigation has somebody else's goal."""
+        return any(goal.identity not in self._own for goal in self._goals.active())
 
     def _begin(self) -> None:
         """Begin the next mission, if there is one and navigation is free for it."""
         self._begin_later.cancel()
-        if self._navigation_is_busy:
+        if self._is_busy():
             return
         if not self._navigate.server_is_ready():
             self._begin_later.reset()
@@ -108,24 +130,41 @@ class Delivery:
             return
         header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frames.map)
         goal = NavigateToPose.Goal(pose=stamped_pose(self._legs.pop(0), header))
-        self._navigate.send_goal_async(goal).add_done_callback(self._leg_answered)
+        identity = uuid.uuid4()
+        self._leg = identity.hex
+        self._own.append(self._leg)
+        asked = self._navigate.send_goal_async(goal, goal_uuid=UUID(uuid=list(identity.bytes)))
+        asked.add_done_callback(partial(self._leg_answered, self._leg))
 
-    def _leg_answered(self, answer: Any) -> None:
+    def _leg_answered(self, leg: str, answer: Any) -> None:
         handle = answer.result()
+        if leg != self._leg:
+            return  # its navigation was given up
         if handle.accepted:
-            handle.get_result_async().add_done_callback(self._leg_ended)
+            handle.get_result_async().add_done_callback(partial(self._leg_ended, leg))
         else:
-            # An impossible mission is planned in vain; a queue of them is not to keep the planner busy.
-            self._missions.finish(MissionState.FAILED, "the navigation refused a leg")
-            self._changed()
-            self._begin_later.reset()
+            self._fail("the navigation refused a leg")
 
-    def _leg_ended(self, answer: Any) -> None:
-        if answer.result().status == GoalStatus.STATUS_SUCCEEDED:
-            self._next_leg()
+    def _leg_ended(self, leg: str, answer: Any) -> None:
+        if leg != self._leg:
             return
-        self._missions.abandon()
+        self._leg = ""
+        outcome = answer.result()
+        if outcome.status == GoalStatus.STATUS_SUCCEEDED:
+            self._next_leg()
+        elif outcome.result.error_code:  # as Nav2 has it; a goal that was displaced has none
+            self._fail(f"the navigation gave a leg up: {outcome.result.error_msg or outcome.result.error_code}")
+        else:
+            self._missions.abandon()
+            self._changed()
+
+    def _fail(self, reason: str) -> None:
+        """Give the mission up, and begin the next one soon."""
+        self._leg = ""
+        self._missions.finish(MissionState.FAILED, reason)
         self._changed()
+        # An impossible mission is planned in vain; a queue of them is not to keep the planner busy.
+        self._begin_later.reset()
 
     def _changed(self) -> None:
         """Report what changed: at once, or when the last report is old enough."""

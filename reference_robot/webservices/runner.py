@@ -6,7 +6,7 @@ import os
 import resource
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import uvloop
@@ -30,12 +30,19 @@ class RobotNotFoundError(RuntimeError):
 
 
 class RobotWebServiceNodesRunner:
-    """Runs the web services of one robot."""
+    """Runs the web services of one robot; ``ros_arguments`` are for its nodes."""
 
-    def __init__(self, configuration: Configuration, listening: Listening, domain_id: int | None) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        listening: Listening,
+        domain_id: int | None,
+        ros_arguments: Sequence[str] = (),
+    ) -> None:
         self._configuration = configuration
         self._listening = listening
         self._domain_id = domain_id
+        self._ros_arguments = ros_arguments
 
     def run(self, ready: Callable[[Endpoints], None], *, wait_for_robot: bool) -> None:
         """Serve until SIGINT or SIGTERM; ``ready`` is called once, when both interfaces answer.
@@ -54,7 +61,7 @@ class RobotWebServiceNodesRunner:
         with (
             bound(host, listening.rest_port) as rest,
             bound(host, listening.soap_port) as soap,
-            RosRuntime(self._domain_id) as ros,
+            RosRuntime(self._domain_id, self._ros_arguments) as ros,
         ):
             endpoints = Endpoints(listening.scheme, host, rest.getsockname()[1], soap.getsockname()[1])
             publishers, subscribers = RobotPublishersNode(ros, configuration), RobotSubscribersNode(ros, configuration)

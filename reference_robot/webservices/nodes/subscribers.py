@@ -43,6 +43,7 @@ class RobotSubscribersNode:
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self.node = ros.create_node("robot_subscribers")
         self._ros = ros
+        self._namespace = self.node.get_namespace().rstrip("/") + "/"  # several robots may be on one graph
         self.odometry: tuple[Odometry | None, float] = (None, 0.0)
         self.mission_reports: deque[str] = deque(maxlen=_MISSION_REPORTS)
         self.current_goal: str | None = None
@@ -77,19 +78,22 @@ class RobotSubscribersNode:
     # The graph
 
     def sensors(self) -> list[dict[str, str]]:
-        """Return name, topic and type of every topic of sensor data that somebody publishes."""
+        """Return name, topic and type of each topic of sensor data in the robot's namespace that has a publisher."""
         return [
             {"name": topic.removeprefix("/"), "topic": topic, "type": types[0]}
             for topic, types in sorted(self.node.get_topic_names_and_types())
-            if types[0].startswith("sensor_msgs/msg/") and self.node.count_publishers(topic)
+            if topic.startswith(self._namespace)
+            and types[0].startswith("sensor_msgs/msg/")
+            and self.node.count_publishers(topic)
         ]
 
     def navigation_services(self) -> list[dict[str, str]]:
-        """Return name and type of every service of the navigation stack; those inside actions are not among them."""
+        """Return name and type of every service of the robot's navigation; those inside actions are not among them."""
         return [
             {"name": name, "type": types[0]}
             for name, types in sorted(self.node.get_service_names_and_types())
-            if types[0].partition("/")[0] in _NAVIGATION_PACKAGES
+            if name.startswith(self._namespace)
+            and types[0].partition("/")[0] in _NAVIGATION_PACKAGES
             and "/_" not in name
             and self.node.count_services(name)  # a name that only a client waits for is no service
         ]

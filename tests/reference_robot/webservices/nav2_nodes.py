@@ -4,9 +4,10 @@ Run as ``python nav2_nodes.py DOMAIN base|navigator|client [OPTION] [--ros-args 
 what it sees, one JSON object a line, and takes commands on its stdin.
 
 base: tells ``velocity``; ``{"odometry": X}`` publishes odometry at x = X, null stops it. OPTION is what it takes: Twist
-or TwistStamped.
+or TwistStamped. ``{"clock": S}`` publishes /clock with S seconds.
 navigator: tells ``goal`` and ``cancel``; ``{"state": "inactive"}`` refuses goals, as a bt_navigator does that is not
-active; ``{"answers": false}`` lets goals wait for their answer.
+active; ``{"answers": false}`` lets goals wait for their answer;
+``{"finish": true}`` ends its goal with success.
 client: ``{"goal": X}`` sends a goal to x = X, as RViz does; tells ``accepted`` with its id, ``ended`` with its status.
 """
 
@@ -17,6 +18,7 @@ from typing import Any
 
 import rclpy
 from action_msgs.msg import GoalStatus
+from builtin_interfaces.msg import Time
 from foreign_robot import tell
 from geometry_msgs.msg import Twist, TwistStamped
 from lifecycle_msgs.msg import State
@@ -28,6 +30,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
 
 STATES = {"inactive": State.PRIMARY_STATE_INACTIVE, "active": State.PRIMARY_STATE_ACTIVE}
 
@@ -36,12 +39,16 @@ class Base(Node):
     def __init__(self, context: Context, velocity: str) -> None:
         super().__init__("base", context=context)
         self._x: float | None = 0.0
+        self._clock_now: int | None = None
+        self._clocks = self.create_publisher(Clock, "/clock", 10)
         self._odometry = self.create_publisher(Odometry, "odom", 10)
         self.create_timer(0.02, self._publish)
         kind = {"Twist": Twist, "TwistStamped": TwistStamped}[velocity]
         self.create_subscription(kind, "cmd_vel", self._velocity, 10)
 
     def _publish(self) -> None:
+        if self._clock_now is not None:
+            self._clocks.publish(Clock(clock=Time(sec=self._clock_now)))
         if self._x is not None:
             message = Odometry(child_frame_id="base_link")
             message.header.frame_id = "odom"
@@ -52,10 +59,13 @@ class Base(Node):
     def _velocity(self, message: Any) -> None:
         stamped = isinstance(message, TwistStamped)
         twist = message.twist if stamped else message
-        tell(velocity={"x": twist.linear.x, "frame": message.header.frame_id if stamped else None})
+        header = {"frame": message.header.frame_id, "sec": message.header.stamp.sec} if stamped else {}
+        tell(velocity={"x": twist.linear.x} | header)
 
     def obey(self, command: dict[str, Any]) -> None:
-        self._x = command["odometry"]
+        if "odometry" in command:
+            self._x = command["odometry"]
+        self._clock_now = command.get("clock", self._clock_now)
 
 
 class Navigator(Node):
@@ -64,6 +74,7 @@ class Navigator(Node):
         self._state = "active"
         self._answers = threading.Event()
         self._answers.set()
+        self._finished = threading.Event()
         group = ReentrantCallbackGroup()
         self.create_service(GetState, "bt_navigator/get_state", self._get_state, callback_group=group)
         self._server = ActionServer(
@@ -81,6 +92,7 @@ class Navigator(Node):
         return response
 
     def _goal(self, goal: NavigateToPose.Goal) -> GoalResponse:
+        self._finished.clear()
         tell(goal=goal.pose.pose.position.x)
         self._answers.wait()
         return GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT
@@ -90,9 +102,10 @@ class Navigator(Node):
         return CancelResponse.ACCEPT
 
     def _drive(self, handle: Any) -> NavigateToPose.Result:
-        waiting = threading.Event()
         while handle.status != GoalStatus.STATUS_CANCELING and self.context.ok():
-            waiting.wait(0.01)
+            if self._finished.wait(0.01):
+                handle.succeed()
+                return NavigateToPose.Result()
         if self.context.ok():
             handle.canceled()
         return NavigateToPose.Result()
@@ -103,6 +116,8 @@ class Navigator(Node):
             self._answers.set()
         else:
             self._answers.clear()
+        if "finish" in command:
+            self._finished.set()
 
 
 class Client(Node):

@@ -1,14 +1,18 @@
 """In front of a robot that is not ours: Nav2's nodes in processes of their own, which others use as well."""
 
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from web_messages import goal, query_envelope, twist
-from web_robot import RosProcess, Served, eventually, running_robot
+from web_messages import delivery_path, goal, query_envelope, twist
+from web_robot import RosProcess, Served, eventually, ros_environment, running_robot
 
+from conformance.contract.delivery import EXAMPLE
 from reference_robot import ros
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
@@ -54,6 +58,19 @@ def attached(nav2: Nav2, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
         yield served
 
 
+@contextmanager
+def delivery_application(domain: str) -> Iterator[None]:
+    command = [sys.executable, "-m", "reference_robot", "--delivery-only", f"--domain-id={domain}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=ros_environment()) as application:
+        try:
+            assert application.stdout.readline() == f"ready delivery=/DeliveryRequestMsg/from_json domain={domain}\n"
+            yield
+        finally:
+            application.terminate()
+            ended = application.wait(20)
+    assert ended == 0
+
+
 def test_odometry_older_than_a_second_is_none(attached, nav2):
     assert attached.call("GET", POSE).status_code == 200
     nav2.base.do(odometry=None)
@@ -93,7 +110,8 @@ def test_a_velocity_that_is_not_renewed_ends_with_zero(attached, nav2):
     began = time.monotonic()
     while time.monotonic() - began < 2 * HOLD:
         assert attached.call("PUT", VELOCITY, json=twist(x=0.2)).status_code == 200
-        assert nav2.base.next("velocity") == {"x": 0.2, "frame": "base_link"}
+        velocity = nav2.base.next("velocity")
+        assert (velocity["x"], velocity["frame"]) == (0.2, "base_link")
         time.sleep(HOLD / 4)
     renewed = time.monotonic()
     assert nav2.base.next("velocity")["x"] == 0.0
@@ -184,6 +202,46 @@ def test_goals_end_with_their_server_and_the_next_one_is_found(attached, nav2, s
     assert attached.call("GET", GOAL).json()["goal_id"]["id"] == "again"
     assert attached.call("DELETE", GOAL).status_code == 204
     assert nav2.navigator.next("cancel") == 6.0
+
+
+def test_a_foreign_robot_delivers(attached, nav2):
+    nav2.navigator.forget()
+    with delivery_application(nav2.domain):
+        eventually(lambda: attached.call("PUT", delivery_path()).status_code == 204)
+        for x in (EXAMPLE["source_x"], EXAMPLE["destination_x"], EXAMPLE["depot_x"]):
+            assert nav2.navigator.next("goal") == x
+            eventually(lambda: attached.call("GET", GOAL).is_success)
+            nav2.navigator.do(finish=True)
+        eventually(lambda: attached.call("GET", "/robot/app/delivery/").json()[0]["state"] == "done")
+        # A mission that is called off drops those that wait; somebody else's goal lets them wait.
+        for _ in range(2):
+            assert attached.call("PUT", delivery_path()).status_code == 204
+        nav2.navigator.forget_until("goal")
+        eventually(lambda: attached.call("GET", GOAL).is_success)
+        assert attached.call("DELETE", GOAL).status_code == 204
+        nav2.navigator.forget_until("cancel")
+        eventually(
+            lambda: (
+                [entry["state"] for entry in attached.call("GET", "/robot/app/delivery/").json()[:2]]
+                == ["dropped", "failed"]
+            )
+        )
+        assert attached.call("PUT", GOAL, json=goal("ours", x=1.0)).status_code == 201
+        assert nav2.navigator.next("goal") == 1.0
+        assert attached.call("PUT", delivery_path()).status_code == 204
+        assert nav2.navigator.heard_nothing()
+        nav2.navigator.do(finish=True)
+        assert nav2.navigator.next("goal") == EXAMPLE["source_x"]
+        # A navigation that dies ends its mission, and the next one finds another navigation.
+        nav2.navigator.kill()
+        nav2.navigator = nav2.navigation()
+        eventually(lambda: attached.call("GET", "/robot/app/delivery/").json()[0]["state"] == "failed")
+        assert "went away" in attached.call("GET", "/robot/app/delivery/").json()[0]["reason"]
+        assert attached.call("PUT", delivery_path()).status_code == 204
+        assert nav2.navigator.next("goal") == EXAMPLE["source_x"]
+        eventually(lambda: attached.call("GET", GOAL).is_success)
+    assert attached.call("DELETE", GOAL).status_code == 204
+    nav2.navigator.forget_until("cancel")
 
 
 def test_the_robot_is_stopped_before_the_web_services_end(attached, nav2):

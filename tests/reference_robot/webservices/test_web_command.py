@@ -119,6 +119,11 @@ def test_a_token_file_that_cannot_be_used_is_named(tmp_path, text):
     assert "words" not in said  # it may be a secret
 
 
+@pytest.mark.parametrize("arguments", [["-r", "nonsense"], ["--bogus"], ["--enclave", "no path"]])
+def test_arguments_that_ros_does_not_take_are_named(arguments):
+    assert arguments[-1] in failed("--attach", "--ros-args", *arguments)
+
+
 @pytest.mark.parametrize("option", ["--rest-port=70000", "--domain-id=102", "--time-scale=0", "--config=/nowhere"])
 def test_options_out_of_range_are_refused(option):
     assert option.split("=", maxsplit=1)[0] in failed(option)
