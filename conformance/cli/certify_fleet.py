@@ -14,7 +14,7 @@ from click.core import ParameterSource
 
 from conformance.cli.summary import inert
 from conformance.contract.command import CommandResult
-from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet
+from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, refuse_same_identity
 from conformance.fleet.member_run import Outcome
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
     shared = _shared()
     try:
         members = load_fleet(path)
+        if options["key"]:
+            refuse_same_identity(path, members)
     except FleetError as error:
         raise click.UsageError(str(error)) from error
     limit_s = TIME_LIMIT_S + (options["minutes"] * 60 if options["effort"] == "deep" else 0)

@@ -28,6 +28,7 @@ class Member(msgspec.Struct, frozen=True):
         name: unique in the fleet, and its folder's name.
         statement: file of its implementation conformance statement, or None where the fleet's file has the addresses.
         endpoints: where its interfaces are.
+        identity: name and vendor, as its certificate will have them.
         baseline: file of its accepted failures, or None.
         movable: whether it may be moved, where the command allows motion at all.
         time_limit_s: after which it is given up, s; None where nothing is said.
@@ -36,6 +37,7 @@ class Member(msgspec.Struct, frozen=True):
     name: str
     statement: Path | None
     endpoints: Endpoints
+    identity: tuple[str, str]
     baseline: Path | None
     movable: bool
     time_limit_s: float | None
@@ -83,9 +85,12 @@ def _member(path: Path, number: int, robot: _Robot, file: _File) -> Member:
         raise FleetError(
             f"{where}: name = {name!r} must be 1 to 64 letters, digits, hyphens and underscores: a folder is named so"
         )
+    identity = (name, "")
     if statement is not None:
         try:
-            endpoints = load_statement(statement).endpoints
+            declared = load_statement(statement)
+            endpoints = declared.endpoints
+            identity = (declared.robot.get("name", ""), declared.robot.get("vendor", ""))
         except StatementError as error:
             raise FleetError(f"{where}: {error}") from error
     else:
@@ -96,6 +101,7 @@ def _member(path: Path, number: int, robot: _Robot, file: _File) -> Member:
         name=name,
         statement=statement,
         endpoints=endpoints,
+        identity=identity,
         baseline=path.parent / robot.baseline if robot.baseline is not None else None,
         movable=robot.allow_motion,
         time_limit_s=robot.time_limit_s if robot.time_limit_s is not None else file.time_limit_s,
@@ -113,6 +119,22 @@ def _refuse_common(path: Path, members: tuple[Member, ...]) -> None:
         for value, numbers in found.items():
             if len(numbers) > 1:
                 raise FleetError(f"{path}: [[robot]] number {numbers[0]} and number {numbers[1]} {what} {value!r}")
+
+
+def refuse_same_identity(path: Path, members: tuple[Member, ...]) -> None:
+    """Certificates tell robots apart by name and vendor: with two of one name, the later would supersede the other's.
+
+    Raises:
+        FleetError: two robots have the same.
+    """
+    seen: dict[tuple[str, str], int] = {}
+    for number, member in enumerate(members, 1):
+        first = seen.setdefault(member.identity, number)
+        if first != number:
+            raise FleetError(
+                f"{path}: [[robot]] number {first} and number {number} would be signed as the same robot, "
+                f"{member.identity[0]!r} of {member.identity[1]!r}: give each statement a [robot] name of its own"
+            )
 
 
 def _addresses(where: Endpoints) -> set[str]:

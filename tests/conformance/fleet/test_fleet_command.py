@@ -125,7 +125,7 @@ def test_wrong_usage_is_told_by_name(tmp_path, arguments, named):
 
 
 def result(outcome: Outcome, code: int | None = 0, **document: object) -> MemberResult:
-    return MemberResult(Member("x", None, None, None, True, None), outcome, code, document=document or None)
+    return MemberResult(Member("x", None, None, ("x", ""), None, True, None), outcome, code, document=document or None)
 
 
 @pytest.mark.parametrize(
