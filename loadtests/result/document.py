@@ -15,7 +15,7 @@ from loadtests.measuring.pauses import PAUSE_S
 from loadtests.result.files import FORMAT
 from loadtests.schedule.arrivals import Schedule, arrivals_due
 from loadtests.schedule.plan import GAP_S, step_operation
-from loadtests.statistics import against, end_to_end, figures, over_time, steps, threshold, verdict
+from loadtests.statistics import against, end_to_end, figures, modes, over_time, steps, threshold, verdict
 from loadtests.statistics.headline import headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
@@ -69,10 +69,11 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "generator": generator,
         "workers": workers,
         "series": [
-            entry | {"after_pause": _after_pause(outcome, entry)}
+            entry | {"after_pause": _after_pause(outcome, entry), "modes": modes.of_series(measured, entry)}
             for entry in figures.series(measured, outcome.findings.sizes)
         ],
         "comparisons": comparisons,
+        "heat_map": modes.heat_map(measured),
         "noise_floor": noise_floor,
         "other_ways": other_ways(measured),
         **_end_to_end(outcome),

@@ -8,8 +8,9 @@ from reports.latency import against
 from reports.latency.distributions import Series
 from reports.latency.figures.spans import means
 from reports.latency.figures.timeline import Stall, stalls
-from reports.latency.numbers import interval, ms, rate, ratio
+from reports.latency.numbers import interval, ms, rate, ratio, share
 
+_MANY_FAR = 0.01
 PAPER = {"rest_ms": 1.5, "soap_ms": 2.5, "ratio": 1.67}
 """What the paper reports: mean response times on localhost, and their ratio. It gives no spread and no method."""
 
@@ -31,7 +32,7 @@ class Verdict:
 
 def verdict(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> Verdict:
     """The verdict on a result as a whole: valid or not first, thresholds next, then what was found."""
-    found = headline(result, series)
+    found = headline(result, series) + _modes_in_short(series)
     if not result["valid"]:
         return Verdict("bad", "✗", "Not valid: these figures say nothing about the robot", found)
     outcomes = [threshold["outcome"] for threshold in result.get("thresholds", [])]
@@ -83,6 +84,7 @@ def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         *_other_ways(result),
         *_followed(result),
         *_stalled(result),
+        *_two_modes(series),
         *_knees(result),
         *_searched(result),
         *_failed(result, series),
@@ -188,6 +190,31 @@ def _stalled(result: Mapping[str, Any]) -> list[str]:
         f"({operation}, {interface.upper()}, {client})."
     )
     return [sentence]
+
+
+def _modes_in_short(series: Mapping[tuple[str, str, str], Series]) -> str:
+    """What the verdict has to say where a median stands for two kinds of request."""
+    names = [one.name for one in series.values() if (one.data.get("modes") or {}).get("split_ms") is not None]
+    return f" {', '.join(dict.fromkeys(names))}: two modes, for which no one figure stands." if names else ""
+
+
+def _two_modes(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+    """A sentence for each series that has two modes, or a share of requests far beyond the median."""
+    told = []
+    for one in series.values():
+        found = one.data.get("modes")
+        if found is None:
+            continue
+        name = f"{one.name} ({one.data['client']} client)"
+        if found["split_ms"] is not None:
+            usual, other = found["medians_ms"]
+            told.append(
+                f"{name} has two modes: {share(found['share_above'])} of the requests take more than "
+                f"{ms(found['split_ms'])} ms, about {ms(other)} ms, and the others about {ms(usual)} ms."
+            )
+        elif found["far"] >= _MANY_FAR:
+            told.append(f"{share(found['far'])} of the requests of {name} take over five times the median.")
+    return told
 
 
 def _knees(result: Mapping[str, Any]) -> list[str]:

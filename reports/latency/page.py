@@ -7,9 +7,9 @@ from typing import Any
 from reports.latency import against
 from reports.latency.distributions import Series, all_series
 from reports.latency.figures.canvas import COLOUR, INK, Picture
+from reports.latency.figures.heat import blocks, heat
 from reports.latency.figures.load import load
 from reports.latency.figures.ratios import Ratio, ratios
-from reports.latency.figures.shape import density, difference
 from reports.latency.figures.spans import SPANS, means, spans
 from reports.latency.figures.spectrum import spectrum
 from reports.latency.figures.timeline import timeline
@@ -76,7 +76,7 @@ def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         "rate": rate,
         "share": share,
         "interval": interval,
-        "none": NONE,
+        "dash": NONE,
         "tag": against.tag,
     }
 
@@ -106,8 +106,8 @@ def _pictures(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], S
         "against": against.picture(result),
         "ratios": _ratio_picture(result),
         "spectrum": spectrum(series),
-        "density": density(series),
-        "difference": difference(series, result["comparisons"]),
+        "heat": heat(result),
+        "blocks": blocks(result),
         "spans": spans(series),
         "timeline": timeline(result),
         "load": load(result),

@@ -1,0 +1,148 @@
+"""Does a series have two modes? Quantiles and an interval do not show it: half the requests may take ten times as long.
+
+Hartigan's dip (The dip test of unimodality, Annals of Statistics 13, 1985; by the `diptest` package) on the logarithm
+of the service times, which are read off the histogram at evenly spaced quantiles. The test finds bumps of no account in
+thousands of samples: two modes are told where there is a valley between them as well, with enough on both sides of it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import diptest
+import numpy as np
+
+from loadtests.statistics.figures import named, rounded
+from loadtests.statistics.histogram import Histogram, edges_us, quantiles_us
+
+if TYPE_CHECKING:
+    from loadtests.schedule.plan import SeriesName
+    from loadtests.statistics.histogram import Floats
+    from loadtests.statistics.measured import Measured
+
+_FEWEST, _POINTS = 100, 2000
+_CHANCE = 0.01
+_BINS = 60
+_VALLEY = 0.6  # of the lower peak, at most
+_LEAST_SHARE = 0.02
+_LEAST_RATIO = 1.5  # of the two sides' medians
+_FAR = 5.0  # medians
+_COLUMNS, _ROWS = 40, 24  # of the heat map: as many as a page can draw without a picture in it
+
+
+def modes(histogram: Histogram) -> dict[str, Any] | None:
+    """The `modes` of a series of latency.json; None where there are too few samples to speak of."""
+    if histogram.total < _FEWEST:
+        return None
+    times = _quantiles_ms(histogram, min(_POINTS, histogram.total))
+    dip, chance = (float(value) for value in diptest.diptest(np.log(times)))
+    median = float(np.median(times))
+    split = _valley_ms(times) if chance < _CHANCE else None
+    above = None if split is None else float((times > split).mean())
+    return {
+        "far": rounded(_share_above(histogram, _FAR * median)),
+        "dip": rounded(dip),
+        "chance": rounded(chance),
+        "split_ms": rounded(split),
+        "share_above": rounded(above),
+        "medians_ms": None
+        if split is None
+        else [rounded(float(np.median(side))) for side in (times[times <= split], times[times > split])],
+    }
+
+
+def of_series(measured: Measured, entry: dict[str, Any]) -> dict[str, Any] | None:
+    """The `modes` of an entry of `series`."""
+    return modes(measured.total("duel", (entry["operation"], entry["interface"], entry["client"])).service)
+
+
+def _quantiles_ms(histogram: Histogram, points: int) -> Floats:
+    bins, counts = histogram.arrays()
+    rows = counts[None, :].astype(np.float64)
+    at = (np.arange(points) + 0.5) / points
+    found = np.array([float(quantiles_us(bins, rows, float(share))[0]) for share in at]) / 1e3
+    return np.maximum(found, 1e-6)
+
+
+def _share_above(histogram: Histogram, limit_ms: float) -> float:
+    bins, counts = histogram.arrays()
+    return float(counts[edges_us(bins)[0] > limit_ms * 1e3].sum()) / histogram.total
+
+
+def _valley_ms(times: Floats) -> float | None:
+    """Where two modes part, if they do."""
+    logs = np.log(times)
+    counts, edges = np.histogram(logs, _BINS)
+    smooth = counts.astype(np.float64)
+    for _ in range(2):
+        smooth = np.convolve(smooth, [0.25, 0.5, 0.25], mode="same")
+    highest = int(smooth.argmax())
+    best: tuple[float, float] | None = None
+    for peak in range(_BINS):
+        low, high = sorted((highest, peak))
+        if high - low < 2:  # noqa: PLR2004 -- no valley between neighbours
+            continue
+        valley = low + int(smooth[low : high + 1].argmin())
+        split = float(np.exp((edges[valley] + edges[valley + 1]) / 2))
+        if smooth[valley] > _VALLEY * smooth[peak] or not _two_sides(times, split):
+            continue
+        if best is None or smooth[peak] > best[0]:
+            best = float(smooth[peak]), split
+    return None if best is None else best[1]
+
+
+def _two_sides(times: Floats, split: float) -> bool:
+    below, above = times[times <= split], times[times > split]
+    enough = min(len(below), len(above)) >= _LEAST_SHARE * len(times)
+    return enough and float(np.median(above) / np.median(below)) >= _LEAST_RATIO
+
+
+def heat_map(measured: Measured) -> dict[str, Any]:
+    """The `heat_map` of latency.json: how many requests took how long, when; rows of time, columns of latency."""
+    plan = measured.plan
+    last = measured.plans[-1]
+    width_s = max(1.0, (last.offset_s + last.length_s) / _COLUMNS)
+    series = []
+    lowest, highest = float("inf"), 0.0
+    for name in plan.series_names():
+        columns: dict[int, Histogram] = {}
+        for start_s, histogram in _block_times(measured, name):
+            columns.setdefault(int(start_s / width_s + 1e-9), Histogram()).merge(histogram)
+        held = [histogram for histogram in columns.values() if histogram.total]
+        lowest = min([lowest, *(histogram.lowest_ns / 1e6 for histogram in held)])
+        highest = max([highest, *(histogram.highest_ns / 1e6 for histogram in held)])
+        series.append((name, columns))
+    if highest <= 0:
+        return {"width_s": rounded(width_s), "edges_ms": [], "series": []}
+    edges = np.geomspace(max(lowest, 1e-3) * 0.999, highest * 1.01, _ROWS + 1)
+    return {
+        "width_s": rounded(width_s),
+        "edges_ms": [rounded(edge) for edge in edges.tolist()],
+        "series": [
+            named(name)
+            | {
+                "columns": [
+                    {"t_s": rounded(number * width_s), "counts": _binned(histogram, edges)}
+                    for number, histogram in sorted(columns.items())
+                ]
+            }
+            for name, columns in series
+        ],
+    }
+
+
+def _binned(histogram: Histogram, edges: Floats) -> list[int]:
+    bins, counts = histogram.arrays()
+    lower, width = edges_us(bins)
+    found, _ = np.histogram((lower + width / 2) / 1e3, edges, weights=counts)
+    return [int(count) for count in found]
+
+
+def _block_times(measured: Measured, name: SeriesName) -> list[tuple[float, Histogram]]:
+    """Each block of a series in the duel: its start in seconds, and its service times."""
+    offsets = {plan.repeat: plan.offset_s for plan in measured.plans}
+    return [
+        (offsets[place[0]] + segment.start_ns / 1e9, cell.service)
+        for place, segment, cell in measured.blocks("duel", name)
+        if cell.service.total
+    ]
