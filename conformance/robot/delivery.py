@@ -10,8 +10,12 @@ from typing import Any, Final, NamedTuple
 from hypothesis import strategies as st
 
 from conformance.contract.delivery import COFFEE, COURIER, PATH_NAMES
+from conformance.rest.interface import RestInterface
+from conformance.rest.validity import require_valid
 from conformance.robot.robot import DELIVERIES
 from conformance.soap.forms import EXTREMES
+from conformance.transport.client import Headers
+from conformance.transport.exchange import Exchange
 
 # Both ends of a double, of its subnormals and of what an integer holds exactly; the paper's own example.
 _KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-308)
@@ -50,6 +54,17 @@ def path_of(code: str, *coordinates: str) -> str:
     """The target of a delivery PUT with values as they are written: code, depot, destination, source."""
     pairs = "".join(f"/{name}/{value}" for name, value in zip(PATH_NAMES, coordinates, strict=True))
     return f"{DELIVERIES}{code}{pairs}"
+
+
+def put_delivery(api: RestInterface, path: str, *, fresh: bool = False, headers: Headers = ()) -> Exchange:
+    """PUT a delivery that has to be taken.
+
+    Raises:
+        HarnessError: it is not valid by the contract.
+        NoAnswerError: no HTTP response came.
+    """
+    require_valid(api.run.contract, "PUT", path)
+    return api.client.send("PUT", path, headers=headers, fresh=fresh)
 
 
 def written(value: float) -> tuple[str, ...]:

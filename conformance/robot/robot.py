@@ -11,7 +11,9 @@ from typing import Any, Final, NamedTuple
 from conformance.contract.limits import Limits
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import projected
+from conformance.rest.calls import JSON
 from conformance.rest.interface import RestInterface
+from conformance.rest.validity import require_valid
 from conformance.robot.geometry import Pose, pose_of
 from conformance.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
 from conformance.transport.exchange import Exchange
@@ -111,6 +113,7 @@ class Robot:
 
     def __init__(self, api: RestInterface) -> None:
         self.rest = api.client
+        self._contract = api.run.contract
         self.judge = api.run.judge
         self.statement = api.run.statement
         self.limits = api.run.statement.limits
@@ -137,7 +140,13 @@ class Robot:
         return Patience(self.rest.connection.pace, seconds)
 
     def get(self, path: str) -> Exchange:
-        """GET as JSON."""
+        """GET as JSON.
+
+        Raises:
+            HarnessError: the parameters are not valid by the contract.
+        """
+        if "?" in path:
+            require_valid(self._contract, "GET", path)
         return self.rest.send("GET", path, headers=ACCEPT_JSON)
 
     def read(self, path: str, shape: Shape) -> tuple[Any, Exchange]:
@@ -147,8 +156,14 @@ class Robot:
         return (None if problem else projected(value, shape.schema)), exchange
 
     def put(self, path: str, value: Mapping[str, Any]) -> Exchange:
-        """PUT as JSON."""
-        return self.rest.send("PUT", path, headers=JSON_BODY, body=body_of(value))
+        """PUT as JSON: what the contract's schema lets be put, whatever the robot then makes of the values.
+
+        Raises:
+            HarnessError: it does not.
+        """
+        body = body_of(value)
+        require_valid(self._contract, "PUT", path, JSON, body)
+        return self.rest.send("PUT", path, headers=JSON_BODY, body=body)
 
     def odometry(self) -> Odometry | None:
         """The odometry, or None where it cannot be read (which the observers have judged)."""

@@ -19,6 +19,7 @@ from conformance.soap.calls import call, read_exchange
 from conformance.soap.content import number_at
 from conformance.soap.envelope import envelope
 from conformance.soap.service import MEDIA_TYPE, SoapService
+from conformance.soap.valid_messages import call_valid, require_valid_message
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import Outgoing
 
@@ -39,7 +40,7 @@ def send_delivery(publishers: SoapService, values: Delivery, *, coffee: bool = F
     """
     operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
     given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
-    return call(publishers, request(operation, **given), fresh=True).exchange
+    return call(publishers, require_valid_message(publishers, request(operation, **given)), fresh=True).exchange
 
 
 def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Outgoing:
@@ -52,12 +53,14 @@ def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool
 def outgoing(service: SoapService, payload: Node) -> Outgoing:
     """A call that is to be sent beside others."""
     headers = (("Content-Type", MEDIA_TYPE), ("SOAPAction", '""'))
-    return Outgoing(service.client, "POST", service.path, headers, envelope((payload,)).written())
+    return Outgoing(
+        service.client, "POST", service.path, headers, envelope((require_valid_message(service, payload),)).written()
+    )
 
 
 def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> Exchange:
     """Ask the subscribers service."""
-    return call(subscribers, request(operation, **parameters)).exchange
+    return call_valid(subscribers, request(operation, **parameters)).exchange
 
 
 def declared_return(service: SoapService, operation: str) -> Element:

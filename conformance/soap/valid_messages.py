@@ -13,13 +13,36 @@ from conformance.documents.xml_names import XSD, XSI, clark, namespace
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS, bounds
 from conformance.documents.xsd_shapes import Element
-from conformance.soap.calls import call
+from conformance.soap.calls import SoapResponse, call
 from conformance.soap.messages import ordinary, simple_leaves, with_text
 from conformance.soap.service import SoapService
 from conformance.verdict.evidence import HarnessError
 
 # Whole numbers tried where a contract takes only some, such as codes.
 _NUMBERS: Final = (0, 1, 2, 3, 4, 5)
+
+
+def require_valid_message(service: SoapService, message: Node) -> Node:
+    """See that a message which is to be sent as a valid one is valid by the contract, and give it back.
+
+    Raises:
+        HarnessError: it is not; the message says why.
+        DescriptionError: the contract cannot be used.
+    """
+    fault = service.contract.types.invalid(parse(message.written()))
+    if fault:
+        raise HarnessError(f"{message.name} was made as a valid message, and is none: {fault}")
+    return message
+
+
+def call_valid(service: SoapService, payload: Node, *, headers: tuple[Node, ...] | None = None) -> SoapResponse:
+    """Call a service by a message that is valid by the contract.
+
+    Raises:
+        HarnessError: it is not.
+        NoAnswerError: no HTTP response came.
+    """
+    return call(service, require_valid_message(service, payload), headers=headers)
 
 
 def example(service: SoapService, operation: Operation) -> Node | None:

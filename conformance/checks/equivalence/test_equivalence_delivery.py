@@ -5,9 +5,10 @@ from hypothesis import strategies as st
 
 from conformance.contract.delivery import COFFEE, COURIER
 from conformance.rest.interface import RestInterface
+from conformance.rest.validity import require_valid
 from conformance.robot.batch import Batch, Order
 from conformance.robot.deliveries_seen import NoObserverError, observer_of
-from conformance.robot.delivery import Delivery, lexical_deliveries
+from conformance.robot.delivery import Delivery, lexical_deliveries, path_of
 from conformance.robot.probe.client import ProbeError, RosProbe
 from conformance.soap.service import SoapService
 from conformance.verdict.evidence import Judge
@@ -52,10 +53,12 @@ def test_deliveries_arrive(
 
         def try_batch(orders: list[Order]) -> None:
             # A failure is not made smaller: each message has a case of its own already. A few tell the kinds apart.
+            for order in orders:
+                require_valid(api.run.contract, "PUT", path_of(*order.written))
             if len(failed) < _ENOUGH and not batch.run(orders):
                 failed.append(orders)
 
-        batch.run([_order(how, Delivery(*values)) for how, values in _CORNERS])
+        try_batch([_order(how, Delivery(*values)) for how, values in _CORNERS])
         explore(_batches(), try_batch, cases=12)
         for turn in range(api.run.effort.cases(8)):
             if len(failed) < _ENOUGH and not batch.run_together(_crowd(turn)):

@@ -10,7 +10,7 @@ import pytest
 from conformance.contract.delivery import COURIER
 from conformance.rest.interface import RestInterface
 from conformance.robot.deliveries_seen import NoObserverError, observer_of
-from conformance.robot.delivery import Delivery
+from conformance.robot.delivery import Delivery, put_delivery
 from conformance.robot.probe.client import ProbeError, RosProbe
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
@@ -23,7 +23,7 @@ _APART = Delivery(COURIER, 80.5, 81.5, 82.5, 83.5, 84.5, 85.5)
 def _put(api: RestInterface, delivery: Delivery, keys: Sequence[str]) -> list[Exchange]:
     """Send a delivery by each of the keys, each on a connection of its own so that nothing is sent again."""
     fields = [(("Idempotency-Key", f'"{key}"'),) for key in keys]
-    return [api.client.send("PUT", delivery.rest_path, headers=field, fresh=True) for field in fields]
+    return [put_delivery(api, delivery.rest_path, headers=field, fresh=True) for field in fields]
 
 
 @pytest.mark.requirement("equivalence/idempotency-key", "equivalence/idempotency-other-key")

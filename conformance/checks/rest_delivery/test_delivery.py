@@ -5,7 +5,8 @@ from typing import Final
 import pytest
 from hypothesis import strategies as st
 
-from conformance.robot.delivery import Delivery, deliveries, lexical_deliveries, path_of
+from conformance.rest.interface import RestInterface
+from conformance.robot.delivery import Delivery, deliveries, lexical_deliveries, path_of, put_delivery
 from conformance.transport.client import HttpClient
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -27,18 +28,18 @@ _BODIES: Final = (
 )
 
 
-def _judge_taken(rest: HttpClient, judge: Judge, path: str, expected: str) -> None:
-    exchange = rest.send("PUT", path)
+def _judge_taken(api: RestInterface, judge: Judge, path: str, expected: str) -> None:
+    exchange = put_delivery(api, path)
     judge.check("rest-delivery/put-range", exchange.response.ok, exchange, expected)
 
 
 @pytest.mark.requirement("rest-delivery/put", "rest-delivery/put-no-content", "rest-delivery/put-repeated")
-def test_deliveries(rest: HttpClient, judge: Judge, explore: Explorer) -> None:
+def test_deliveries(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """The paper's example and any other are accepted, the first time and again."""
 
     def try_delivery(delivery: Delivery) -> None:
-        first = rest.send("PUT", delivery.rest_path)
-        again = rest.send("PUT", delivery.rest_path)
+        first = put_delivery(api, delivery.rest_path)
+        again = put_delivery(api, delivery.rest_path)
         status = first.response.status
         repeated = again.response.status
         judge.check("rest-delivery/put", 200 <= status < 300, first, "2xx for a delivery")
@@ -52,12 +53,12 @@ def test_deliveries(rest: HttpClient, judge: Judge, explore: Explorer) -> None:
 
 
 @pytest.mark.requirement("rest-delivery/put-range")
-def test_numbers_in_any_form(rest: HttpClient, judge: Judge, explore: Explorer) -> None:
+def test_numbers_in_any_form(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """Every finite double, with and without sign, fraction and exponent."""
 
     def try_forms(case: tuple[Delivery, tuple[str, ...]]) -> None:
         _, written = case
-        exchange = rest.send("PUT", path_of(*written))
+        exchange = put_delivery(api, path_of(*written))
         judge.require(
             "rest-delivery/put-range",
             exchange.response.ok,
@@ -68,9 +69,9 @@ def test_numbers_in_any_form(rest: HttpClient, judge: Judge, explore: Explorer) 
 
     explore(lexical_deliveries(), try_forms, cases=60)
     for text in ("-0.0", "5e-324", "1.7976931348623157e308", "-1.7976931348623157e+308", ".5", "+1", "0"):
-        _judge_taken(rest, judge, path_of("3", *[text] * 6), f"2xx for coordinates written {text}")
+        _judge_taken(api, judge, path_of("3", *[text] * 6), f"2xx for coordinates written {text}")
     for code in ("+3", "04", "+4"):
-        _judge_taken(rest, judge, path_of(code, *_VALID[1:]), f"2xx for the code written {code}")
+        _judge_taken(api, judge, path_of(code, *_VALID[1:]), f"2xx for the code written {code}")
 
 
 @pytest.mark.requirement("rest-delivery/put-body")

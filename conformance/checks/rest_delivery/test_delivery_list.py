@@ -2,7 +2,8 @@
 
 import pytest
 
-from conformance.robot.delivery import Delivery
+from conformance.rest.interface import RestInterface
+from conformance.robot.delivery import Delivery, put_delivery
 from conformance.robot.message_shapes import DELIVERIES as LIST
 from conformance.robot.message_shapes import read_as
 from conformance.robot.robot import ACCEPT_JSON, DELIVERIES
@@ -40,7 +41,7 @@ def test_list(rest: HttpClient, judge: Judge, effort: Effort) -> None:
 
 @pytest.mark.motion
 @pytest.mark.requirement("rest-delivery/list-newest-first", "rest-delivery/list-values")
-def test_list_of_many(rest: HttpClient, judge: Judge, effort: Effort) -> None:
+def test_list_of_many(api: RestInterface, rest: HttpClient, judge: Judge, effort: Effort) -> None:
     """More deliveries than the list has to hold are there, newest first, each with its values."""
     if _read(rest, judge) is None:
         pytest.skip("the robot's list of deliveries cannot be read")
@@ -48,7 +49,7 @@ def test_list_of_many(rest: HttpClient, judge: Judge, effort: Effort) -> None:
     many = 5 if effort.slow else _LEAST + 5
     sent = [Delivery(3 + index % 2, 0.5, index + 0.25, -1.0, 1e300, 1e-300, index / 3) for index in range(many)]
     for delivery in sent:
-        rest.send("PUT", delivery.rest_path, fresh=True)
+        put_delivery(api, delivery.rest_path, fresh=True)
     exchange = rest.send("GET", DELIVERIES, headers=ACCEPT_JSON)
     value, problem = read_as(exchange.response, LIST)
     if problem:

@@ -9,11 +9,12 @@ from conformance.documents.xml_names import ADDRESSING, clark, local
 from conformance.documents.xml_node import Node
 from conformance.robot import delivery_messages, soap_services
 from conformance.soap.callable_services import repetitions
-from conformance.soap.calls import SoapResponse, call, judge_answer, read_exchange, send
+from conformance.soap.calls import SoapResponse, judge_answer, read_exchange, send
 from conformance.soap.envelope import envelope
 from conformance.soap.forms import written_integer
 from conformance.soap.messages import padded, variants, with_text
 from conformance.soap.service import SoapService
+from conformance.soap.valid_messages import call_valid, require_valid_message
 from conformance.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
@@ -54,7 +55,7 @@ def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> No
     for number in range(effort.cases(55)):
         for operation, id_ in zip(_BOTH, ("soap-delivery/delivery", "soap-delivery/coffee"), strict=True):
             code = "3" if operation == "ExecuteDeliveryRequest" and number % 2 else "4"
-            answer = call(publishers, delivery_messages.delivery(operation, code))
+            answer = call_valid(publishers, delivery_messages.delivery(operation, code))
             right = answer.payload == clark(delivery_messages.NAMESPACE, f"{operation}Response")
             judge_answer(judge, id_, answer.accepted and right, answer, f"2xx with {operation}Response for code {code}")
             if answer.succeeded:
@@ -75,7 +76,7 @@ def test_range(publishers: SoapService, judge: Judge, explore: Explorer) -> None
         code = 3 if operation == "ExecuteDeliveryRequest" and form % 2 else 4
         message = with_text(message, code_path, f"{space}{written_integer(code, form // 2)}{space}")
         message = Node(clark(delivery_messages.NAMESPACE, operation), "", message.children)
-        answer = call(publishers, message)
+        answer = call_valid(publishers, message)
         values = ", ".join(f"{leaf.name} {leaf.text!r}" for leaf in message.children[0].children)
         judge.require(
             "soap-delivery/range",
@@ -101,7 +102,9 @@ def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort
     """Requests that differ only in how their XML is written are all taken."""
 
     def taken(operation: str, style: XmlStyle, what: str) -> None:
-        document = serialize(envelope([delivery_messages.delivery(operation)]), style)
+        document = serialize(
+            envelope([require_valid_message(publishers, delivery_messages.delivery(operation))]), style
+        )
         answer = send(publishers, document)
         judge.require(
             "soap-delivery/syntax",
@@ -114,7 +117,9 @@ def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort
 
     for operation in _BOTH:
         for what, style in single_changes()[: effort.cases(len(single_changes()))]:
-            document = serialize(envelope([delivery_messages.delivery(operation)]), style)
+            document = serialize(
+                envelope([require_valid_message(publishers, delivery_messages.delivery(operation))]), style
+            )
             _answered(judge, "soap-delivery/syntax", operation, send(publishers, document), f"the same with {what}")
     explore(
         st.tuples(st.sampled_from(_BOTH), xml_styles()),
@@ -141,7 +146,7 @@ def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> No
                         (Node(clark(ADDRESSING, "Address"), f"{ADDRESSING}/anonymous"),),
                     ),
                 )
-                answer = call(publishers, delivery_messages.delivery(operation), headers=headers)
+                answer = call_valid(publishers, delivery_messages.delivery(operation), headers=headers)
                 _answered(judge, "soap-delivery/addressing", operation, answer, f"wsa:Action {form}")
 
 
@@ -153,7 +158,7 @@ def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
         return
     codes = ("5", "0", "2", "-4", "1", "7", "44", "2147483647", "-2147483648", "34", "-3", "100")
     for code in codes[: effort.cases(len(codes))]:
-        answer = call(publishers, delivery_messages.delivery(code=code))
+        answer = call_valid(publishers, delivery_messages.delivery(code=code))
         for id_ in ("soap-delivery/refuses-code", "strict-input/soap-code"):
             judge_answer(judge, id_, answer.refused, answer, f"a refusal of code {code}")
         if not answer.accepted:

@@ -18,8 +18,8 @@ from conformance.robot.robot import DELIVERIES as DELIVERIES_PATH
 from conformance.robot.robot import Robot
 from conformance.robot.stopping import bring_to_rest
 from conformance.soap import content
-from conformance.soap.calls import call
 from conformance.soap.service import SoapService
+from conformance.soap.valid_messages import call_valid
 from conformance.transport.client import HttpClient
 from conformance.transport.pace import Patience
 from conformance.verdict.effort import Effort
@@ -54,12 +54,12 @@ def test_misunderstood_has_no_effect(interfaces: Interfaces, judge: Judge, effor
     block = Node(clark("urn:example:strange", "Transaction"), "5", (), ((clark(ENVELOPE, "mustUnderstand"), "1"),))
     for number in range(effort.cases(4)):
         depot_x = _DEPOT_X + number
-        answer = call(service, delivery_messages.delivery(depot_x=repr(depot_x)), headers=(block,))
+        answer = call_valid(service, delivery_messages.delivery(depot_x=repr(depot_x)), headers=(block,))
         if answer.code != "MustUnderstand":
             continue
         # A valid delivery after it shows when the robot is through with both.
         marker = depot_x + 0.5
-        call(service, delivery_messages.delivery(depot_x=repr(marker)))
+        call_valid(service, delivery_messages.delivery(depot_x=repr(marker)))
         _until(partial(_listed, api.client, marker), Patience(api.client.connection.pace, _LISTED_S))
         listed = _listed(api.client, depot_x)
         for id_ in ("soap-basic-profile/R1025", "soap-basic-profile/R1028"):
@@ -96,7 +96,7 @@ def test_goal_is_shown(interfaces: Interfaces, judge: Judge) -> None:
     # A short goal may have ended before anybody could see it; then REST does not show it either.
     ended = robot.goal()[0] is None
     if shown or not ended:
-        answer = call(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
+        answer = call_valid(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
         judge.check(
             "soap-subscribers/goal",
             shown,
@@ -108,7 +108,7 @@ def test_goal_is_shown(interfaces: Interfaces, judge: Judge) -> None:
 
 
 def _goal_id(service: SoapService) -> str | None:
-    answer = call(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
+    answer = call_valid(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
     first = answer.first if answer.accepted else None
     return content.text_at(first, "goal_id", "id") if first is not None else None
 

@@ -16,8 +16,9 @@ from conformance.robot.geometry import Pose
 from conformance.robot.plan import START_OFF
 from conformance.soap import content
 from conformance.soap.callable_services import SoapServices
-from conformance.soap.calls import SoapResponse, call, judge_answer
+from conformance.soap.calls import SoapResponse, judge_answer
 from conformance.soap.service import SoapService
+from conformance.soap.valid_messages import call_valid
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
@@ -89,7 +90,9 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
         # Frame and tolerance may be left out: then they are map and 0.1 (contract, REST).
         given = {"frame_id": frame, "tolerance": repr(_TOLERANCE)} if number % 2 or frame != "map" else {}
         before = _here(soap, subscribers) or here
-        answer = call(subscribers, delivery_messages.request("GetPlan", x=target.x, y=target.y, yaw="0.0", **given))
+        answer = call_valid(
+            subscribers, delivery_messages.request("GetPlan", x=target.x, y=target.y, yaw="0.0", **given)
+        )
         after = _here(soap, subscribers) or before
         if answer.fault is not None:
             continue
@@ -132,7 +135,7 @@ def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> 
             "a frame that the robot does not know",
         ),
     ):
-        answer = call(subscribers, message)
+        answer = call_valid(subscribers, message)
         wrapper = answer.first if answer.accepted else None
         path = _path(wrapper, expected)[0] if wrapper is not None else None
         # A robot in an open world may know a way to anywhere; then it has to end there.

@@ -14,10 +14,11 @@ from conformance.documents.xsd_shapes import Element
 from conformance.robot import delivery_messages
 from conformance.robot.soap_services import declared_return, outgoing
 from conformance.soap import content
-from conformance.soap.calls import SoapResponse, call, judge_answer, read_exchange, send
+from conformance.soap.calls import SoapResponse, judge_answer, read_exchange, send
 from conformance.soap.envelope import envelope
 from conformance.soap.messages import padded
 from conformance.soap.service import SoapService
+from conformance.soap.valid_messages import call_valid
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
@@ -48,7 +49,7 @@ def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapRes
 
 def _complete(judge: Judge, id_: str, service: SoapService, operation: str) -> etree._Element | None:
     """Ask an operation without arguments, and judge that it returns all that the contract says; return it."""
-    answer = call(service, Node(clark(delivery_messages.NAMESPACE, operation)))
+    answer = call_valid(service, Node(clark(delivery_messages.NAMESPACE, operation)))
     judge_answer(judge, id_, answer.accepted, answer, f"{operation}Response")
     if not answer.succeeded:
         return None
@@ -93,7 +94,7 @@ def test_lists(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
             ("GetSensors", "soap-subscribers/sensors"),
             ("GetNavigationServices", "soap-subscribers/services"),
         ):
-            answer = call(subscribers, Node(clark(delivery_messages.NAMESPACE, operation)))
+            answer = call_valid(subscribers, Node(clark(delivery_messages.NAMESPACE, operation)))
             judge_answer(judge, id_, answer.accepted, answer, f"{operation}Response")
             if not answer.succeeded:
                 continue
@@ -126,7 +127,7 @@ def test_goal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """GetGoal gives a complete goal; without one an empty response, or a fault."""
     expected = declared_return(subscribers, "GetGoal")
     for _ in range(effort.cases(30)):
-        answer = call(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
+        answer = call_valid(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
         if answer.fault is not None:
             judge.check("soap-subscribers/goal", True, answer.exchange, "a fault where there is no goal")
             continue

@@ -9,7 +9,7 @@ from conformance.rest.calls import JSON
 from conformance.rest.interface import RestInterface
 from conformance.rest.mutations import near_misses
 from conformance.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
-from conformance.robot.delivery import Delivery, path_of
+from conformance.robot.delivery import Delivery, path_of, put_delivery
 from conformance.robot.delivery_messages import request
 from conformance.robot.drive import Drive
 from conformance.robot.goal import await_goal, await_none, difference, goal_body, put_goal
@@ -169,7 +169,7 @@ def test_an_invalid_delivery_reaches_nobody(
     if observer is None:
         return
     last = Delivery(3, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
-    rest.send("PUT", last.rest_path, fresh=True)
+    put_delivery(api, last.rest_path, fresh=True)
     try:
         seen = [one.delivery for one in observer.collect(1)]
     except (NoObserverError, ProbeError) as nobody:

@@ -7,6 +7,8 @@ from itertools import count
 import pytest
 from hypothesis import given, settings
 
+from conformance.contract.files import CONTRACT_DIR
+from conformance.documents.wsdl import read_file
 from conformance.robot.batch import Batch, Order
 from conformance.robot.deliveries_seen import Seen
 from conformance.robot.delivery import Delivery, deliveries, doubles, path_of, written
@@ -51,6 +53,7 @@ class Robot:
     """Rest interface, publishers service and observer of a robot that has one fault, or none."""
 
     exact = True
+    contract = read_file(CONTRACT_DIR / "publishers.wsdl")
 
     def __init__(self, fault):
         self._fault, self._numbers, self._seen = fault, count(1), deque()

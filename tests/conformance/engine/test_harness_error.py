@@ -1,0 +1,71 @@
+"""A generator's own mistake is an error of the suite, with exit code 4, and never the robot's failure."""
+
+from dataclasses import replace
+
+import pytest
+
+from conformance.contract.files import Contract
+from conformance.contract.statement import Endpoints, Statement
+from conformance.documents.xml_node import Node
+from conformance.engine.certification import certify
+from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.rest import calls
+from conformance.robot import delivery, delivery_messages
+from conformance.selftest.robots import running
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
+
+
+@pytest.fixture(scope="module")
+def statement():
+    with running("baroque", 0) as robot:
+        yield Statement(endpoints=Endpoints(rest=robot.rest, publishers_wsdl=robot.soap))
+
+
+def certified(statement, requirement, tmp_path):
+    contract = Contract.load(only=(requirement,))
+    claims = (contract.ledger[requirement].class_,)
+    run = Run(statement=statement, contract=contract, claims=claims, allow_motion=True, effort=Effort("quick"))
+    return certify(RobotUnderTest(run), tmp_path, progress=None)
+
+
+def _misspelt(monkeypatch):
+    make = calls._example  # noqa: SLF001 - whose mistake it is to be
+
+    def wrong(api, operation, media_type):
+        call = make(api, operation, media_type)
+        return replace(call, body=call.body.replace(b'"linear"', b'"liner"')) if call.body else call
+
+    monkeypatch.setattr(calls, "_example", wrong)
+
+
+def _with_letters(monkeypatch):
+    make = delivery.path_of
+    monkeypatch.setattr(delivery, "path_of", lambda _code, *coordinates: make("four", *coordinates))
+
+
+def _without_an_element(monkeypatch):
+    make = delivery_messages.delivery
+
+    def wrong(*given, **named):
+        whole = make(*given, **named)
+        (inside,) = whole.children
+        return Node(whole.tag, "", (replace(inside, children=inside.children[1:]),))
+
+    monkeypatch.setattr(delivery_messages, "delivery", wrong)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "requirement"),
+    [
+        (_misspelt, "http/charset"),
+        (_with_letters, "rest-delivery/put"),
+        (_without_an_element, "soap-delivery/delivery"),
+    ],
+)
+def test_a_mistake_of_the_suite_s_own_is_no_failure(statement, tmp_path, monkeypatch, mistake, requirement):
+    mistake(monkeypatch)
+    outcome = certified(statement, requirement, tmp_path)
+    (item,) = outcome.document["requirements"]
+    assert (outcome.exit_code, item["verdict"]) == (4, "error"), item
+    assert "HarnessError" in item["reason"]
