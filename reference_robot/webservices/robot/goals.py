@@ -171,8 +171,8 @@ class Goals:
             return None  # it says itself that it follows none
         goal = told_goal(told) if told else None
         if goal is None:
-            active = self._subscribers.goals.active()
-            goal = untold_goal(active[-1]) if active else None
+            unknown = [goal for goal in self._subscribers.goals.active() if goal.identity not in self._known]
+            goal = untold_goal(unknown[-1]) if unknown else None
         return None if goal is None or goal["goal_id"]["id"] in self._known else goal
 
     def _filled_in(self, wanted: dict[str, Any]) -> dict[str, Any]:

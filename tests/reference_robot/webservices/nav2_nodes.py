@@ -5,8 +5,8 @@ what it sees, one JSON object a line, and takes commands on its stdin.
 
 base: tells ``velocity``; ``{"odometry": X}`` publishes odometry at x = X, null stops it. OPTION is what it takes: Twist
 or TwistStamped. ``{"clock": S}`` publishes /clock with S seconds.
-navigator: tells ``goal`` and ``cancel``; ``{"state": "inactive"}`` refuses goals, as a bt_navigator does that is not
-active; ``{"answers": false}`` lets goals wait for their answer;
+navigator: tells ``goal`` and ``cancel``, plans straight ahead; ``{"state": "inactive"}`` refuses goals and plans, as
+a bt_navigator and a planner_server do that are not active; ``{"answers": false}`` lets goals wait for their answer;
 ``{"finish": true}`` ends its goal with success.
 client: ``{"goal": X}`` sends a goal to x = X, as RViz does; tells ``accepted`` with its id, ``ended`` with its status.
 """
@@ -23,7 +23,7 @@ from foreign_robot import tell
 from geometry_msgs.msg import Twist, TwistStamped
 from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
-from nav2_msgs.action import NavigateToPose
+from nav2_msgs.action import ComputePathToPose, NavigateToPose
 from nav_msgs.msg import Odometry
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -76,7 +76,16 @@ class Navigator(Node):
         self._answers.set()
         self._finished = threading.Event()
         group = ReentrantCallbackGroup()
-        self.create_service(GetState, "bt_navigator/get_state", self._get_state, callback_group=group)
+        for name in ("bt_navigator", "planner_server"):
+            self.create_service(GetState, f"{name}/get_state", self._get_state, callback_group=group)
+        self._planner = ActionServer(
+            self,
+            ComputePathToPose,
+            "compute_path_to_pose",
+            execute_callback=self._plan,
+            goal_callback=lambda _: GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT,
+            callback_group=group,
+        )
         self._server = ActionServer(
             self,
             NavigateToPose,
@@ -90,6 +99,13 @@ class Navigator(Node):
     def _get_state(self, _request: GetState.Request, response: GetState.Response) -> GetState.Response:
         response.current_state = State(id=STATES[self._state], label=self._state)
         return response
+
+    def _plan(self, handle: Any) -> ComputePathToPose.Result:
+        result = ComputePathToPose.Result()
+        result.path.header.frame_id = "map"
+        result.path.poses = [handle.request.start, handle.request.goal]
+        handle.succeed()
+        return result
 
     def _goal(self, goal: NavigateToPose.Goal) -> GoalResponse:
         self._finished.clear()

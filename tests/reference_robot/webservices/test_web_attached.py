@@ -21,6 +21,7 @@ from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.robot.goals import Goals
 
 POSE, VELOCITY, GOAL, HEALTH = "/robot/pose/", "/robot/velocity/", "/robot/navigation/action/goal/", "/robot/health/"
+PLAN = "/robot/navigation/service/plan?x=1&y=2"
 HOLD = 0.4
 LEASE = str(Path(__file__).with_name("short_lease.xml"))
 
@@ -180,7 +181,11 @@ def test_a_navigator_that_is_not_active_is_503(attached, nav2):
     assert int(answer.headers["Retry-After"]) > 0
     assert "bt_navigator is inactive" in answer.json()["detail"]
     assert attached.call("GET", HEALTH).json()["navigation"]["state"] == "inactive"
+    answer = attached.call("GET", PLAN)
+    assert answer.status_code == 503
+    assert "planner_server is inactive" in answer.json()["detail"]
     nav2.navigator.do(state="active")
+    eventually(lambda: attached.call("GET", PLAN).status_code == 200)
     assert nav2.navigator.next("goal") == 3.0
     assert nav2.navigator.heard_nothing()
 
@@ -200,6 +205,7 @@ def test_goals_end_with_their_server_and_the_next_one_is_found(attached, nav2, s
     assert answer.status_code == 201
     assert nav2.navigator.next("goal") == 6.0
     assert attached.call("GET", GOAL).json()["goal_id"]["id"] == "again"
+    eventually(lambda: attached.call("GET", PLAN).status_code == 200)
     assert attached.call("DELETE", GOAL).status_code == 204
     assert nav2.navigator.next("cancel") == 6.0
 
