@@ -113,6 +113,26 @@ class FrontDoor:
             click.echo(f"report: {path}")
 
     @staticmethod
+    def compare(old: Path, new: Path, threshold: float) -> int:
+        """Have the reports room say what changed between two latency results; returns the exit code."""
+        pages = import_module("reports.cli.pages")
+        try:
+            code: int = pages.tell_change(old, new, threshold)
+        except import_module("reports.errors").ReportError as error:
+            click.echo(f"not compared: {error}", err=True)
+            return int(pages.EXIT_INVALID)
+        return code
+
+    @staticmethod
+    def history(folder: Path) -> None:
+        """Have the reports room write the history of the results that are stored in a folder."""
+        try:
+            for path in import_module("reports.latency.history").write_history(folder):
+                click.echo(f"history: {path}")
+        except import_module("reports.errors").ReportError as error:
+            click.echo(f"no history: {error}", err=True)
+
+    @staticmethod
     def known() -> dict[str, Any]:
         """What the installed suite knows: its digest, the requirement sets, the profiles."""
         known: dict[str, Any] = import_module("conformance.engine.suite").known()

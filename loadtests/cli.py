@@ -7,6 +7,7 @@ import shlex
 import signal
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from conformance.contract.statement import Endpoints, Statement, load_statement
 from conformance.contract.thresholds import load_thresholds
 from conformance.contract.toml_file import TomlFileError
 from loadtests.measuring.command_line import without_folders
+from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
 from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
 from loadtests.settings.settings import STEP_S, Settings
@@ -173,6 +175,9 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     "--tolerance", callback=_share, default="5%", show_default=True, help="By how much it may be slower than that."
 )
 @click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
+@click.option("--save", metavar="NAME", help="Store the result as a baseline of that name.")
+@click.option("--baseline", metavar="NAME", help="Compare with the result that was stored last under that name.")
+@click.option("--baselines", type=_FILE, metavar="DIR", default=FOLDER, show_default=True, help="Where they are.")
 @click.option("--out", metavar="DIR", default=DEFAULT_OUT, show_default=True, help="Where the result goes.")
 def load(statement: Path | None, **options: Any) -> CommandResult:
     """Measure how fast a robot answers, SOAP against REST.
@@ -184,16 +189,55 @@ def load(statement: Path | None, **options: Any) -> CommandResult:
     """
     try:
         said = load_statement(statement) if statement is not None else Statement()
+        kept = _Baselines.of(options.pop("baselines"), options.pop("save"), options.pop("baseline"))
         limits = load_thresholds(options.pop("thresholds")) if options["thresholds"] else ()
         options.pop("thresholds", None)
-        other = _other_robot(options, said)
+        other, tolerance = _other_robot(options, said), options["tolerance"]
         settings = settle(CliOptions.of(**options, against=other, thresholds=limits, command=_command_line()), said)
         _check_folder(Path(settings.output.folder))
-    except (TomlFileError, SettingsError) as error:
+    except (TomlFileError, SettingsError, BaselineError) as error:
         click.echo(f"roaas load: {error}", err=True)
         return CommandResult(ExitCode.USAGE)
     with TemporaryDirectory(prefix="roaas-load-") as folder:
-        return _run_load(settings, Path(folder, "written"))
+        result = _run_load(settings, Path(folder, "written"))
+    return kept.after(result, tolerance, click.get_current_context().obj)
+
+
+@dataclass(frozen=True)
+class _Baselines:
+    """What a run has to do with stored results: the folder to store it in, and the result to compare it with."""
+
+    store_in: Path | None
+    old: Path | None
+
+    @classmethod
+    def of(cls, baselines: Path, save: str | None, baseline: str | None) -> _Baselines:
+        """Look before the run whether all is there.
+
+        Raises:
+            BaselineError: a name is none, or there is nothing to compare with.
+        """
+        old = newest(folder_of(baselines, baseline)) if baseline is not None else None
+        return cls(folder_of(baselines, save) if save is not None else None, old)
+
+    def after(self, result: CommandResult, tolerance: float, door: Any) -> CommandResult:
+        """Compare and store a run's result; a run that missed nothing else has the comparison's exit code."""
+        code = result.exit_code
+        if result.file is None:
+            return result
+        if self.old is not None and door is not None:
+            told = door.compare(self.old, result.file, tolerance)
+            code = told if code == ExitCode.PASSED else code
+        if self.store_in is not None:
+            try:
+                stored = store(result.file, self.store_in)
+            except BaselineError as error:
+                click.echo(f"roaas load: {error}", err=True)
+                return CommandResult(ExitCode.USAGE, result.file)
+            click.echo(f"stored: {stored}" if stored else "not stored: the measurement is not valid", err=True)
+            if stored is not None and door is not None:
+                door.history(self.store_in)
+        return CommandResult(code, result.file)
 
 
 def _command_line() -> str:

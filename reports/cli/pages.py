@@ -65,30 +65,42 @@ def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
     slower; 1: slower; 2: a result cannot be read, or the two cannot be compared; 4: one of them is not valid,
     or nothing in them could be judged.
     """
+    try:
+        code = tell_change(old, new, threshold / 100, out)
+    except ReportError as error:
+        refuse(error)
+    raise SystemExit(code)
+
+
+def tell_change(old: Path, new: Path, threshold: float, out: Path | None = None) -> int:
+    """Say what changed from one latency result to another, and return the exit code of `roaas compare`.
+
+    `threshold` is a share, 0.05 for 5 %; pages go to `out`, where it is given.
+
+    Raises:
+        ReportError: a result cannot be read, or the two cannot be compared.
+    """
     # They load matplotlib and numpy, which `roaas report` of a certificate does without.
     from reports.latency import comparison, comparison_page  # noqa: PLC0415 - see above
 
     names = _latency_file(old), _latency_file(new)
     texts = str(names[0]), str(names[1])
-    try:
-        found = comparison.compare(read_latency(names[0]), read_latency(names[1]), texts, threshold / 100)
-        if out is not None:
-            pages = {
-                "compare.html": comparison_page.comparison_html(found, texts),
-                "compare.md": comparison_page.comparison_markdown(found, texts),
-            }
-            for path in write_pages(out, pages):
-                click.echo(path, err=True)
-    except ReportError as error:
-        refuse(error)
+    found = comparison.compare(read_latency(names[0]), read_latency(names[1]), texts, threshold)
+    if out is not None:
+        pages = {
+            "compare.html": comparison_page.comparison_html(found, texts),
+            "compare.md": comparison_page.comparison_markdown(found, texts),
+        }
+        for path in write_pages(out, pages):
+            click.echo(path, err=True)
     verdict = comparison_page.verdict(found)
     click.echo(comparison_page.table(found))
     for remark in found.remarks:
         click.echo(f"\n{visible(remark)}", nl=False)
     click.echo(f"\n{verdict.words}. {visible(verdict.sentence)}")
     if not found.valid:
-        raise SystemExit(EXIT_INVALID)
-    raise SystemExit(EXIT_SLOWER if found.slower else EXIT_OK)
+        return EXIT_INVALID
+    return EXIT_SLOWER if found.slower else EXIT_OK
 
 
 def _latency_file(path: Path) -> Path:

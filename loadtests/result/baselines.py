@@ -1,0 +1,61 @@
+"""Stored results, by name: what later runs are compared with, and what a history is made of.
+
+A baseline is a folder of latency.json files that are named by when they were measured; the last one is compared with.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from conformance.contract.atomic_write import write_atomically
+
+FOLDER = Path(".roaas", "baselines")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_PATTERN = "20*.json"
+
+
+class BaselineError(ValueError):
+    """A baseline that cannot be used; the message says what to do."""
+
+
+def folder_of(baselines: Path, name: str) -> Path:
+    """Where a baseline is kept.
+
+    Raises:
+        BaselineError: no name for a folder.
+    """
+    if not _NAME.fullmatch(name):
+        raise BaselineError(f"baseline {name!r}: a name is made of letters, digits, '.', '_' and '-'")
+    return baselines / name
+
+
+def newest(folder: Path) -> Path:
+    """The result that was stored last.
+
+    Raises:
+        BaselineError: there is none.
+    """
+    stored = sorted(folder.glob(_PATTERN))
+    if not stored:
+        raise BaselineError(f"there is no baseline in {str(folder)!r}: store one with --save {folder.name}")
+    return stored[-1]
+
+
+def store(result: Path, folder: Path) -> Path | None:
+    """Store a result; None where it is not valid, for nothing may be measured by it.
+
+    Raises:
+        BaselineError: the folder cannot be written to.
+    """
+    text = result.read_text(encoding="utf-8")
+    document = json.loads(text)
+    if not document["valid"]:
+        return None
+    moment = re.sub(r"[^0-9TZ]", "", document["started"])
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return write_atomically(folder / f"{moment}.json", text)
+    except OSError as error:
+        raise BaselineError(f"baseline folder {str(folder)!r}: {error.strerror or error}") from None

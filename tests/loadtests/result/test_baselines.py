@@ -1,0 +1,85 @@
+"""Stored results: what is kept, what a run is compared with, and the history of it."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import loadtests.cli
+import roaas
+from conformance.contract.command import CommandResult
+from conformance.contract.exit_codes import ExitCode
+
+EXAMPLE = Path(__file__).parents[2] / "reports" / "data" / "latency-example.json"
+
+
+@pytest.fixture
+def load(tmp_path, monkeypatch):
+    """Run `roaas load` with a measurement that has been made already."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(roaas.FrontDoor, "render", staticmethod(lambda *_: None))  # its pages have tests of their own
+
+    def run(*options, **changed):
+        result = json.loads(EXAMPLE.read_text()) | changed
+        (tmp_path / "latency.json").write_text(json.dumps(result))
+        measured = CommandResult(ExitCode.PASSED, tmp_path / "latency.json")
+        monkeypatch.setattr(loadtests.cli, "_run_load", lambda *_: measured)
+        return CliRunner().invoke(roaas.main, ["load", "--rest", "http://robot:1", *options])
+
+    return run
+
+
+def slowed(factor):
+    series = json.loads(EXAMPLE.read_text())["series"]
+    for one in series:
+        for times in (one["service_ms"], one["response_ms"]):
+            times.update({name: value * factor for name, value in times.items() if value is not None})
+        for bounds in (one["ci95_ms"], one.get("response_ci95_ms", {})):
+            bounds.update({name: [b * factor for b in value] for name, value in bounds.items() if value is not None})
+    return series
+
+
+def test_results_are_stored_compared_and_told_as_a_history(load):
+    first = load("--save", "main", started="2026-11-01T10:00:00.000Z")
+    assert first.exit_code == ExitCode.PASSED, first.output
+    same = load("--baseline", "main", "--save", "main", started="2026-11-02T10:00:00.000Z")
+    assert same.exit_code == ExitCode.PASSED, same.output
+    slower = load("--baseline", "main", started="2026-11-03T10:00:00.000Z", series=slowed(2))
+    assert slower.exit_code == ExitCode.FAILED
+    assert "It got slower" in slower.output
+    folder = Path(".roaas/baselines/main")
+    assert sorted(path.name for path in folder.glob("*.json")) == [
+        "20261101T100000000Z.json",
+        "20261102T100000000Z.json",
+    ]
+    rows = list(csv.DictReader(io.StringIO((folder / "history.csv").read_text())))
+    assert [row["time"] for row in rows] == ["2026-11-01T10:00:00.000Z", "2026-11-02T10:00:00.000Z"]
+    assert float(rows[0]["delivery_soap_wire_p50_ms"]) > float(rows[0]["delivery_rest_wire_p50_ms"]) > 0
+    page = (folder / "history.html").read_text()
+    assert "2026-11-02, 10:00 UTC" in page
+    assert 'id="history-0"' in page
+    assert "None" not in page
+
+
+def test_what_is_not_valid_is_not_stored_and_other_loads_are_not_compared(load):
+    invalid = load("--save", "main", valid=False, invalid_because=["the machine was busy"])
+    assert "not stored" in invalid.output
+    assert not Path(".roaas").exists()
+    plan = json.loads(EXAMPLE.read_text())["plan"]
+    load("--save", "main")
+    other = load("--baseline", "main", plan=plan | {"rate": 2 * plan["rate"]})
+    assert other.exit_code == ExitCode.INCONCLUSIVE
+    assert "not compared" in other.output
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [(["--baseline", "gone"], "there is no baseline"), (["--save", "../up"], "a name is made of letters")],
+)
+def test_baselines_that_cannot_be(load, option, message):
+    refused = load(*option)
+    assert refused.exit_code == ExitCode.USAGE
+    assert message in refused.output
