@@ -17,12 +17,12 @@ from reference_robot.simulation.office import OFFICE
 
 _RESOLUTION_M: Final = 0.05
 _OCCUPIED: Final = 100  # nav_msgs/OccupancyGrid: a probability in percent
-_PERIOD_S: Final = 0.05  # between transforms, which tf2 interpolates: at 50 Hz they would cost as much as the odometry
+_PERIOD_S: Final = 0.1  # between transforms, which tf2 interpolates: at 50 Hz they would cost as much as the odometry
 _TRANSFORMS: Final = 100  # depth, as tf2's broadcaster has it
 
 
 class FramePublisher:
-    """Publishes the transform of the base at 20 Hz, and once, latched, that map and odometry coincide."""
+    """Publishes the transform of the base at 10 Hz, and once, latched, that map and odometry coincide."""
 
     def __init__(self, node: Node, names: RosNames) -> None:
         self._base = TransformStamped()
