@@ -23,3 +23,5 @@ EXPOSE 7003 5555
 HEALTHCHECK --interval=5s --timeout=3s --start-period=20s CMD \
     ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:7003/robot/pose/', timeout=2)"]
 ENTRYPOINT ["roaas", "robot", "--host", "0.0.0.0"]
+# Who may reach it is for the published ports to say; or replace this by --token-file and TLS (docs/security.md).
+CMD ["--insecure"]

@@ -120,7 +120,6 @@ def test_a_newcomers_way_through_the_pages(tmp_path):
     shutil.copytree(out, tmp_path / "roaas-results")
     assert run("roaas report roaas-results").returncode == 0
     assert {"roaas.sarif", "ctrf-report.json"} <= {path.name for path in (tmp_path / "roaas-results").iterdir()}
-    assert run("roaas report out").returncode == 0
 
 
 @pytest.mark.parametrize(("page", "text"), list(fences("yaml")), ids=lambda value: value.split("\n", 1)[0])

@@ -160,6 +160,27 @@ def test_gitlabs_job_is_red_and_leaves_what_it_promises(programs, absent, tmp_pa
     assert "::" not in done.stdout
 
 
+def test_the_images_commands_do_what_they_are_for(programs, domain_id):
+    folder = CI.parent / "deploy" / "container"
+    said = {
+        name: [
+            word
+            for found in re.findall(r"^(?:ENTRYPOINT|CMD) (\[.*\])$", text, re.MULTILINE)
+            for word in json.loads(found)
+        ]
+        for name in ("suite", "robot")
+        for text in [(folder / f"Containerfile.{name}").read_text(encoding="utf-8")]
+    }
+    environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "ROS_DOMAIN_ID": str(domain_id)}
+    assert bash(" ".join(said["suite"]), environment, programs).returncode == 0
+    command = [*said["robot"], "--rest-port=0", "--soap-port=0"]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as robot:
+        try:
+            assert robot.stdout.readline().startswith("ready rest=http://0.0.0.0:")
+        finally:
+            robot.terminate()
+
+
 def test_inputs_reach_scripts_by_the_environment_alone():
     scripts = [step["run"] for step in ACTION["runs"]["steps"] if "run" in step]
     assert len(scripts) >= 2
