@@ -21,6 +21,7 @@ from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
 _DESCRIPTORS: Final = 8192  # connections and ROS together; the usual soft limit of 1,024 is soon reached
+_TLS_CONNECTIONS: Final = 500  # of each interface: each keeps 280 kB once it has carried something
 _DISCOVERY: Final = 20.0  # seconds in which a robot that has been started must appear on the graph
 _DISCOVERY_STEP: Final = 0.05
 
@@ -69,9 +70,10 @@ class RobotWebServiceNodesRunner:
             if wait_for_robot:
                 _await_robot(publishers, subscribers)
             *pair, velocity = interfaces(publishers, subscribers, configuration, endpoints, listening)
+            patience = configuration.web.read_deadline
             publisher = EndpointPublisher(
                 list(zip(pair, (rest, soap), strict=True)),
-                Limits(configuration.web.read_deadline),
+                Limits(patience) if listening.tls is None else Limits(patience, connections=_TLS_CONNECTIONS),
                 listening.proxies,
                 listening.tls,
             )

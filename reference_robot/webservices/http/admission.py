@@ -1,7 +1,7 @@
 """Who is let in: requests for this robot, from no foreign page, with a token where tokens are asked for."""
 
-from collections.abc import Callable, Iterable
-from typing import Final
+from collections.abc import Iterable
+from typing import Final, Protocol
 
 from reference_robot.webservices.http.authorization import Authorization, Scope
 from reference_robot.webservices.http.hosts import AllowedHosts
@@ -11,6 +11,13 @@ from reference_robot.webservices.representation.problems import Problem
 SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})  # RFC 9110 9.2.1
 
 _SHOWN: Final = 100  # characters of a client's own word
+
+
+class Scoped(Protocol):
+    """What knows the scope that a request needs."""
+
+    def needed(self, request: Request) -> Scope | None:
+        """Return it; None for what any token may do."""
 
 
 class Admission:
@@ -24,16 +31,16 @@ class Admission:
 
     def __init__(self, authorization: Authorization, hosts: AllowedHosts, origins: Iterable[str] = ()) -> None:
         self._authorization = authorization
-        self._hosts = hosts
+        self._allows = hosts.allows
         self._origins = frozenset(origin.encode() for origin in origins)
 
-    def check(self, request: Request, scope_of: Callable[[Request], Scope | None]) -> None:
+    def check(self, request: Request, scoped: Scoped) -> None:
         """Raise the Problem 421, 401 or 403 for a request that is not let in."""
-        if not self._hosts.allows(request.authority):
+        if not self._allows(request.authority):
             host = request.authority.decode("latin-1")[:_SHOWN]
             raise Problem(421, f"this robot is not {host!a}; started with --allowed-host NAME, it answers to NAME too")
         if self._authorization.is_asked_for:
-            self._authorization.check(request.headers, scope_of(request))
+            self._authorization.check(request.headers, scoped.needed(request))
         if b"origin" in request.headers and request.method not in SAFE:
             self._require_own_origin(request)
 

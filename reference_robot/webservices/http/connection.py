@@ -58,6 +58,7 @@ class HttpConnection(asyncio.Protocol):
 
     def __init__(self, port: Port) -> None:
         self._port = port
+        self._admit = port.interface.admit
         self._respond = port.interface.respond
         self._now = port.loop.time
         self._transport: asyncio.Transport
@@ -179,7 +180,7 @@ class HttpConnection(asyncio.Protocol):
                 request.headers = headers = fields_by_name(fields)
             if b"host" not in headers:
                 require_old_version(parser.get_http_version())
-            self._port.interface.admit(request)
+            self._admit(request)
             if b"content-length" in headers:  # digits only: the parser has seen to that
                 require_bounded(int(headers[b"content-length"]))
         except Problem as problem:
@@ -208,7 +209,6 @@ class HttpConnection(asyncio.Protocol):
     def on_message_complete(self) -> None:
         """Hand the request over, and be ready for the next."""
         request, refused = self._request, self._is_refused
-        weight = self._weight()
         self._has_begun = self._is_refused = False
         self._in_head = True
         self._head_octets = 0
@@ -226,20 +226,21 @@ class HttpConnection(asyncio.Protocol):
         if self._content:
             request.body = bytes(self._content)
             self._content.clear()
-        self._queue(request, None, weight)
+        self._queue(request, None)
 
     # Answers, in the order of the requests
 
     def _is_busy(self) -> bool:
         return self._task is not None or self._stalled or bool(self._waiting)
 
-    def _queue(self, request: Request, response: Response | None, weight: int = 0) -> None:
+    def _queue(self, request: Request, response: Response | None) -> None:
         """Answer a request, or let it wait its turn; ``response`` is set where it has been refused already."""
         if self._leaving:
             return  # it follows one that was to be the last
         if not self._is_busy():
-            self._serve(request, response, weight)
+            self._serve(request, response)
             return
+        weight = _weight(request)
         self._hold(weight)
         if response is None and self._port.is_full():
             response = described(_full(), request.headers.get(b"accept"))
@@ -249,16 +250,17 @@ class HttpConnection(asyncio.Protocol):
         if len(self._waiting) >= _PIPELINED:
             self._pause_reading()
 
-    def _serve(self, request: Request, response: Response | None, weight: int) -> None:
+    def _serve(self, request: Request, response: Response | None) -> None:
         outcome = response or self._respond(request)
         if isinstance(outcome, Response):
             self._write(request, outcome)
         else:
-            self._await(request, outcome, weight)
+            self._await(request, outcome)
 
-    def _await(self, request: Request, outcome: Coroutine[Any, Any, Response], weight: int) -> None:
+    def _await(self, request: Request, outcome: Coroutine[Any, Any, Response]) -> None:
         if not self._has_begun:
             self.due = _NEVER
+        weight = _weight(request)
         self._hold(weight)
         self._task = self._port.loop.create_task(outcome)
         self._task.add_done_callback(partial(self._finish, request, weight))
@@ -275,7 +277,7 @@ class HttpConnection(asyncio.Protocol):
         while self._waiting and self._task is None and not self._stalled:
             request, response, weight = self._waiting.popleft()
             self._hold(-weight)
-            self._serve(request, response, weight)
+            self._serve(request, response)
         if self._is_busy():
             return
         if self._ended:
@@ -317,7 +319,7 @@ class HttpConnection(asyncio.Protocol):
         self._is_refused = True
         self._hold(-len(self._content))
         self._content.clear()
-        self._queue(request, described(problem, request.headers.get(b"accept")), self._weight())
+        self._queue(request, described(problem, request.headers.get(b"accept")))
 
     def _refuse(self, problem: Problem) -> None:
         """Refuse what is no request, or too long a one, and read no more."""
@@ -384,18 +386,21 @@ class HttpConnection(asyncio.Protocol):
             if self._head_octets > HEAD_LIMIT:
                 self._refuse(head_too_large())
                 return
-        weight = self._weight()
+        weight = self._head_octets + _FIELD * len(self._fields)
         self._hold(weight - self._arriving)
         self._arriving = weight
         if self._in_head and self._port.is_full():
             self._refuse(_full())
 
-    def _weight(self) -> int:
-        return self._head_octets + _FIELD * len(self._fields)
-
     def _hold(self, octets: int) -> None:
         self._held += octets
         self._port.held.octets += octets
+
+
+def _weight(request: Request) -> int:
+    """Return what the head of a request takes, in octets."""
+    fields = request.headers.items()
+    return len(request.path) + len(request.query) + sum(_FIELD + len(name) + len(value) for name, value in fields)
 
 
 def _full() -> Problem:

@@ -26,13 +26,14 @@ class Interface(ABC):
 
     def admit(self, request: Request) -> None:
         """Raise a Problem for a request whose head already says that it is not answered."""
-        self._admission.check(request, self._needed)
+        self._admission.check(request, self)
 
     @abstractmethod
     def scope(self, request: Request) -> Scope:
         """Return what a token must be good for to change something by this request."""
 
-    def _needed(self, request: Request) -> Scope | None:
+    def needed(self, request: Request) -> Scope | None:
+        """Return what a token must be good for; None where any will do."""
         if request.method in SAFE:
             return None if request.method == "OPTIONS" else Scope.READ
         return self.scope(request)

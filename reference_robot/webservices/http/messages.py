@@ -14,6 +14,7 @@ BODY_LIMIT: Final = 1024 * 1024  # octets; the contract allows 64 KiB to 10 MiB
 Field = tuple[bytes, bytes]
 
 _NO_CONTENT: Final = 204
+_SLASH: Final = ord("/")
 
 
 class Request:
@@ -39,7 +40,7 @@ class Request:
         self.method = method
         self.authority = headers.get(b"host", b"")
         self.scheme = ""
-        if target.startswith(b"/") and b"#" not in target:
+        if target[0] == _SLASH and b"#" not in target:
             self.path, _, self.query = target.partition(b"?")
         else:  # the absolute form, the asterisk, or a fragment, which has no business here
             url = parse_url(target)

@@ -1,0 +1,296 @@
+"""Whether the reference robot lasts: good clients beside hostile ones, while the robot behind it dies and comes back.
+
+``python benchmarks/soak.py`` runs for ten minutes (``--minutes``). The simulation, which is the robot and its action
+servers, is killed and started again every minute. It ends with exit code 1 unless
+
+- good clients are always answered, and never by a 5xx but 503 (or the SOAP fault that says the same);
+- hostile clients get no other status than they should, and the robot's log has no traceback;
+- memory is within 5 % of what it was after the first tenth, descriptors and threads where they were;
+- the good clients' p99 at the end is within 20 % of the beginning's, both under the same load. A bare application,
+  asked in turn with the robot, tells how much slower the machine itself has become, and that is taken out.
+"""
+
+import argparse
+import contextlib
+import http.client
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from loader import Call
+from robot import DELIVERY, ENVELOPE, report, running_bare
+
+RATE = 100.0  # good requests a second, and as many to the bare application
+SLICES = 10  # of a window; its p99 is the median of theirs, so that a neighbour's burst is none of the robot's
+MOST_GROWTH, MOST_SLOWER = 0.05, 0.20
+DEADLINE = 10.0  # seconds for an answer
+BACK = 20.0  # seconds for the robot to be served again, and for what is left to go
+SETTLED = 75.0  # seconds after which idle connections are gone
+GET_POSE = (
+    '<s:Envelope xmlns:s="http://schemas.xmlsoap.org/soap/envelope/"><s:Body>'
+    '<t:GetPose xmlns:t="http://soap.turtlebot.mybot.org/"/></s:Body></s:Envelope>'
+)
+ASKED = (  # (operation, SOAP or REST, method, target, content); deliveries seldom, for the robot has to drive for each
+    *(("pose", False, "GET", "/robot/pose/", ""),) * 6,
+    *(("pose by SOAP", True, "POST", "/turtlesim_subscriber_ws", GET_POSE),) * 6,
+    *(("sensors", False, "GET", "/robot/sensors/", ""),) * 3,
+    *(("deliveries", False, "GET", "/robot/app/delivery/", ""),) * 3,
+    ("delivery", False, "PUT", DELIVERY, ""),
+    ("delivery by SOAP", True, "POST", "/turtlesim_publisher_ws", ENVELOPE),
+)
+
+
+@dataclass
+class Footprint:
+    """What the web services' process uses: resident megabytes, descriptors, threads."""
+
+    megabytes: float
+    descriptors: int
+    threads: int
+
+    @classmethod
+    def of(cls, pid: int) -> "Footprint":
+        """Look at a process."""
+        proc = Path(f"/proc/{pid}")
+        pages = int((proc / "statm").read_text().split()[1])
+        return cls(
+            pages * os.sysconf("SC_PAGE_SIZE") / 1e6,
+            len(list((proc / "fd").iterdir())),
+            len(list((proc / "task").iterdir())),
+        )
+
+
+@dataclass
+class Good:
+    """What good clients have seen: times in ms by when they were asked for, s since the start; what went wrong."""
+
+    robot: list[tuple[float, float]] = field(default_factory=list)
+    bare: list[tuple[float, float]] = field(default_factory=list)
+    statuses: Counter[str] = field(default_factory=Counter)
+    wrong: Counter[str] = field(default_factory=Counter)
+
+
+class Client:
+    """A good client of one port, which connects again when its connection is closed."""
+
+    def __init__(self, port: int) -> None:
+        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=DEADLINE)
+
+    def ask(self, method: str, target: str, body: str = "") -> tuple[int, bytes, float]:
+        """Return status and content, and how long it took, in ms."""
+        fields = {"Content-Type": "text/xml"} if body else {}
+        began = time.perf_counter()
+        self._connection.request(method, target, body or None, fields)
+        answer = self._connection.getresponse()
+        content = answer.read()
+        return answer.status, content, (time.perf_counter() - began) * 1000
+
+    def close(self) -> None:
+        """Hang up."""
+        self._connection.close()
+
+
+class Soak:
+    """One run: a robot, who asks it, and what was seen."""
+
+    def __init__(self, domain_id: int, seconds: float, log: Path) -> None:
+        self.seconds, self.log, self._domain = seconds, log, f"--domain-id={domain_id}"
+        self.good = Good()
+        self.warm, self.left = Footprint(0, 0, 0), Footprint(0, 0, 0)
+        self.hostile: dict[str, dict[str, int]] = {}
+        self.restarts = 0
+
+    def run(self) -> None:
+        """Keep everything busy for as long as asked, and look at what is left."""
+        with contextlib.ExitStack() as stack:
+            simulation = stack.enter_context(self._simulation())
+            pid, rest, soap = stack.enter_context(self._web_services())
+            pose = Call("127.0.0.1", rest, "GET", "/robot/pose/")
+            self._await_pose(rest)
+            bare = stack.enter_context(running_bare([pose]))
+            clients = {False: Client(rest), True: Client(soap)}
+            yardstick = Client(bare)
+            before = Footprint.of(pid)
+            hostile = stack.enter_context(self._hostile(rest, soap))
+            started = time.monotonic()
+            tenth = self.seconds / 10
+            next_kill, asked = 2 * tenth, 0
+            while (now := time.monotonic() - started) < self.seconds:
+                if not self.warm.threads and now > tenth:
+                    self.warm = Footprint.of(pid)
+                # None in the last part, whose time is compared with that of the first.
+                if now > next_kill and now < self.seconds - 2 * tenth:
+                    next_kill = now + max(tenth, 60.0)
+                    self._restart(simulation)
+                self._ask(clients, yardstick, asked, now)
+                asked += 1
+                if asked % (10 * RATE) == 0:
+                    print(f"{now:5.0f} s: {dict(self.good.statuses)}, {Footprint.of(pid)}", flush=True)
+                time.sleep(max(0.0, started + asked / RATE - time.monotonic()))
+            assert hostile.stdin is not None  # noqa: S101 - tells mypy what PIPE means
+            hostile.stdin.close()
+            assert hostile.stdout is not None  # noqa: S101 - as above
+            self.hostile = json.loads(hostile.stdout.read())
+            for client in clients.values():
+                client.close()
+            self.left = self._settled(pid, before)
+            self.warm.descriptors, self.warm.threads = before.descriptors, before.threads
+
+    def _ask(self, clients: dict[bool, Client], yardstick: Client, number: int, now: float) -> None:
+        name, is_soap, method, target, body = ASKED[number * 7 % len(ASKED)]
+        client = clients[is_soap]
+        try:
+            status, content, took = client.ask(method, target, body)
+        except (OSError, http.client.HTTPException) as error:
+            self.good.wrong[f"{name}: {type(error).__name__}: {error}"] += 1
+            client.close()
+            return
+        refused = status == 503 or (status == 500 and is_soap and b"its log says why" not in content)  # noqa: PLR2004
+        self.good.statuses[f"{status}"] += 1
+        if status >= 400 and not refused:  # noqa: PLR2004 - RFC 9110 15.5
+            self.good.wrong[f"{name}: {status} {content[:200]!r}"] += 1
+        if name == "pose" and not refused:
+            self.good.robot.append((now, took))
+            try:
+                self.good.bare.append((now, yardstick.ask("GET", "/robot/pose/")[2]))
+            except (OSError, http.client.HTTPException):
+                yardstick.close()  # it drops idle connections after a few seconds
+
+    def _restart(self, simulation: list[subprocess.Popen[str]]) -> None:
+        simulation[0].kill()
+        simulation[0].wait()
+        simulation[0] = self._start_simulation()
+        self.restarts += 1
+
+    @contextlib.contextmanager
+    def _simulation(self) -> Iterator[list[subprocess.Popen[str]]]:
+        """Run the simulation; yields the one that runs at the time."""
+        running = [self._start_simulation()]
+        try:
+            yield running
+        finally:
+            running[0].terminate()
+            running[0].wait(BACK)
+
+    def _start_simulation(self) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", "reference_robot.simulation", self._domain, "--time-scale=5"]
+        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True)
+
+    @contextlib.contextmanager
+    def _web_services(self) -> Iterator[tuple[int, int, int]]:
+        """Run the web services; yields process and ports."""
+        command = [sys.executable, "-m", "reference_robot", "--attach", "--rest-port=0", "--soap-port=0", self._domain]
+        with (
+            self.log.open("w", encoding="utf-8") as log,
+            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True) as process,
+        ):
+            try:
+                assert process.stdout is not None  # noqa: S101 - tells mypy what PIPE means
+                words = dict(word.split("=", 1) for word in process.stdout.readline().split()[1:])
+                rest, soap = (int(words[name].split(":")[2].split("/")[0]) for name in ("rest", "soap"))
+                yield process.pid, rest, soap
+            finally:
+                process.terminate()
+
+    @contextlib.contextmanager
+    def _hostile(self, rest: int, soap: int) -> Iterator[subprocess.Popen[str]]:
+        program = str(Path(__file__).with_name("hostile.py"))
+        pipes: dict[str, int] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        with subprocess.Popen([sys.executable, program, str(rest), str(soap)], text=True, **pipes) as process:
+            try:
+                yield process
+            finally:
+                process.terminate()
+
+    def _await_pose(self, port: int) -> None:
+        give_up = time.monotonic() + BACK
+        client = Client(port)
+        while client.ask("GET", "/robot/pose/")[0] != http.client.OK:
+            if time.monotonic() > give_up:
+                raise SystemExit(f"no pose within {BACK:g} s; the robot's log is {self.log}")
+            time.sleep(0.1)
+        client.close()
+
+    def _settled(self, pid: int, before: Footprint) -> Footprint:
+        """Return what is left once idle connections are gone."""
+        print("waiting until idle connections are closed", flush=True)
+        give_up = time.monotonic() + SETTLED
+        while True:
+            left = Footprint.of(pid)
+            if (left.descriptors, left.threads) == (before.descriptors, before.threads) or time.monotonic() > give_up:
+                return left
+            time.sleep(1.0)
+
+
+def p99(times: list[tuple[float, float]], start: float, end: float) -> float:
+    """Return the p99 of a window in ms: the median of those of its slices."""
+    length = (end - start) / SLICES
+    found = []
+    for number in range(SLICES):
+        begin = start + number * length
+        within = [took for asked, took in times if begin <= asked < begin + length]
+        if len(within) > 1:
+            found.append(statistics.quantiles(within, n=100)[-1])
+    return statistics.median(found)
+
+
+def judged(soak: Soak) -> list[bool]:
+    """Print what was seen, line by line; return what is as it should be."""
+    good, warm, left = soak.good, soak.warm, soak.left
+    fifth = soak.seconds / 5
+    first, last = (fifth / 2, fifth * 1.5), (soak.seconds - fifth, soak.seconds)
+    robot, bare = ([p99(times, *window) for window in (first, last)] for times in (good.robot, good.bare))
+    machine = max(1.0, bare[1] / bare[0])
+    slower = robot[1] / robot[0] / machine - 1
+    log = soak.log.read_text(encoding="utf-8")
+    grown = left.megabytes / warm.megabytes - 1
+    return [
+        report(
+            f"good clients: {dict(good.statuses)} over {soak.restarts} restarts, wrong {dict(good.wrong)}",
+            met=not good.wrong and soak.restarts > 0,
+        ),
+        report(
+            f"hostile clients: {soak.hostile['done']}, wrong {soak.hostile['failed']}", met=not soak.hostile["failed"]
+        ),
+        report(f"log: {log.count('Traceback')} tracebacks in {len(log)} characters", met="Traceback" not in log),
+        report(
+            f"memory: {warm.megabytes:.0f} MB, then {left.megabytes:.0f} MB: {grown:+.1%} (at most {MOST_GROWTH:.0%})",
+            met=grown <= MOST_GROWTH,
+        ),
+        report(f"descriptors: {warm.descriptors}, then {left.descriptors}", met=left.descriptors <= warm.descriptors),
+        report(f"threads: {warm.threads}, then {left.threads}", met=left.threads <= warm.threads),
+        report(
+            f"p99 of GET pose: {robot[0]:.2f} ms, then {robot[1]:.2f}; of the bare application {bare[0]:.2f}, then "
+            f"{bare[1]:.2f}: {slower:+.0%} beside the machine (at most {MOST_SLOWER:+.0%})",
+            met=slower <= MOST_SLOWER,
+        ),
+    ]
+
+
+def main() -> int:
+    """Run, and return 0 when everything is as it should be."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--minutes", type=float, default=10.0)
+    options.add_argument("--domain-id", type=int, default=int(os.environ.get("ROS_DOMAIN_ID", "0")))
+    chosen = options.parse_args()
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    with tempfile.TemporaryDirectory() as folder:
+        soak = Soak(chosen.domain_id, chosen.minutes * 60, Path(folder, "robot.log"))
+        soak.run()
+        passed = all(judged(soak))
+        if not passed:
+            print(soak.log.read_text(encoding="utf-8")[-3000:])
+    print("the robot lasts" if passed else "the robot does not last")
+    return 0 if passed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
