@@ -91,7 +91,6 @@ class Hostile:
     async def never_reads(self) -> None:
         """Ask for much, and read none of it."""
         reader, writer = await self._connect(self.rest)
-        writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         writer.transport.pause_reading()
         with contextlib.suppress(ConnectionError, TimeoutError):
             for _ in range(200):
