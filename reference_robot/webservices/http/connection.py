@@ -14,7 +14,10 @@ Over 300 lines because a connection is one state: what arrives, what waits its t
 """
 
 import asyncio
+import contextlib
 import math
+import socket
+import struct
 from collections import deque
 from collections.abc import Coroutine
 from functools import partial
@@ -47,6 +50,7 @@ _UNREAD: Final = 16 * 1024  # octets of answers that wait for the client before 
 _FIELD: Final = 200  # octets that a field takes besides its own: two objects, and where they are
 _CONTINUE: Final = b"HTTP/1.1 100 Continue\r\n\r\n"
 _NEVER: Final = math.inf
+_NO_LINGER: Final = struct.pack("ii", 1, 0)  # SO_LINGER: closing resets the connection
 
 
 class HttpConnection(asyncio.Protocol):
@@ -117,7 +121,7 @@ class HttpConnection(asyncio.Protocol):
         self._unread = self._transport.get_write_buffer_size()
         self._hold(self._unread)
         if self._port.is_full():
-            self._transport.abort()
+            self._reset()
 
     def resume_writing(self) -> None:
         """Answer what has waited."""
@@ -355,7 +359,7 @@ class HttpConnection(asyncio.Protocol):
     def expire(self) -> None:
         """End what is overdue; a client that is still sending is told so by a 408 (RFC 9110 15.5.9)."""
         if self._transport.is_closing() or self._stalled:
-            self._transport.abort()
+            self._reset()
         elif self._has_begun and not self._leaving:
             self._refuse(Problem(408, "the request took too long to arrive"))
         else:
@@ -370,6 +374,12 @@ class HttpConnection(asyncio.Protocol):
         """Drop the connection, and what the robot works on for it."""
         if self._task is not None:
             self._task.cancel()
+        self._transport.abort()
+
+    def _reset(self) -> None:
+        """Drop the connection, and with it what the kernel would keep for minutes for a client that does not read."""
+        with contextlib.suppress(OSError):  # it may be closed, but for the word of it
+            self._transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
         self._transport.abort()
 
     def _pause_reading(self) -> None:

@@ -274,11 +274,14 @@ async def test_a_client_that_sends_nothing_or_only_line_ends_is_closed():
 async def test_a_client_that_asks_and_never_reads_is_dropped():
     async with served() as robot:
         for asked in (request("/big") * 50, request("/big", "Connection: close")):
-            _, writer = await robot.connect()
+            reader, writer = await robot.connect()
             writer.transport.pause_reading()
             writer.write(asked)
             await until(lambda: robot.interface.seen)
             await robot.port.is_empty.wait()
+            writer.transport.resume_reading()
+            with pytest.raises(ConnectionResetError):  # and so the kernel, too, keeps nothing for it
+                await reader.read()
             assert len(robot.interface.seen) < 5  # nothing is answered while nobody reads
             robot.interface.seen.clear()
             writer.close()
