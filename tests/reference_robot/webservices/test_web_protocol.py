@@ -24,7 +24,7 @@ from reference_robot.webservices.representation.problems import Problem
 
 PATIENCE = 0.6
 TIMEOUT = 20.0
-BIG = b"x" * 4_000_000  # more than the kernel buffers
+BIG = b"x" * 16_000_000  # more than the kernel buffers on both sides (tcp_wmem and tcp_rmem)
 
 
 class Steered(Interface):
