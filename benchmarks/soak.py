@@ -14,6 +14,7 @@ import argparse
 import contextlib
 import http.client
 import json
+import math
 import os
 import statistics
 import subprocess
@@ -231,7 +232,7 @@ class Soak:
 
 
 def p99(times: list[tuple[float, float]], start: float, end: float) -> float:
-    """Return the p99 of a window in ms: the median of those of its slices."""
+    """Return the p99 of a window in ms: the median of those of its slices; NaN where nothing was answered."""
     length = (end - start) / SLICES
     found = []
     for number in range(SLICES):
@@ -239,7 +240,7 @@ def p99(times: list[tuple[float, float]], start: float, end: float) -> float:
         within = [took for asked, took in times if begin <= asked < begin + length]
         if len(within) > 1:
             found.append(statistics.quantiles(within, n=100)[-1])
-    return statistics.median(found)
+    return statistics.median(found) if found else math.nan
 
 
 def judged(soak: Soak) -> list[bool]:
