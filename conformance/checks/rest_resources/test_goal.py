@@ -147,7 +147,7 @@ def _repeat(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, A
         # A robot that shows one stamp as long as nothing is asked of it shows another one for another goal.
         if not changed and stamps[1:] == stamps[:1] != [goal["goal_id"]["stamp"]]:
             changed = f"goal_id.stamp {goal['goal_id']['stamp']} for {stamps[0]}"
-        if (status not in REPEATED or goal is None) and arrived(robot, there):
+        if goal is None and arrived(robot, there):
             return
         judge.check(
             "rest-resources/goal-repeat",
