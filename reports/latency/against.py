@@ -61,9 +61,9 @@ def picture(result: Mapping[str, Any]) -> Picture | None:
     ]
     return ratios(
         "against",
-        "this robot's service time over the other's",
+        "this robot over the other",
         rows,
-        "How many times as long requests take on this robot as on the other one, with 95 % intervals. Right of 1 this "
-        "robot is slower; the dashed line is what is tolerated.",
+        "Service time: how many times as long requests take on this robot as on the other one, with 95 % intervals. "
+        "Right of 1 this robot is slower; the dashed line is what is tolerated.",
         mark=(1 + compared["tolerance"], f"tolerance, {share(compared['tolerance'])}"),
     )

@@ -53,15 +53,6 @@ class Distribution:
         result: Floats = self.low_ms[index] + np.clip(inside, 0.0, 1.0) * width
         return result
 
-    def quantile_band(self, at: Floats) -> tuple[Floats, Floats]:
-        """95 % bounds of the quantiles by order statistics (binomial, normal approximation of the rank).
-
-        They take the values for independent, which a robot's answers in one run are not quite: the intervals
-        that the result file carries, from resampled blocks, are the ones to judge by.
-        """
-        spread = 1.96 * np.sqrt(at * (1 - at) / self.total)
-        return self.quantiles(at - spread), self.quantiles(at + spread)
-
     @property
     def highest_supported(self) -> float:
         """The highest quantile for which these many values support a 95 % interval with an upper bound.

@@ -67,7 +67,7 @@ def blocks(result: Mapping[str, Any]) -> Picture | None:
         kinds = ((block["client"], operation) for block in found for operation in block["p50_ms"])
         for client, operation in dict.fromkeys(kinds):
             panel = Panel(f"{operation}, {client} client", f"Medians of the blocks of {operation}, {client} client.")
-            for interface in dict.fromkeys(block["interface"] for block in found):
+            for interface in (name for name in COLOUR if any(block["interface"] == name for block in found)):
                 points = [
                     (block["t_s"], block["p50_ms"][operation])
                     for block in found
