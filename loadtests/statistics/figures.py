@@ -173,22 +173,41 @@ def comparisons(measured: Measured) -> list[dict[str, Any]]:
         return found  # robots took turns, not interfaces
     names = set(measured.plan.series_names())
     for operation in measured.plan.operations:
-        noise = {quantile: _noise(measured, operation, quantile) for quantile in COMPARED}
-        for client in measured.plan.clients:
-            sides = [(operation, interface, client) for interface in _COMPARED_INTERFACES]
-            if not all(side in names for side in sides):
-                continue
-            units = measured.paired(Side("duel", sides[0]), Side("duel", sides[1]))
-            length = pair_s(measured, "duel", sides[0])
-            found += [
-                {"operation": operation, "client": client}
-                | _judged(compared(units, quantile, measured, "soap_minus_rest_ms", length), noise[quantile])
-                for quantile in COMPARED
-            ]
+        clients = [
+            client
+            for client in measured.plan.clients
+            if all((operation, interface, client) in names for interface in _COMPARED_INTERFACES)
+        ]
+        floor = {quantile: noise(measured, operation, quantile) for quantile in COMPARED} if clients else {}
+        found += [
+            comparison(measured, operation, client, quantile, floor[quantile])
+            for client in clients
+            for quantile in COMPARED
+        ]
     return found
 
 
-def _noise(measured: Measured, operation: str, quantile: str) -> Interval | None:
+def comparison(
+    measured: Measured, operation: str, client: str, quantile: str, floor: Interval | None
+) -> dict[str, Any]:
+    """SOAP against REST at one quantile, judged by the interval that an interface came to against itself."""
+    rest, soap = (Side("duel", (operation, interface, client)) for interface in _COMPARED_INTERFACES)
+    length = pair_s(measured, "duel", rest.name)
+    entry = compared(measured.paired(rest, soap), quantile, measured, "soap_minus_rest_ms", length)
+    verdict = judge(entry["ratio"], entry["ci95"], floor) if entry["ratio"] is not None else Judgement("none")
+    return (
+        {"operation": operation, "client": client}
+        | entry
+        | {
+            "noise_ci95": rounded_interval(floor),
+            "judgement": verdict.verdict,
+            "bound": rounded(verdict.bound),
+            "judgement_reason": verdict.reason or entry["reason"],
+        }
+    )
+
+
+def noise(measured: Measured, operation: str, quantile: str) -> Interval | None:
     """The ratio that SOAP and REST came to against themselves, both together: its interval."""
     client = measured.plan.clients[0]
     parts = []
@@ -201,17 +220,6 @@ def _noise(measured: Measured, operation: str, quantile: str) -> Interval | None
         return None
     whole = together(known)
     return whole.ci95 if whole else None
-
-
-def _judged(entry: dict[str, Any], noise: Interval | None) -> dict[str, Any]:
-    """A comparison with what the A/A run lets it say."""
-    verdict = judge(entry["ratio"], entry["ci95"], noise) if entry["ratio"] is not None else Judgement("none")
-    return entry | {
-        "noise_ci95": rounded_interval(noise),
-        "judgement": verdict.verdict,
-        "bound": rounded(verdict.bound),
-        "judgement_reason": verdict.reason or entry["reason"],
-    }
 
 
 def _against_itself(measured: Measured, name: SeriesName) -> list[Unit]:

@@ -135,6 +135,7 @@ def _same_load(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str,
         raise ResultsIncompatibleError(
             f"{names[0]} measured with {old.get('users')} users and {names[1]} with {new.get('users')}"
         )
+    _same_cap(old, new, names)
     before, after = old.get("rate"), new.get("rate")
     if (before is None) != (after is None) or (
         before is not None and after is not None and abs(after - before) > _SAME_RATE * max(before, after)
@@ -142,6 +143,17 @@ def _same_load(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str,
         raise ResultsIncompatibleError(
             f"{names[0]} measured at {rate(before)} requests/s and {names[1]} at {rate(after)}: "
             "only what ran under the same load can be compared"
+        )
+
+
+def _same_cap(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, str]) -> None:
+    """A closed model under a cap measures the cap as well; in the open one the rate is what it is."""
+    caps = [(plan.get("limits") or {}).get("max_rate") for plan in (old, new)]
+    if new["model"] == "closed" and caps[0] != caps[1]:
+        told = [f"a cap of {rate(cap)} requests/s" if cap is not None else "no cap" for cap in caps]
+        raise ResultsIncompatibleError(
+            f"{names[0]} measured under {told[0]} and {names[1]} under {told[1]}: users that are held back wait for "
+            "the cap, not for the robot; measure both under the same [load] max_rate"
         )
 
 
@@ -253,10 +265,19 @@ def _remarks(
             yield f"Only in the {word} result: {', '.join(alone)}."
     before, after = (_failed(series) for series in (old_series, new_series))
     if after > before:
-        yield f"More requests failed: {after:.2%} instead of {before:.2%}. Failed requests are in no figure of time."
+        yield f"More requests failed: {after:.2%} instead of {before:.2%}."
+    yield from _uncounted(old_series, new_series)
     for interface, (was, now) in _knees(old, new).items():
         if was != now:
             yield f"{interface.upper()} held up to {rate(was)} requests/s, and now holds up to {rate(now)}."
+
+
+def _uncounted(
+    old_series: Mapping[tuple[str, str, str], Series], new_series: Mapping[tuple[str, str, str], Series]
+) -> Iterator[str]:
+    for word, series in (("old", old_series), ("new", new_series)):
+        if any(one.data["errors"] and "counted" not in one.data for one in series.values()):
+            yield f"In the {word} result, of an earlier version, failed requests are in no figure of time."
 
 
 def _failed(series: Mapping[tuple[str, str, str], Series]) -> float:

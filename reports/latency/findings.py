@@ -9,8 +9,10 @@ from reports.latency.distributions import Series
 from reports.latency.figures.spans import means
 from reports.latency.figures.timeline import Stall, stalls
 from reports.latency.numbers import interval, ms, rate, ratio, share
+from reports.latency.of_series import cold, repeated
 
 _MANY_FAR = 0.01
+_MISSED = 1  # the exit code of a run whose thresholds are missed, be it because requests failed
 PAPER = {"rest_ms": 1.5, "soap_ms": 2.5, "ratio": 1.67}
 """What the paper reports: mean response times on localhost, and their ratio. It gives no spread and no method."""
 
@@ -33,7 +35,7 @@ class Verdict:
 def verdict(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> Verdict:
     """The verdict on a result as a whole: valid or not first, thresholds next, then what was found."""
     found = headline(result, series) + _modes_in_short(series)
-    if not result["valid"]:
+    if not result["valid"] and not (result.get("exit_code") == _MISSED and result.get("thresholds") and series):
         return Verdict("bad", "✗", "Not valid: these figures say nothing about the robot", found)
     outcomes = [threshold["outcome"] for threshold in result.get("thresholds", [])]
     missed, unsure = outcomes.count("missed"), outcomes.count("inconclusive")
@@ -64,9 +66,13 @@ def headline(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Se
     if leading is None:
         return _alone(series)
     operation, client = leading["operation"], leading["client"]
+    told = result.get("headline")
+    if told is not None:
+        differs = leading["judgement"] in {"differs", "bounded"}
+        return str(told["sentence"]) + (_server_share(series, operation, client) if differs else "")
     where = f"for {operation}, with the {client} client"
     low, high = leading["ci95"]
-    if low <= 1 <= high:
+    if low <= 1 <= high or _within_noise(result, leading):
         return (
             f"No difference between SOAP and REST can be shown at the median {where}: SOAP takes {ratio(low)} to "
             f"{ratio(high)} times as long (95 % interval, estimate {ratio(leading['ratio'])})."
@@ -81,6 +87,8 @@ def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
     """Further findings, a sentence each: noise floor, stalls, knee, failures."""
     return [
         *_noise(result),
+        *cold(series),
+        *repeated(series),
         *_other_ways(result),
         *_followed(result),
         *_stalled(result),
@@ -101,10 +109,22 @@ def _in_short(result: Mapping[str, Any]) -> str:
     leading = _leading(result)
     if leading is None:
         return "Valid measurement"
+    told = result.get("headline")
+    if told is not None:
+        return str(told["words"])
     low, high = leading["ci95"]
-    if low <= 1 <= high:
+    if low <= 1 <= high or _within_noise(result, leading):
         return "No difference between SOAP and REST can be shown"
     return f"SOAP takes {ratio(leading['ratio'])} times as long as REST"
+
+
+def _within_noise(result: Mapping[str, Any], leading: Mapping[str, Any]) -> bool:
+    """Whether an interface differs from itself by as much: asked of files that hold no judgement of their own."""
+    return any(
+        noise["ci95"] and noise["ci95"][0] <= leading["ratio"] <= noise["ci95"][1]
+        for noise in result.get("noise_floor", [])
+        if all(noise[key] == leading[key] for key in ("operation", "client", "quantile"))
+    )
 
 
 def _alone(series: Mapping[tuple[str, str, str], Series]) -> str:
@@ -264,7 +284,12 @@ def _failed(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
     if not errors and not result.get("errors"):
         return ["No request failed."] if any(one.data["count"] for one in series.values()) else []
     answered = sum(one.data["count"] for one in series.values())
-    return [f"{_count(errors, 'request')} of {errors + answered:,} failed; they are in no figure of time."]
+    counted = (
+        "they count as at least their age when they were given up"
+        if all("counted" in one.data for one in series.values())
+        else "they are in no figure of time"
+    )
+    return [f"{_count(errors, 'request')} of {errors + answered:,} failed; {counted}."]
 
 
 def _count(number: int, noun: str) -> str:

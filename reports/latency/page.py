@@ -29,6 +29,14 @@ QUANTILE_WORDS = {
 }
 
 
+JUDGED = {
+    "differs": "a difference",
+    "bounded": "a difference, bound",
+    "noise": "noise; excluded: beyond",
+    "none": "nothing",
+}
+
+
 @dataclass(frozen=True, slots=True)
 class PaperRow:
     """One line of the comparison with the paper: means, because that is what it gives; None where not measured.
@@ -71,6 +79,8 @@ def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         "spans": SPANS,
         "quantiles": QUANTILES,
         "words": QUANTILE_WORDS,
+        "judged": JUDGED,
+        "rounds": _rounds(result),
         "ms": ms,
         "ratio": ratio,
         "rate": rate,
@@ -79,6 +89,21 @@ def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         "dash": NONE,
         "tag": against.tag,
     }
+
+
+def _rounds(result: Mapping[str, Any]) -> list[str]:
+    """What the medians' intervals were drawn from, by operation and client."""
+    told = []
+    for entry in result["comparisons"]:
+        rounds = entry.get("rounds")
+        if entry["quantile"] == "p50" and rounds:
+            before, after = (rounds["autocorrelation"][key] for key in ("pairs", "rounds"))
+            known = "" if before is None or after is None else f", autocorrelation {after:.2f} (of pairs {before:.2f})"
+            told.append(
+                f"{rounds['number']} rounds of {rounds['pairs']} pairs of blocks for {entry['operation']}, "
+                f"{entry['client']}{known}"
+            )
+    return told
 
 
 def paper_rows(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[PaperRow]:

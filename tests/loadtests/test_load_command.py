@@ -91,6 +91,51 @@ def test_a_robot_that_answers_otherwise_gives_no_valid_run(toy, load, fault, opt
     assert kinds <= {entry["kind"] for entry in run.result["errors"]}
 
 
+def test_a_robot_that_hangs_on_its_slowest_requests_misses_a_p99(toy, load, tmp_path):
+    limits = tmp_path / "limits.toml"
+    limits.write_text(
+        '[[threshold]]\noperation="pose"\ninterface="rest"\nquantile="p99"\nbelow_ms=1900\ntime="service"\n'
+    )
+    robot = toy("--hang-every", "80")
+    run = load(
+        "--rest", robot.url, "--client wire --rate 400 --duration 5.5 --warmup 0.2 --timeout 2 --thresholds", limits
+    )
+    result, series = run.result, run.series("pose", "rest")
+    share = series["errors"] / (series["errors"] + series["count"])
+    assert share > 0.009, "one in eighty is never answered"
+    assert series["counted"] == series["count"] + series["errors"] + series["dropped"] >= 1000
+    assert {"p999", "max"} & set(series["at_least"])
+    assert series["service_ms"]["max"] >= 2000, "none of them was answered in 2 s"
+    assert series["failed_histogram"]
+    assert [entry["outcome"] for entry in result["thresholds"]] == ["missed"], result["thresholds"]
+    other = [reason for reason in result["invalid_because"] if "requests failed" not in reason]
+    assert run.code == (4 if other else 1), run.out
+
+
+def test_repeats_begin_with_new_connections_and_a_command(toy, load, tmp_path):
+    mark, command = tmp_path / "restarted", tmp_path / "restart"
+    command.write_text(f"#!/bin/sh\nprintf x >> {mark}\n")
+    command.chmod(0o755)
+    robot = toy()
+    options = ("--rest", robot.url, "--client wire --rate 60 --duration 2 --warmup 0.2 --repeat 2")
+    process, finish = load.begin(*options, "--restart-command", command)
+    run = finish()
+    result = run.result
+    assert mark.read_text() == "x", run.err
+    assert str(tmp_path) not in json.dumps(result)
+    assert result["plan"]["repeats"] == 2
+    assert {block["repeat"] for block in result["blocks"]} == {0, 1}
+    assert [repeat["repeat"] for repeat in run.series("pose", "rest")["repeats"]] == [0, 1]
+    assert max(point["t_s"] for entry in result["time_series"]["series"] for point in entry["points"]) > 3
+    assert result["generator"]["connects"] >= 2
+    assert process.returncode == run.code
+    command.write_text("#!/bin/sh\nexit 3\n")
+    failed = load(*options, "--restart-command", command)
+    assert failed.code == 3
+    assert "exit code 3" in failed.err
+    assert sum(entry["count"] for entry in failed.result["series"]) > 40, "what was measured is kept"
+
+
 def test_a_token_and_a_base_path(toy, load, tmp_path):
     token = tmp_path / "token"
     token.write_text("s3same\n")

@@ -59,8 +59,9 @@ class Robot:
             target = target[len(options.prefix) :]
         if options.redirect:
             return 307, b"", "text/plain"
-        if options.delay:
-            await asyncio.sleep(options.delay)
+        hangs = options.hang_every and not self.count % options.hang_every
+        if hangs or options.delay:
+            await asyncio.sleep(3600 if hangs else options.delay)
         if method == "POST":
             return self.soap(body)
         if target == "/count":
@@ -164,6 +165,7 @@ async def main():
     parser.add_argument("--stall-at", type=float, default=0.0)
     parser.add_argument("--ready-after", type=int, default=20)
     parser.add_argument("--die-after", type=int, default=0)
+    parser.add_argument("--hang-every", type=int, default=0)
     parser.add_argument("--idle", type=float, default=0.0)
     parser.add_argument("--form", default="")
     parser.add_argument("--prefix", default="")

@@ -146,6 +146,15 @@ def test_other_load_cannot_be_compared(latency, key, value, told):
         compared(latency, other)
 
 
+def test_a_closed_model_under_another_cap_cannot_be_compared(latency):
+    old, new = copy.deepcopy(latency), copy.deepcopy(latency)
+    for result, cap in ((old, 500.0), (new, None)):
+        result["plan"] |= {"model": "closed", "rate": None, "users": 4, "limits": {"max_rate": cap}}
+    with pytest.raises(ResultsIncompatibleError, match=r"a cap of 500 requests/s and new\.json under no cap"):
+        compared(old, new)
+    assert compared(old, copy.deepcopy(old)).changes
+
+
 def test_nothing_in_common(latency):
     rest, soap = copy.deepcopy(latency), copy.deepcopy(latency)
     rest["series"] = [s for s in rest["series"] if s["interface"] == "rest"]

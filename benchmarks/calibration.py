@@ -1,0 +1,151 @@
+"""How often `roaas load` claims a difference where there is none, and finds one where there is: calibration and power.
+
+`python benchmarks/calibration.py` prints the table of docs/load.md, `--quick` a rougher one. Most runs are made: the
+schedule of a real plan, with service times that are log-normal about a level which wanders as a first-order
+autoregressive series (lag-1 autocorrelation of the per-second medians about 0.6, as was measured on a shared machine),
+go through the real recorder and the real statistics. Some are real: `roaas load` over HTTP against `noisy_robot.py`.
+"""
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import signal, stats
+
+from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.plan import Load, Plan
+from loadtests.statistics.figures import comparison, noise
+from loadtests.statistics.measured import Measured
+from loadtests.statistics.recorder import Recorder
+
+_HERE = Path(__file__).parent
+_CONTRACT = _HERE.parent / "conformance" / "contract"
+RATE, LEVEL_NS, FAST, DRIFT, MEMORY_S = 200.0, 2_000_000, 0.2, 0.1, 2.0
+_STEP_S = 0.01
+SHIFT = 1.05
+MOST_CLAIMS, LEAST_POWER = 0.05, 0.95
+CLAIMS = frozenset({"differs", "bounded"})
+
+
+def made_run(seed: int, seconds: float, shift: float) -> Measured:
+    """A run of which only the robot's times are made; SOAP's are `shift` times REST's."""
+    load = Load(RATE, None, seconds, 0.0, "constant", seed)
+    plan = Plan(("pose",), ("rest", "soap"), ("wire",), load, timeout_s=10.0, workers=1, connections=32)
+    schedule, recorder = Schedule(plan, 0, 1), Recorder(plan.series_of())
+    lot = np.random.default_rng([seed, 99])
+    kept, before = math.exp(-_STEP_S / MEMORY_S), int(10 * MEMORY_S / _STEP_S)
+    steps = lot.normal(0.0, DRIFT * math.sqrt(1 - kept * kept), before + int(seconds / _STEP_S) + 2)
+    level = signal.lfilter([1.0], [1.0, -kept], steps)[before:]
+    for index, segment in enumerate(plan.segments):
+        factor = shift if segment.interface == "soap" else 1.0
+        for due in schedule.due_ns(index):
+            took = int(LEVEL_NS * factor * math.exp(level[int(due / 1e9 / _STEP_S)] + lot.normal(0.0, FAST)))
+            recorder.record(index, 0, due, due, due, due + took, due + took, -1)
+    recorder.flush()
+    return Measured([plan], recorder)
+
+
+def judged(run: tuple[int, float, float, str]) -> tuple[str, bool, bool]:
+    """Of a made run: the judgement, and whether the intervals of the duel and of A/A leave the truth out."""
+    seed, seconds, shift, quantile = run
+    measured = made_run(seed, seconds, shift)
+    floor = noise(measured, "pose", quantile)
+    entry = comparison(measured, "pose", "wire", quantile, floor)
+    low, high = entry["ci95"]
+    return entry["judgement"], not low <= shift <= high, floor is None or not floor[0] <= 1 <= floor[1]
+
+
+def real_run(seed: int, seconds: float, shift: float) -> str:
+    """The judgement of `roaas load` on a robot whose noise is made."""
+    robot = subprocess.Popen(
+        [sys.executable, _HERE / "noisy_robot.py", str(seed), str(shift)], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        url = f"http://127.0.0.1:{robot.stdout.readline().strip()}" if robot.stdout else ""
+        wsdl = ["--subscribers-wsdl", _CONTRACT / "subscribers.wsdl", "--subscribers-endpoint", f"{url}/subscribers"]
+        with tempfile.TemporaryDirectory() as folder:
+            command = [sys.executable, "-c", "from loadtests.cli import load; load()", "--rest", url, *wsdl]
+            times = ["--client", "wire", "--duration", f"{seconds:g}", "--seed", str(seed), "--out", folder]
+            subprocess.run([*command, *times], check=False, capture_output=True, timeout=seconds + 120)
+            found: dict[str, Any] = json.loads((Path(folder) / "latency.json").read_text())
+    finally:
+        robot.kill()
+        robot.wait()
+    medians = (entry for entry in found["comparisons"] if entry["quantile"] == "p50")
+    return str(next(medians)["judgement"])
+
+
+def share(number: int, runs: int) -> str:
+    """A share with the 95 % interval of its own."""
+    low, high = stats.binomtest(number, runs).proportion_ci(method="wilson")
+    return f"{number} of {runs} = {number / runs:.1%} ({low:.1%} to {high:.1%})"
+
+
+def row(words: str, cell: str, aim: str, *, met: bool) -> bool:
+    """Print a row of the table."""
+    print(f"| {words} | {cell} | {aim} | {'met' if met else 'MISSED'} |", flush=True)
+    return met
+
+
+def made_rows(pool: ProcessPoolExecutor, runs: int) -> list[bool]:
+    """The rows of what is made."""
+    met = []
+    for quantile, seconds in (("p50", 20.0), ("p99", 60.0)):
+        found = list(pool.map(judged, [(seed, seconds, 1.0, quantile) for seed in range(runs)]))
+        said = f"A/A, {quantile}, {seconds:g} s, made"
+        claims = sum(verdict in CLAIMS for verdict, _, _ in found)
+        wrong = sum(left_out for _, left_out, _ in found)
+        met.append(row(f"{said}: claims a difference", share(claims, runs), "at most 5 %", met=_few(claims, runs)))
+        met.append(row(f"{said}: interval without 1", share(wrong, runs), "at most 5 %", met=_few(wrong, runs)))
+    found = list(pool.map(judged, [(seed, 60.0, SHIFT, "p50") for seed in range(1000, 1000 + runs)]))
+    hits = sum(verdict in CLAIMS for verdict, _, _ in found)
+    wrong = sum(left_out for _, left_out, _ in found)
+    said = "5 % planted, p50, 60 s, made"
+    met.append(row(f"{said}: found", share(hits, runs), "at least 95 %", met=hits >= LEAST_POWER * runs))
+    met.append(row(f"{said}: interval without 1.05", share(wrong, runs), "at most 5 %", met=_few(wrong, runs)))
+    return met
+
+
+def _few(number: int, runs: int) -> bool:
+    return number <= MOST_CLAIMS * runs
+
+
+def real_rows(same: int, planted: int) -> list[bool]:
+    """The rows of what is real; so few runs show that the made ones are no fiction, and no more."""
+    alike = [real_run(seed, 12.0, 1.0) for seed in range(same)]
+    other = [real_run(seed, 60.0, SHIFT) for seed in range(100, 100 + planted)]
+    claims, hits = (sum(verdict in CLAIMS for verdict in verdicts) for verdicts in (alike, other))
+    return [
+        row("A/A, p50, 12 s, HTTP: claims a difference", share(claims, same), "at most 1", met=claims <= 1),
+        row("5 % planted, p50, 60 s, HTTP: found", share(hits, planted), "all but 1", met=hits >= planted - 1),
+    ]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table; the exit code is 1 when a target is missed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="a tenth of the runs, and one real one of each kind")
+    parser.add_argument("--runs", type=int, help="made runs of each kind [200]")
+    options = parser.parse_args(arguments)
+    runs = options.runs or (20 if options.quick else 200)
+    began = time.monotonic()
+    print("| what | how often (95 % interval) | aim | |\n|---|---|---|---|")
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        met = made_rows(pool, runs)
+    met += real_rows(1, 1) if options.quick else real_rows(12, 3)
+    print(f"\n{time.monotonic() - began:.0f} s, {os.cpu_count()} processors, load average {os.getloadavg()[0]:.1f}")
+    return 0 if all(met) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+"""What is said of each series by itself: after a pause, and over several repeats."""
+
+from collections.abc import Mapping
+
+from reports.latency.distributions import Series
+from reports.latency.numbers import interval, ms
+
+
+def cold(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+    """What a request costs after a pause, beside one right behind another."""
+    told = []
+    for one in series.values():
+        pause = one.data.get("after_pause")
+        if pause and pause["cold_ms"]["p50"] is not None and pause["warm_ms"]["p50"] is not None:
+            bounds = pause["cold_ci95_ms"]
+            sure = f" (95 % interval {interval(bounds)})" if bounds else ""
+            told.append(
+                f"{one.name}: {ms(pause['cold_ms']['p50'])} ms{sure} after a pause of {pause['pause_s']:g} s, "
+                f"{ms(pause['warm_ms']['p50'])} ms {_behind(pause['spacing_s'])}."
+            )
+    return told
+
+
+def _behind(spacing_s: float) -> str:
+    return f"{ms(spacing_s * 1e3)} ms behind another, which is the limit" if spacing_s else "right behind another"
+
+
+def repeated(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+    """Whether the repeats' own intervals cover what the repeats differ by."""
+    told = []
+    for one in series.values():
+        repeats = [repeat for repeat in one.data.get("repeats", []) if repeat["p50"] and repeat["ci95_ms"]["p50"]]
+        whole = one.data["service_ms"]["p50"]
+        if len(repeats) > 1 and whole:
+            missed = sum(not low <= whole <= high for low, high in (repeat["ci95_ms"]["p50"] for repeat in repeats))
+            medians = [repeat["p50"] for repeat in repeats]
+            told.append(
+                f"{one.name}, {one.data['client']}: medians of {len(repeats)} repeats from {ms(min(medians))} to "
+                f"{ms(max(medians))} ms; the intervals of {missed} of them leave the median of all out."
+            )
+    return told
