@@ -4,6 +4,7 @@ import asyncio
 import threading
 from collections.abc import Awaitable, Callable
 from typing import Any
+from urllib.parse import unquote_to_bytes, urlsplit
 
 from hypercorn.asyncio import serve as serve_asgi
 from hypercorn.config import Config
@@ -28,7 +29,7 @@ def serve(rest_port: int, _soap_port: int) -> tuple[str, str, Callable[[], None]
     config.loglevel = "CRITICAL"
     ended = asyncio.Event()
     loop = asyncio.new_event_loop()
-    application: Any = _application()  # hypercorn's own words for ASGI's types are others than Starlette's
+    application: Any = _OriginForm(_application())  # hypercorn's own words for ASGI's types are others than Starlette's
 
     def run() -> None:
         loop.run_until_complete(serve_asgi(application, config, shutdown_trigger=ended.wait))
@@ -41,6 +42,19 @@ def serve(rest_port: int, _soap_port: int) -> tuple[str, str, Callable[[], None]
         thread.join(5)
 
     return rest, "", stop
+
+
+class _OriginForm:
+    """Takes targets in absolute form, which every server has to (RFC 9112 3.2.2) and hypercorn leaves to its robot."""
+
+    def __init__(self, application: Any) -> None:
+        self._application = application
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        if scope["type"] == "http" and not scope["raw_path"].startswith(b"/"):
+            path = urlsplit(scope["raw_path"]).path or b"/"
+            scope = scope | {"raw_path": path, "path": unquote_to_bytes(path).decode()}
+        await self._application(scope, receive, send)
 
 
 def _application() -> Starlette:
