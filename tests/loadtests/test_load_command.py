@@ -266,7 +266,7 @@ def test_the_knee_is_searched_and_connections_are_added(toy, load):
     robot = toy("--busy", "0.01")  # answers 100 a second and no more
     run = load(
         *robot.both(),
-        "--rate 20 --duration 0.5 --warmup 0.1 --client wire --knee --knee-searches 1 --step-duration 0.4",
+        "--rate 20 --duration 0.5 --warmup 0.1 --client wire --knee --knee-searches 1 --step-duration 0.3",
         "--connections 1,4",
     )
     result = run.result
@@ -278,5 +278,5 @@ def test_the_knee_is_searched_and_connections_are_added(toy, load):
     one, more = ([e for e in result["over_connections"] if e["connections"] == number] for number in (1, 4))
     assert len(one) == len(more) == 2
     assert all(before["p50_ms"] >= 10 for before in one)
-    assert all(after["p50_ms"] > 2 * before["p50_ms"] for before, after in zip(one, more, strict=True))
-    assert all(entry["rate"] < 110 for entry in (*one, *more))
+    assert all(after["p50_ms"] >= 30 for after in more), "four take turns, 10 ms each"
+    assert all(entry["rate"] < 130 for entry in (*one, *more)), "those under way at the end count as well"
