@@ -80,6 +80,7 @@ def test_a_stall_is_seen_by_every_request_that_it_meets(toy, load):
     [
         ("--fault", "", {"fault"}, "out of coffee"),
         ("--redirect", "--interface rest", {"redirect"}, "status 307 to 'http://elsewhere.invalid/robot/pose/'"),
+        ("--redirect", "--interface soap --client zeep", {"redirect"}, "status 307 to 'http://elsewhere.invalid"),
         ("--short", "--client wire", set(), "payloads are not equivalent: pose: "),
     ],
 )
