@@ -3,9 +3,11 @@
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import pytest
+import yaml
 from click.testing import CliRunner
 
 import loadtests.cli
@@ -14,6 +16,7 @@ from conformance.contract.command import CommandResult
 from conformance.contract.exit_codes import ExitCode
 
 EXAMPLE = Path(__file__).parents[2] / "reports" / "data" / "latency-example.json"
+_PAGE = Path(__file__).parents[3] / "docs" / "load.md"
 
 
 @pytest.fixture
@@ -57,6 +60,9 @@ def test_results_are_stored_compared_and_told_as_a_history(load):
     ]
     rows = list(csv.DictReader(io.StringIO((folder / "history.csv").read_text())))
     assert [row["time"] for row in rows] == ["2026-11-01T10:00:00.000Z", "2026-11-02T10:00:00.000Z"]
+    (otava,) = re.findall(r"^```yaml\n(.*?)^```", _PAGE.read_text(), re.MULTILINE | re.DOTALL)
+    (reader,) = yaml.safe_load(otava)["tests"].values()
+    assert {reader["time_column"], *reader["attributes"], *reader["metrics"]} <= set(rows[0])
     assert float(rows[0]["delivery_soap_wire_p50_ms"]) > float(rows[0]["delivery_rest_wire_p50_ms"]) > 0
     page = (folder / "history.html").read_text()
     assert "the last of 2026-11-02" in page
