@@ -93,7 +93,9 @@ def _again_by_rest(request: Request, forward: Forward) -> Response:
         values = {name.decode(): text.decode() for name, text in _COORDINATES.findall(request.body)}
         pairs = "".join(f"/{name}/{values[field]}" for name, field in zip(PATH_NAMES, COORDINATES, strict=True))
         target = f"{DELIVERIES}{COFFEE}{pairs}"
-        later(_LATER_S, forward, Request("rest", "PUT", target, fields=[("Host", "robot"), ("Content-Length", "0")]))
+        later(
+            _LATER_S, forward, Request("rest", "PUT", target, fields=[("Host", "localhost"), ("Content-Length", "0")])
+        )
     return response
 
 

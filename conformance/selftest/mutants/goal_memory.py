@@ -28,7 +28,9 @@ def identity(request: Request) -> str | None:
 def active(forward: Forward, request: Request) -> Any:
     """The robot's goal, or None."""
     response = forward(
-        request.copy(method="GET", target=GOAL, body=b"", fields=[("Host", "robot"), ("Accept", "application/json")])
+        request.copy(
+            method="GET", target=GOAL, body=b"", fields=[("Host", "localhost"), ("Accept", "application/json")]
+        )
     )
     return parsed(response.body) if response.status == 200 else None
 
@@ -103,7 +105,7 @@ class Abandoned:
         """See messages.Change."""
         response = forward(request)
         if _PUT(request) and response.status in {201, 202}:
-            fields = [("Host", "robot"), ("Connection", "close")]
+            fields = [("Host", "localhost"), ("Connection", "close")]
             later(0.4, forward, request.copy(method="DELETE", body=b"", fields=fields))
         return response
 

@@ -26,7 +26,7 @@ _INVALID = {400, 415, 422}
 
 def sent(request: Request, forward: Forward, method: str, target: str, value: Any = None) -> Response:
     """A request of the proxy's own to the robot."""
-    fields = [("Host", "robot"), ("Accept", "application/json")]
+    fields = [("Host", "localhost"), ("Accept", "application/json")]
     body = b"" if value is None else json.dumps(value).encode()
     if body:
         fields.append(("Content-Type", "application/json"))
