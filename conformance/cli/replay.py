@@ -8,10 +8,10 @@ from typing import Any
 
 import click
 
-from conformance.cli.summary import inert
 from conformance.contract.command import CommandResult, ResultCommand
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.files import CONTRACT_VERSION
+from conformance.contract.terminal import inert
 
 _FORMAT = "roaas-result/1"
 _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conformance.contract.exit_codes import ExitCode
+from conformance.contract.terminal import inert
 
 if TYPE_CHECKING:
     from conformance.engine.certification import Certification
@@ -21,7 +22,7 @@ def print_summary(outcome: Certification) -> None:
     document = outcome.document
     if outcome.exit_code == ExitCode.UNREACHABLE:
         reasons = (item["reason"] for item in document["requirements"] if item["verdict"] == "error")
-        click.echo(f"error: {next(reasons, 'the robot could not be reached')}", err=True)
+        click.echo(f"error: {inert(next(reasons, 'the robot could not be reached'))}", err=True)
         click.echo(f"result: {outcome.path}")
         return
     click.echo()
@@ -49,8 +50,3 @@ def _print_finding(requirement: dict[str, Any]) -> None:
         click.echo(f"  found:    {inert(failure['message'])} (seen {failure['seen']}x)")
         if failure["request"]:
             click.echo(f"  replay:   {inert(failure['request']['curl'][:_SHOWN_CURL])}")
-
-
-def inert(text: str) -> str:
-    """Text of a robot without what a terminal would obey."""
-    return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)

@@ -2,12 +2,13 @@
 
 A file's shape is a frozen ``msgspec.Struct`` that forbids unknown fields; msgspec decides what fits. Its messages
 speak of JSON paths and types, so where something does not fit, the message is made here, from the shape and the value:
-file, table, key, offending value, and what is allowed.
+file, table, key, offending value, and what is allowed. What the suite writes into such a file is text, but for strings.
 """
 
 from __future__ import annotations
 
 import datetime as dt
+import json
 import re
 import sys
 import tomllib
@@ -70,6 +71,11 @@ def fit(table: dict[str, Any], shape: type[_Shape], where: str, error: type[Toml
         return msgspec.convert(table, shape, builtin_types=_DATES)
     except msgspec.ValidationError as problem:
         raise error(f"{where}: {_explained(table, shape, str(problem))}") from problem
+
+
+def basic_string(text: str) -> str:
+    """Write a text as TOML's basic string: JSON's escapes are TOML's (TOML 1.0, String), once DEL is escaped too."""
+    return json.dumps(text).replace("\x7f", "\\u007f")
 
 
 def _explained(table: dict[str, Any], shape: type, said: str) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from conformance.contract.classes import CLASSES
 from conformance.contract.interfaces import NEEDS, Interface
+from conformance.contract.toml_file import basic_string
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.transport.exchange import NoAnswerError
@@ -97,8 +98,7 @@ def write_first_statement(path: Path, known: Statement) -> str:
 
 
 def _quoted(text: Any) -> str:
-    """A TOML basic string: JSON's escapes are TOML's (TOML 1.0, String), once DEL is escaped too."""
-    return json.dumps(str(text)[:200], ensure_ascii=True).replace("\x7f", "\\u007f")
+    return basic_string(str(text)[:200])
 
 
 def _openapi(rest: HttpClient) -> dict[str, Any]:

@@ -84,8 +84,8 @@ def result_document(
             "share_of_cases": run.effort.speed.share,
         },
         "command": command,
-        "started": _rfc3339(started),
-        "finished": _rfc3339(finished),
+        "started": rfc3339(started),
+        "finished": rfc3339(finished),
         "duration_s": round((finished - started).total_seconds(), 3),
         "requests": robot.connection.sent,
         "environment": {
@@ -195,7 +195,8 @@ def _body(body: bytes) -> dict[str, Any]:
     return {"body": shown} if len(body) <= _SHOWN_BODY else {"body": shown, "body_length": len(body)}
 
 
-def _rfc3339(moment: dt.datetime) -> str:
+def rfc3339(moment: dt.datetime) -> str:
+    """A time in UTC with its microseconds, as result files have it (RFC 3339 5.6)."""
     return moment.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
 
 

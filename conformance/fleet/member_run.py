@@ -15,7 +15,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from msgspec.structs import asdict
+
 from conformance.contract.exit_codes import ExitCode
+from conformance.contract.toml_file import basic_string
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -228,9 +231,10 @@ async def _first(process: asyncio.subprocess.Process, event: asyncio.Event, most
 
 
 def _statement(member: Member) -> str:
-    """A statement with the addresses that the fleet's file has; a basic string of TOML is written as JSON's."""
-    where = {name: getattr(member.endpoints, name) for name in member.endpoints.__struct_fields__}
+    """A statement with the addresses that the fleet's file has."""
     endpoints = [
-        f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in where.items() if value is not None
+        f"{key} = {basic_string(value) if isinstance(value, str) else value}"
+        for key, value in asdict(member.endpoints).items()
+        if value is not None
     ]
-    return "\n".join(["[robot]", f"name = {json.dumps(member.name)}", "", "[endpoints]", *endpoints, ""])
+    return "\n".join(["[robot]", f"name = {basic_string(member.name)}", "", "[endpoints]", *endpoints, ""])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from conformance.contract.atomic_write import write_atomically
 from conformance.contract.classes import CLASS_TITLES, CLASSES
 from conformance.contract.exit_codes import ExitCode
+from conformance.engine.result import rfc3339
 from conformance.engine.suite import suite_version
 from conformance.fleet.member_run import EXIT_CODES, MemberResult
 
@@ -48,8 +49,8 @@ def fleet_document(
     return {
         "format": FLEET_FORMAT,
         "suite": {"version": suite_version()},
-        "started": _rfc3339(started),
-        "finished": _rfc3339(finished),
+        "started": rfc3339(started),
+        "finished": rfc3339(finished),
         "duration_s": round((finished - started).total_seconds(), 3),
         "parallel": parallel,
         "interrupted": interrupted,
@@ -93,7 +94,3 @@ def _robot(result: MemberResult) -> dict[str, Any]:
             "accepted_until": document.get("accepted_until"),
         }
     return told
-
-
-def _rfc3339(moment: dt.datetime) -> str:
-    return moment.strftime("%Y-%m-%dT%H:%M:%S.%fZ")

@@ -8,6 +8,7 @@ import signal
 import time
 from typing import TYPE_CHECKING, TextIO
 
+from conformance.contract.terminal import inert
 from conformance.fleet.member_run import MemberResult, MemberRun, Outcome, Stop
 
 if TYPE_CHECKING:
@@ -98,7 +99,6 @@ class FleetRun:
     def _tell(self, text: str) -> None:
         if self._out is not None:
             spent = time.monotonic() - self._started
-            # What a robot's run said last is foreign text: nothing of it is obeyed by a terminal.
-            shown = "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
-            self._out.write(f"[{spent:5.1f} s] {self._done}/{len(self._runs)} judged | {shown}\n")
+            # What a robot's run said last is foreign text.
+            self._out.write(f"[{spent:5.1f} s] {self._done}/{len(self._runs)} judged | {inert(text)}\n")
             self._out.flush()
