@@ -149,13 +149,11 @@ def _requirement_set(run: Run, policy: Policy, known: Known) -> Point:
 
 
 def _when(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
-    try:
-        finished = dt.datetime.fromisoformat(run.finished)
-        age = now - finished
-    except (ValueError, TypeError):
+    if run.ended is None:
         yield Point("max_age_days", met=False, found=f"{run.finished[:40]!r} is no time in UTC")
     else:
-        told = f"the run ended on {finished:%Y-%m-%d %H:%M} UTC"
+        age = now - run.ended
+        told = f"the run ended on {run.ended:%Y-%m-%d %H:%M} UTC"
         days = f", {age.days} days ago" if age.days > 0 else ""
         yield Point("max_age_days", -_SKEW <= age <= dt.timedelta(days=policy.max_age_days), told + days)
     if policy.nonce is None:

@@ -6,6 +6,7 @@ would have to call such a run one of the three. What a relying party asks beyond
 extension field `roaas` (a consumer ignores what it does not know: in-toto attestation, parsing rules).
 """
 
+import datetime as dt
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -100,6 +101,15 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     started: str
     finished: str
     outcomes: dict[str, dict[str, list[str]]] = {}
+
+    @property
+    def ended(self) -> dt.datetime | None:
+        """`finished` as a time; None where it is none in UTC."""
+        try:
+            moment = dt.datetime.fromisoformat(self.finished)
+        except ValueError:
+            return None
+        return moment if moment.utcoffset() == dt.timedelta() else None
 
 
 class Verifier(msgspec.Struct, frozen=True):

@@ -1,14 +1,15 @@
 """What a registry may still say of each robot: of its certificates the latest counts, where the policy lets it."""
 
 import datetime as dt
-import hashlib
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from reports.attestation.policy import Known, Policy, judge
-from reports.attestation.statement import passed
+import msgspec
+
+from reports.attestation.policy import Known, Point, Policy, judge
+from reports.attestation.statement import passed, sha256
 from reports.registry.entries import Certificate
 
 SUPERSEDED = "superseded"
@@ -82,7 +83,8 @@ class History:
     def page(self) -> str:
         """File name of its page: letters of its name for the reader, and a digest so that no two robots share one."""
         letters = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-")[:40].rstrip("-")
-        digest = hashlib.sha256(f"{self.vendor}\0{self.name}".encode()).hexdigest()[:12]
+        robot = self.current.certificate.run.robot
+        digest = sha256(msgspec.json.encode((robot.vendor or "", robot.name or "")))[:12]
         return f"{letters or 'robot'}-{digest}.html"
 
     @property
@@ -106,7 +108,7 @@ def histories(certificates: Iterable[Certificate], policy: Policy, known: Known,
         by_robot[robot.name or "", robot.vendor or ""].append(certificate)
     found = []
     for _, group in sorted(by_robot.items()):
-        latest_first = sorted(group, key=lambda one: (_finished(one) or _LONG_AGO, one.digest), reverse=True)
+        latest_first = sorted(group, key=lambda one: (one.run.ended or _LONG_AGO, one.digest), reverse=True)
         found.append(
             History(tuple(_standing(one, policy, known, now, first=not at) for at, one in enumerate(latest_first)))
         )
@@ -118,10 +120,17 @@ def _standing(certificate: Certificate, policy: Policy, known: Known, now: dt.da
     counted = [point for point in unmet if point.name in _WORDS]
     return Standing(
         certificate,
-        (*_own(certificate, first=first), *(_WORDS[point.name] for point in counted)),
+        (*_own(certificate, first=first), *(_word(point, certificate, now) for point in counted)),
         tuple(point.found for point in counted),
-        _after(_finished(certificate), policy.max_age_days),
+        _after(certificate.run.ended, policy.max_age_days),
     )
+
+
+def _word(point: Point, certificate: Certificate, now: dt.datetime) -> str:
+    ended = certificate.run.ended
+    if point.name != "max_age_days" or (ended is not None and ended <= now):
+        return _WORDS[point.name]
+    return "not dated in UTC" if ended is None else "dated in the future"
 
 
 def _own(certificate: Certificate, *, first: bool) -> Iterator[str]:
@@ -137,12 +146,3 @@ def _after(finished: dt.datetime | None, days: float) -> dt.datetime | None:
         return finished + dt.timedelta(days=days) if finished else None
     except OverflowError:
         return None
-
-
-def _finished(certificate: Certificate) -> dt.datetime | None:
-    """When the run ended, or None where that is no time in UTC."""
-    try:
-        finished = dt.datetime.fromisoformat(certificate.run.finished)
-    except ValueError:
-        return None
-    return finished if finished.tzinfo else None

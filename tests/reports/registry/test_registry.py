@@ -4,6 +4,7 @@ import base64
 import json
 import re
 
+import msgspec
 import pytest
 from click.testing import CliRunner
 from lxml import html
@@ -63,7 +64,7 @@ def test_a_robot_has_a_row_and_a_page(host):
 
 NOT_GREEN = [
     ({"days_ago": 366}, "expired"),
-    ({"days_ago": -1}, "expired"),
+    ({"days_ago": -1}, "dated in the future"),
     ({"requirement_set": None}, "another requirement set"),
     ({"requirement_set": {"name": "1.1", "digest": "sha256:" + "8" * 64}}, "another requirement set"),
     ({"requirement_set": {"name": "1.2", "digest": "sha256:" + "7" * 64}}, "another requirement set"),
@@ -177,17 +178,26 @@ def test_no_secret_of_a_result_reaches_the_site(host, make_requirement):
         assert not any(secret.encode() in payload for payload in signed)
 
 
-def test_an_envelope_that_holds_what_is_not_known_is_not_handed_on(host, monkeypatch):
-    encode = "reports.attestation.signature.msgspec.json.encode"
-    original = __import__("msgspec").json.encode
-
-    def with_more(value):
-        octets = original(value)
-        return octets.replace(b'"roaas":{', b'"roaas":{"target":"10.20.30.40",') if b'"roaas":{' in octets else octets
-
-    monkeypatch.setattr(encode, with_more)
+def sign_another_text(host, monkeypatch, pattern, instead):
+    """Sign what this suite would never write: what a pattern finds in the statement is replaced."""
+    encode = msgspec.json.encode
+    monkeypatch.setattr(
+        "reports.attestation.signature.msgspec.json.encode", lambda value: re.sub(pattern, instead, encode(value))
+    )
     host.sign("one")
     monkeypatch.undo()
+
+
+def test_a_time_of_another_zone_lengthens_no_life(host, monkeypatch):
+    sign_another_text(host, monkeypatch, rb'"finished":"([^"]+)Z"', rb'"finished":"\1-12:00"')
+    host.build()
+    assert index(host)["Courier 7"][0] == "not dated in UTC"
+    assert greens(host.site) == []
+    assert "data-until" not in (host.site / "index.html").read_text().partition("<tbody>")[2].partition("</tbody>")[0]
+
+
+def test_an_envelope_that_holds_what_is_not_known_is_not_handed_on(host, monkeypatch):
+    sign_another_text(host, monkeypatch, rb'"roaas":{', rb'"roaas":{"target":"10.20.30.40",')
     assert host.build().exit_code == 0
     assert index(host)["Courier 7"][0] == "conformant"
     assert list((host.site / "envelopes").glob("*")) == []
@@ -206,13 +216,15 @@ def test_hostile_names_are_shown_and_do_nothing(host, hostile_text):
     ]
     for number, name in enumerate(names):
         host.sign(str(number), statement__robot={"name": name, "vendor": name, "version": name})
+    host.sign("none", statement__robot={})
+    host.sign("like none", statement__robot={"name": "Unnamed robot"})
     host.build()
     pages = list(host.site.rglob("*"))
     assert {path.parent for path in pages if path.is_file()} == {
         host.site, host.site / "robots", host.site / "envelopes",
     }  # fmt: skip
     robots = list((host.site / "robots").iterdir())
-    assert len(robots) == len(names)
+    assert len(robots) == len(names) + 2
     assert all(re.fullmatch(r"[a-z0-9-]+-[0-9a-f]{12}\.html", path.name) for path in robots)
     for path in (host.site / "index.html", *robots):
         page = page_of(path)
