@@ -18,6 +18,9 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
+from click.testing import CliRunner
+
+from reference_robot.cli import robot
 
 _PATIENCE = 20.0  # seconds
 
@@ -126,6 +129,13 @@ class ForeignRobot(RosProcess):
 
 def ros_environment() -> dict[str, str]:
     return os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+def usage_error(*options: str) -> str:
+    """Run the command in this process, as far as the first error; return what it says."""
+    done = CliRunner().invoke(robot, ["--attach", "--rest-port=0", "--soap-port=0", *options])
+    assert done.exit_code == 2, done.output
+    return " ".join(done.output.split())
 
 
 @contextmanager
