@@ -51,6 +51,7 @@ class Admission:
         holds where a browser, or something between, forgets to ask.
         """
         origin = request.headers[b"origin"]
-        if origin.partition(b"://")[2].lower() != request.authority.lower() and origin not in self._origins:
+        asked_by = origin.partition(b"://")[2].lower()  # nothing, where the origin is null
+        if not (asked_by and asked_by == request.authority.lower()) and origin not in self._origins:
             told = origin.decode("latin-1")[:_SHOWN]
             raise Problem(403, f"a page of {told!a} may not command this robot; --public-url names the robot's own")
