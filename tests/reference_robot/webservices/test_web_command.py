@@ -87,11 +87,8 @@ def test_a_missing_package_is_named_with_its_remedy(package):
 def test_a_port_in_use_and_an_address_that_is_not_ours_are_named():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        for named, options in {
-            str(port): [f"--soap-port={port}"],
-            "192.0.2.1": ["--host=192.0.2.1", "--insecure"],
-        }.items():
-            command = [*COMMAND, "--attach", *options]
+        for named, option in ((str(port), f"--soap-port={port}"), ("192.0.2.1", "--host=192.0.2.1")):
+            command = [*COMMAND, "--attach", "--insecure", option]
             done = subprocess.run(
                 command, capture_output=True, text=True, env=ros_environment(), timeout=60, check=False
             )
