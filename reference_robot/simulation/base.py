@@ -12,13 +12,14 @@ from rclpy.qos import QoSProfile
 from reference_robot.names import RosNames
 from reference_robot.simulation.frames import FramePublisher
 from reference_robot.simulation.kinematics import Accelerations, Motion, advance
-from reference_robot.simulation.messages import quaternion_of
+from reference_robot.simulation.odometry import OdometryOctets
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE
 from reference_robot.simulation.realism import Delayed, Realism
 
 HOLD_S: Final = 1.0  # a setpoint is good for this long, by the wall clock whatever the time scale
 _PERIOD_S: Final = 0.02  # 50 Hz of simulated time
 _SHORTEST_PERIOD_S: Final = 0.004  # of real time: a time scale beyond 5 makes the steps longer instead
+_NANOSECONDS: Final = 10**9
 _LONGEST_STEP_S: Final = 0.1  # of simulated time: a robot whose process was held up does not jump ahead
 
 # Variances (m², rad²) of x, y and yaw as a wheeled base with encoders has them; the rest cannot move.
@@ -51,11 +52,11 @@ class Base:
         self._setpoint = (0.0, 0.0)
         self._commanded_at = -math.inf
         self._moved_at = self._reported_at = time.monotonic()
-        # One message for all: publishing copies it out.
-        self._odometry = Odometry(child_frame_id=names.frames.base)
-        self._odometry.header.frame_id = names.frames.odom
-        self._odometry.pose.covariance = _POSE_COVARIANCE
-        self._odometry.twist.covariance = _TWIST_COVARIANCE
+        odometry = Odometry(child_frame_id=names.frames.base)
+        odometry.header.frame_id = names.frames.odom
+        odometry.pose.covariance = _POSE_COVARIANCE
+        odometry.twist.covariance = _TWIST_COVARIANCE
+        self._odometry = OdometryOctets(odometry)
         self._publisher = node.create_publisher(Odometry, names.topics.odom, 10)
         self._frames = FramePublisher(node, names)
         newest = QoSProfile(depth=1)
@@ -99,12 +100,6 @@ class Base:
             self._report(self._realism.noisy(self._belief))
 
     def _report(self, motion: Motion) -> None:
-        odometry = self._odometry
-        odometry.header.stamp = self._clock.now().to_msg()
-        position = odometry.pose.pose.position
-        position.x, position.y = motion.x, motion.y
-        odometry.pose.pose.orientation = quaternion_of(motion.yaw)
-        odometry.twist.twist.linear.x = motion.linear
-        odometry.twist.twist.angular.z = motion.angular
-        self._publisher.publish(odometry)
-        self._frames.tell(odometry)
+        stamp = divmod(self._clock.now().nanoseconds, _NANOSECONDS)
+        self._publisher.publish(self._odometry.filled(stamp, motion))
+        self._frames.tell(stamp, motion)

@@ -7,12 +7,13 @@ from typing import Final
 
 import numpy as np
 from geometry_msgs.msg import TransformStamped
-from nav_msgs.msg import OccupancyGrid, Odometry
+from nav_msgs.msg import OccupancyGrid
 from rclpy.node import Node
 from tf2_msgs.msg import TFMessage
 
 from reference_robot.names import RosNames
-from reference_robot.simulation.messages import LATCHED
+from reference_robot.simulation.kinematics import Motion
+from reference_robot.simulation.messages import LATCHED, quaternion_of
 from reference_robot.simulation.office import OFFICE
 
 _RESOLUTION_M: Final = 0.05
@@ -25,7 +26,8 @@ class FramePublisher:
     """Publishes the transform of the base at 10 Hz, and once, latched, that map and odometry coincide."""
 
     def __init__(self, node: Node, names: RosNames) -> None:
-        self._base = TransformStamped()
+        self._base = TransformStamped(child_frame_id=names.frames.base)
+        self._base.header.frame_id = names.frames.odom
         self._message = TFMessage(transforms=[self._base])
         self._told_at = -math.inf
         self._moving = node.create_publisher(TFMessage, names.topics.tf, _TRANSFORMS)
@@ -35,16 +37,16 @@ class FramePublisher:
         identity.header.frame_id = names.frames.map
         self._static.publish(TFMessage(transforms=[identity]))
 
-    def tell(self, odometry: Odometry) -> None:
-        """Publish the odometry's pose as a transform, unless the last one is that young."""
+    def tell(self, stamp: tuple[int, int], motion: Motion) -> None:
+        """Publish where the body is at a time (seconds, nanoseconds), unless the last transform is that young."""
         now = time.monotonic()
         if now - self._told_at < _PERIOD_S:
             return
         self._told_at = now
-        base, pose = self._base, odometry.pose.pose
-        base.header, base.child_frame_id = odometry.header, odometry.child_frame_id
-        base.transform.translation.x, base.transform.translation.y = pose.position.x, pose.position.y
-        base.transform.rotation = pose.orientation
+        base = self._base
+        base.header.stamp.sec, base.header.stamp.nanosec = stamp
+        base.transform.translation.x, base.transform.translation.y = motion.x, motion.y
+        base.transform.rotation = quaternion_of(motion.yaw)
         self._moving.publish(self._message)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message
 
 from reference_robot.names import RosNames
 from reference_robot.simulation.messages import PoseError, yaw_of
@@ -13,14 +14,16 @@ from reference_robot.simulation.planner import Pose
 class Localisation:
     """The robot's last known pose in the map frame, with which the odometry frame coincides.
 
+    Odometry comes as octets, and is read when somebody asks: nobody does while the robot has nothing to do.
+
     Attributes:
-        on_update: Called with the pose after each odometry message.
+        on_update: Called after each odometry message.
     """
 
     def __init__(self, node: Node, names: RosNames) -> None:
-        self.on_update: Callable[[Pose], None] | None = None
-        self._pose: Pose | None = None
-        node.create_subscription(Odometry, names.topics.odom, self._take, 1)
+        self.on_update: Callable[[], None] | None = None
+        self._octets = b""
+        node.create_subscription(Odometry, names.topics.odom, self._take, 1, raw=True)
 
     def pose(self) -> Pose:
         """Return x, y (m) and yaw (rad).
@@ -28,12 +31,12 @@ class Localisation:
         Raises:
             PoseError: No odometry has come yet.
         """
-        if self._pose is None:
+        if not self._octets:
             raise PoseError("the robot does not know yet where it is")
-        return self._pose
+        pose = deserialize_message(self._octets, Odometry).pose.pose
+        return pose.position.x, pose.position.y, yaw_of(pose.orientation)
 
-    def _take(self, odometry: Odometry) -> None:
-        pose = odometry.pose.pose
-        self._pose = (pose.position.x, pose.position.y, yaw_of(pose.orientation))
+    def _take(self, octets: bytes) -> None:
+        self._octets = octets
         if self.on_update is not None:
-            self.on_update(self._pose)
+            self.on_update()

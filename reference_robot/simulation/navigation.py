@@ -118,7 +118,7 @@ class Navigation:
         handle.execute()
         self._tell_current_goal()
 
-    def _step(self, pose: Pose) -> None:
+    def _step(self) -> None:
         """Control once; runs after each odometry message."""
         drive = self._drive
         if drive is None:
@@ -129,6 +129,7 @@ class Navigation:
                 self._tell_current_goal()
             self._end(drive, drive.handle.canceled)
             return
+        pose = self._localisation.pose()
         command = drive.pursuit.command(*pose)
         if command.arrived:
             self._end(drive, drive.handle.succeed)

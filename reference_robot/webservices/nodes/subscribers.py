@@ -31,7 +31,8 @@ class RobotSubscribersNode:
     loop's thread reads. What a message means is worked out by whoever is asked for it.
 
     Attributes:
-        odometry: The odometry received last, None before the first; and when it was received, by ``time.monotonic``.
+        odometry: The octets of the odometry received last, to be read by whoever asks, None before the first; and when
+            they were received, by ``time.monotonic``.
         mission_reports: The JSON of what changed in the missions (see ``names.toml``), oldest first, to be taken off.
         goals: The goals of the robot's navigation, whoever sent them.
         map_transform: Where the odometry frame lies in the map.
@@ -44,14 +45,14 @@ class RobotSubscribersNode:
         self.node = ros.create_node("robot_subscribers")
         self._ros = ros
         self._namespace = self.node.get_namespace().rstrip("/") + "/"  # several robots may be on one graph
-        self.odometry: tuple[Odometry | None, float] = (None, 0.0)
+        self.odometry: tuple[bytes | None, float] = (None, 0.0)
         self.mission_reports: deque[str] = deque(maxlen=_MISSION_REPORTS)
         self.current_goal: str | None = None
         self.last_rejection = ""
         self.goals = GoalStatuses(self.node, names.actions.navigate_to_pose)
         self.map_transform = MapTransform(self.node, names)
         topics = names.topics
-        self.node.create_subscription(Odometry, topics.odom, self._keep_odometry, qos_profile_sensor_data)
+        self.node.create_subscription(Odometry, topics.odom, self._keep_odometry, qos_profile_sensor_data, raw=True)
         self.node.create_subscription(
             String, topics.missions, lambda report: self.mission_reports.append(report.data), _MISSIONS_QOS
         )
@@ -61,8 +62,8 @@ class RobotSubscribersNode:
         self._planner_service = self.node.create_client(GetPlan, names.services.get_plan)
         self._planner_action = ActionClient(self.node, ComputePathToPose, names.actions.compute_path_to_pose)
 
-    def _keep_odometry(self, message: Odometry) -> None:
-        self.odometry = message, monotonic()
+    def _keep_odometry(self, octets: bytes) -> None:
+        self.odometry = octets, monotonic()
 
     def _keep_text(self, attribute: str, message: String) -> None:
         setattr(self, attribute, message.data)

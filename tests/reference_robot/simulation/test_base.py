@@ -103,3 +103,12 @@ def test_the_sensors_report_what_is_there(robot):
     assert seen[Imu].linear_acceleration.z == pytest.approx(9.81)
     assert 0.9 < seen[BatteryState].percentage <= 1.0
     assert {message.header.frame_id for message in seen.values()} == {"base_link"}
+
+
+def test_a_sensor_measures_for_whoever_listens_and_again_for_the_next(robot):
+    seen = []
+    for _ in range(2):
+        listener = robot.node.create_subscription(Imu, "imu", seen.append, qos_profile_sensor_data)
+        until(lambda: len(seen) > 2)
+        robot.node.destroy_subscription(listener)
+        seen.clear()

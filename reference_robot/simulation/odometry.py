@@ -1,0 +1,42 @@
+"""Odometry messages as the octets that ROS sends, of which only the numbers change from one to the next.
+
+rclpy turns a message into octets field by field, the 72 covariances one by one: 9 µs, where filling in the 15 numbers
+that change takes 1. A base that stands still has little else to do, 50 times a second.
+"""
+
+import math
+import struct
+from typing import Final
+
+from nav_msgs.msg import Odometry
+from rclpy.serialization import serialize_message
+
+from reference_robot.simulation.kinematics import Motion
+
+# CDR (OMG DDS-RTPS 2.3, 10): four octets of encapsulation, of which the second's last bit says little endian; then the
+# stamp, two strings of any length, and doubles to the end: pose and 36 covariances, twist and 36 covariances.
+_STAMP_AT: Final = 4
+_LITTLE_ENDIAN: Final = 1
+_POSE: Final = "7d"  # x, y, z; x, y, z, w
+_TWIST: Final = "6d"  # x, y, z; x, y, z
+_COVARIANCE: Final = 36 * 8  # octets
+
+
+class OdometryOctets:
+    """A nav_msgs/Odometry; ``message`` is what it has of frames and covariances."""
+
+    def __init__(self, message: Odometry) -> None:
+        self._octets = bytearray(serialize_message(message))
+        order = "<" if self._octets[1] & _LITTLE_ENDIAN else ">"
+        self._stamp, self._pose, self._twist = (struct.Struct(order + form) for form in ("iI", _POSE, _TWIST))
+        self._twist_at = len(self._octets) - _COVARIANCE - self._twist.size
+        self._pose_at = self._twist_at - _COVARIANCE - self._pose.size
+
+    def filled(self, stamp: tuple[int, int], motion: Motion) -> bytes:
+        """Return the message of a stamp (seconds, nanoseconds) and a motion."""
+        octets, half = self._octets, motion.yaw / 2
+        self._stamp.pack_into(octets, _STAMP_AT, *stamp)
+        turn = (0.0, 0.0, math.sin(half), math.cos(half))
+        self._pose.pack_into(octets, self._pose_at, motion.x, motion.y, 0.0, *turn)
+        self._twist.pack_into(octets, self._twist_at, motion.linear, 0.0, 0.0, 0.0, 0.0, motion.angular)
+        return bytes(octets)
