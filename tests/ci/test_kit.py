@@ -208,6 +208,7 @@ def test_what_others_wrote_is_pinned():
         ["shellcheck", "certify.sh"],
         ["hadolint", "../deploy/container/Containerfile.suite"],
         ["hadolint", "../deploy/container/Containerfile.robot"],
+        ["hadolint", "../deploy/kubernetes/Dockerfile"],
     ],
     ids=lambda command: f"{command[0]} {command[-1]}",
 )
