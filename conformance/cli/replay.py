@@ -27,7 +27,11 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="The robot's statement: let the requirements' own checks judge again, in place of sending what was recorded.",
 )
-@click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="Holds the bearer token to send.")
+@click.option(
+    "--token-file",
+    type=click.Path(exists=True, dir_okay=False),
+    help="Holds the bearer token to send, to the addresses that RESULT has.",
+)
 @click.option("--ca-file", type=click.Path(exists=True, dir_okay=False), help="Authorities to trust for HTTPS.")
 @click.option(
     "--timeout",
