@@ -16,6 +16,7 @@ from lxml import etree
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from robot import DELIVERY, ENVELOPE
 
+from reference_robot.deliveries import DeliveryRequest
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 from reference_robot.webservices.http.admission import Admission
@@ -117,7 +118,7 @@ async def main() -> None:
         ros.start()
         await asyncio.to_thread(found, node)
         stages = put_stages() | post_stages()
-        message = DeliveryRequestMsg(message_code=4)
+        message = DeliveryRequest(4, *[0.0] * 6)
         stages["publish: rclpy and Fast DDS"] = lambda: node.publish_delivery(message)
         rest, soap = map(connection, interfaces(node))
         stages["PUT, published"] = lambda: rest.data_received(PUT)

@@ -10,7 +10,7 @@
 
 The context is the runtime's own and installs no signal handlers: those belong to the program. Set
 ``ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`` in the environment before, where a robot is to be seen on
-this machine only.
+this machine only. Where the environment names no profiles of Fast DDS, those in ``fastdds.xml`` are used.
 """
 
 import os
@@ -18,6 +18,7 @@ import threading
 import time
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
@@ -39,6 +40,10 @@ except ImportError:  # a Jazzy from before its backport
 # Measured with 50 Hz odometry, two action servers and a dozen subscriptions in one process:
 # EventsExecutor 2.2 % of a core, SingleThreadedExecutor, which builds its wait set anew for every
 # message, 6 %.
+
+# Read once in a process, when its first participant is made; a user's own file counts instead.
+_FAST_DDS_PROFILES: Final = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_OUR_PROFILES: Final = Path(__file__).with_name("fastdds.xml")
 
 _IDLE_WAKE_S: Final = 0.5
 _CLOSING_S: Final = 8.0  # for the executors and their threads together
@@ -67,6 +72,7 @@ class RosRuntime:
         if not 0 <= domain <= _HIGHEST_DOMAIN_ID:
             raise ValueError(f"a ROS domain id is 0 to {_HIGHEST_DOMAIN_ID}, not {domain}")
         self.domain_id = domain
+        os.environ.setdefault(_FAST_DDS_PROFILES, str(_OUR_PROFILES))
         self.context = Context()
         try:
             rclpy.init(

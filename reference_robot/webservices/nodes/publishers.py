@@ -14,6 +14,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.task import Future
 from unique_identifier_msgs.msg import UUID
 
+from reference_robot.deliveries import DeliveryRequest
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 
@@ -52,12 +53,12 @@ class RobotPublishersNode:
         """Tell whether anybody on the graph takes delivery requests."""
         return bool(self._delivery.get_subscription_count())
 
-    def publish_delivery(self, request: DeliveryRequestMsg) -> bool:
+    def publish_delivery(self, request: DeliveryRequest) -> bool:
         """Publish one delivery request; return False, with nothing published, while readers cannot keep up."""
         now = monotonic()
         if now < self._behind_until:
             return False
-        if _published(self._delivery, request):
+        if _published(self._delivery, request.octets()):
             return True
         self._behind_until = now + _RECOVERY
         return False
@@ -126,7 +127,7 @@ class RobotPublishersNode:
 
 
 def _published(publisher: Any, message: Any) -> bool:
-    """Publish; return False where the middleware could not take the message within its own deadline."""
+    """Publish a message, or its octets; return False where the middleware could not take it within its own deadline."""
     try:
         publisher.publish(message)
     except rclpy_c.RCLError:

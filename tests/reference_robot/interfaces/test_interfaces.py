@@ -75,8 +75,10 @@ def test_delivery_requests_reach_another_process_bit_for_bit(domain_id):
         while not publisher.get_subscription_count():
             assert time.monotonic() < deadline
             time.sleep(0.01)
-        for code, doubles in sent:
-            publisher.publish(DeliveryRequestMsg(message_code=code, **dict(zip(COORDINATES, doubles, strict=True))))
+        for number, (code, doubles) in enumerate(sent):
+            fields = dict(zip(COORDINATES, doubles, strict=True))
+            message = DeliveryRequestMsg(message_code=code, **fields)
+            publisher.publish(message if number % 2 else DeliveryRequest(code, *doubles).octets())
         received, _ = listener.communicate(timeout=90)
     assert received.split() == [struct.pack(">i6d", code, *doubles).hex() for code, doubles in sent]
 
