@@ -45,8 +45,8 @@ if [[ -n ${ROAAS_STATEMENT:-} ]]; then options+=(-- "$ROAAS_STATEMENT"); fi
 
 # What an earlier run left is not taken for this one's.
 mkdir -p -- "$out"
-rm -f -- "$out"/{result.json,certificate.html,certificate.md,junit.xml,roaas.sarif,ctrf-report.json}
-rm -f -- "$out"/{gl-code-quality-report.json,badge.json,annotations.txt}
+rm -f -- "$out"/{result.json,certificate.{html,md,intoto.json},certificate-print.html,junit.xml}
+rm -f -- "$out"/{roaas.sarif,ctrf-report.json,gl-code-quality-report.json,badge.json,annotations.txt}
 
 private=$(mktemp -d)
 trap 'rm -rf -- "$private"' EXIT

@@ -14,7 +14,8 @@ from urllib.parse import quote
 
 from reports.certificate.page import certificate
 from reports.formats.cases import Case, Outcome, cases, worst_first
-from reports.formats.places import Place, page_of, places_of
+from reports.formats.places import Place, places_of
+from reports.formats.source_pages import page_of
 from reports.pages.untrusted import excerpt, visible
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"

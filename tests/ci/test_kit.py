@@ -19,6 +19,7 @@ import yaml
 from conformance.selftest.mutants import MUTANTS
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import running
+from reports.attestation.envelope import ENVELOPE_NAME
 from reports.formats.catalogue import FORMATS
 
 CI = Path(__file__).parents[2] / "ci"
@@ -156,11 +157,11 @@ def test_a_robot_that_is_absent_or_hangs_or_could_not_be_judged_is_red(programs,
 def test_wrong_usage_is_red_and_no_old_result_is_taken_for_new(programs, absent, tmp_path):
     out = tmp_path / "roaas-results"
     out.mkdir()
-    for name in FILES:
+    for name in {*FILES, ENVELOPE_NAME}:
         (out / name).write_text("of an earlier run", encoding="utf-8")
     done = on_github(programs, tmp_path, rest=absent, statement="$(touch injected).toml")
     assert done.returncode == 2
-    assert not (FILES & {path.name for path in out.iterdir()})
+    assert list(out.iterdir()) == []
     assert not (tmp_path / "injected").exists()
     assert "exit code 2" in (tmp_path / "summary").read_text(encoding="utf-8")
     assert on_github(programs, tmp_path, rest=absent, **{"allow-motion": "yes"}).returncode == 2

