@@ -71,18 +71,42 @@ _BROWSER_OPTIONS = (
     "--disable-component-update --disable-sync --allow-file-access-from-files --window-size=1400,1000 "
     "--virtual-time-budget=20000 --dump-dom"
 )
+_WIDTHS = (1280, 390)
+_WRAPPER = """<!doctype html><meta charset="utf-8"><title>wrapper</title><body><pre id="out"></pre><script>
+"use strict";
+const measure = MEASURE;
+const found = {};
+for (const frame of FRAMES) {
+  const element = document.createElement("iframe");
+  element.style = `border: 0; height: 900px; width: ${frame.width}px`;
+  element.src = frame.url;
+  element.addEventListener("load", () => {
+    found[`${frame.name} ${frame.width}`] = measure(element.contentDocument, element.contentWindow);
+    if (Object.keys(found).length === FRAMES.length) document.getElementById("out").textContent = JSON.stringify(found);
+  });
+  document.body.append(element);
+}
+</script>"""
 
 
 @pytest.fixture(scope="session")
-def browse() -> Callable[[Path, str], dict[str, Any]]:
-    """Return what shows a wrapper page in a folder, and takes the JSON that its script leaves in `#out`."""
+def browse() -> Callable[[Path, dict[str, str], str], dict[str, Any]]:
+    """Return what shows pages, by name, in a folder, each on a desk's and a phone's width.
+
+    A function of JavaScript that takes a page and its window measures; what it returns is at `NAME WIDTH`.
+    """
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
         pytest.fail("this test needs a browser: install Debian's package `chromium` (apt-get install chromium)")
 
-    def show(folder: Path, page: str) -> dict[str, Any]:
+    def show(folder: Path, pages: dict[str, str], measure: str) -> dict[str, Any]:
+        frames = []
+        for name, text in pages.items():
+            page = folder / f"{name}.html"
+            page.write_text(text, encoding="utf-8")
+            frames += [{"name": name, "width": width, "url": page.as_uri()} for width in _WIDTHS]
         wrapper = folder / "wrapper.html"
-        wrapper.write_text(page, encoding="utf-8")
+        wrapper.write_text(_WRAPPER.replace("FRAMES", json.dumps(frames)).replace("MEASURE", measure), encoding="utf-8")
         profile = f"--user-data-dir={folder / 'profile'}"
         done = subprocess.run(
             [browser, *_BROWSER_OPTIONS.split(), profile, wrapper.as_uri()],

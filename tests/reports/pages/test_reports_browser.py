@@ -16,54 +16,36 @@ from reports.latency.page import latency_html
 DATA = Path(__file__).parents[1] / "data"
 WIDTHS = (1280, 390)
 PAGES = ("certificate", "latency", "compare")
-MEASURE = """<!doctype html><meta charset="utf-8"><title>wrapper</title><body><pre id="out"></pre><script>
-"use strict";
-const found = {};
-for (const frame of FRAMES) {
-  const element = document.createElement("iframe");
-  element.style = `border: 0; height: 900px; width: ${frame.width}px`;
-  element.src = frame.url;
-  element.addEventListener("load", () => {
-    const page = element.contentDocument, view = element.contentWindow;
-    const box = (node) => { const b = node.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; };
-    found[`${frame.name} ${frame.width}`] = {
-      width: page.documentElement.scrollWidth,
-      text: page.body.innerText.length,
-      verdict: box(page.querySelector("#verdict")),
-      drawings: Array.from(page.querySelectorAll("figure svg"), (svg) => ({
-        name: svg.id, box: box(svg),
-        marks: svg.querySelectorAll("path, use").length,
-        words: Array.from(svg.querySelectorAll("text"), (node) => box(node)),
-        within: Array.from(svg.querySelectorAll("text"), (node) => {
-          const inner = node.getBoundingClientRect(), outer = svg.getBoundingClientRect();
-          return inner.left >= outer.left - 2 && inner.right <= outer.right + 2 && inner.bottom <= outer.bottom + 2;
-        }),
-      })),
-      figures: page.querySelectorAll("figure").length,
-      buttons: page.querySelectorAll("button").length,
-      loaded: view.performance.getEntriesByType("resource").map((entry) => entry.name),
-    };
-    if (Object.keys(found).length === FRAMES.length) document.getElementById("out").textContent = JSON.stringify(found);
-  });
-  document.body.append(element);
-}
-</script>"""
+MEASURE = """(page, view) => {
+  const box = (node) => { const b = node.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; };
+  return {
+    width: page.documentElement.scrollWidth,
+    text: page.body.innerText.length,
+    verdict: box(page.querySelector("#verdict")),
+    drawings: Array.from(page.querySelectorAll("figure svg"), (svg) => ({
+      name: svg.id, box: box(svg),
+      marks: svg.querySelectorAll("path, use").length,
+      words: Array.from(svg.querySelectorAll("text"), (node) => box(node)),
+      within: Array.from(svg.querySelectorAll("text"), (node) => {
+        const inner = node.getBoundingClientRect(), outer = svg.getBoundingClientRect();
+        return inner.left >= outer.left - 2 && inner.right <= outer.right + 2 && inner.bottom <= outer.bottom + 2;
+      }),
+    })),
+    figures: page.querySelectorAll("figure").length,
+    buttons: page.querySelectorAll("button").length,
+    loaded: view.performance.getEntriesByType("resource").map((entry) => entry.name),
+  };
+}"""
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory, browse):
     """Show every page at every width, once, and return what was measured."""
-    folder = tmp_path_factory.mktemp("pages")
     result = json.loads((DATA / "result-example.json").read_text(encoding="utf-8"))
     latency = json.loads((DATA / "latency-example.json").read_text(encoding="utf-8"))
-    (folder / "certificate.html").write_text(certificate_html(result), encoding="utf-8")
-    (folder / "latency.html").write_text(latency_html(latency), encoding="utf-8")
     both = compare(latency, latency, ("old", "new"), 0.05)
-    (folder / "compare.html").write_text(comparison_html(both, ("old", "new")), encoding="utf-8")
-    frames = [
-        {"name": name, "width": width, "url": (folder / f"{name}.html").as_uri()} for name in PAGES for width in WIDTHS
-    ]
-    return browse(folder, MEASURE.replace("FRAMES", json.dumps(frames)))
+    pages = certificate_html(result), latency_html(latency), comparison_html(both, ("old", "new"))
+    return browse(tmp_path_factory.mktemp("pages"), dict(zip(PAGES, pages, strict=True)), MEASURE)
 
 
 EACH = pytest.mark.parametrize("page", [f"{name} {width}" for name in PAGES for width in WIDTHS])

@@ -1,6 +1,5 @@
 """The pages of who may do what in a browser, from files alone: wide and narrow, filtered, and read years later."""
 
-import json
 import re
 
 from reports.certificate.difference import difference
@@ -8,39 +7,27 @@ from reports.certificate.difference_page import difference_html
 from reports.fleet.page import fleet_html
 
 WIDTHS = (1280, 390)
-MEASURE = """<!doctype html><meta charset="utf-8"><title>wrapper</title><body><pre id="out"></pre><script>
-"use strict";
-const found = {};
-for (const frame of FRAMES) {
-  const element = document.createElement("iframe");
-  element.style = `border: 0; height: 900px; width: ${frame.width}px`;
-  element.src = frame.url;
-  element.addEventListener("load", () => {
-    const page = element.contentDocument;
-    const all = (what) => Array.from(page.querySelectorAll(what));
-    const shown = () => all("tr[data-found]").filter((row) => row.getClientRects().length).length;
-    const seen = {
-      width: page.documentElement.scrollWidth,
-      right: Math.max(0, ...all("td.mark").map((cell) => cell.getBoundingClientRect().right)),
-      rows: shown(),
-      green: all(".good").filter((one) => !one.closest(".small.tally")).length,
-      loaded: element.contentWindow.performance.getEntriesByType("resource").length,
-    };
-    const radio = page.getElementById("may-0");
-    if (radio) { radio.click(); seen.filtered = shown(); }
-    const box = page.querySelector("input[type=search]");
-    if (box) {
-      page.getElementById("may-all").click();
-      box.value = "courier 7";
-      box.dispatchEvent(new Event("input"));
-      seen.searched = shown();
-    }
-    found[`${frame.name} ${frame.width}`] = seen;
-    if (Object.keys(found).length === FRAMES.length) document.getElementById("out").textContent = JSON.stringify(found);
-  });
-  document.body.append(element);
-}
-</script>"""
+MEASURE = """(page, view) => {
+  const all = (what) => Array.from(page.querySelectorAll(what));
+  const shown = () => all("tr[data-found]").filter((row) => row.getClientRects().length).length;
+  const seen = {
+    width: page.documentElement.scrollWidth,
+    right: Math.max(0, ...all("td.mark").map((cell) => cell.getBoundingClientRect().right)),
+    rows: shown(),
+    green: all(".good").filter((one) => !one.closest(".small.tally")).length,
+    loaded: view.performance.getEntriesByType("resource").length,
+  };
+  const radio = page.getElementById("may-0");
+  if (radio) { radio.click(); seen.filtered = shown(); }
+  const box = page.querySelector("input[type=search]");
+  if (box) {
+    page.getElementById("may-all").click();
+    box.value = "courier 7";
+    box.dispatchEvent(new Event("input"));
+    seen.searched = shown();
+  }
+  return seen;
+}"""
 
 
 def test_the_pages_fit_a_desk_and_a_phone_and_can_be_filtered(host, fleet, browse, make_requirement):
@@ -63,14 +50,7 @@ def test_the_pages_fit_a_desk_and_a_phone_and_can_be_filtered(host, fleet, brows
         "index later": re.sub(r'data-until="[^"]+"', 'data-until="2026-01-01T00:00:00Z"', index),
         "robot later": re.sub(r'data-until="[^"]+"', 'data-until="2026-01-01T00:00:00Z"', robot.read_text()),
     }
-    for name, text in pages.items():
-        (host.site / f"{name}.html").write_text(text)
-    frames = [
-        {"name": name, "width": width, "url": (host.site / f"{name}.html").as_uri()}
-        for name in pages
-        for width in WIDTHS
-    ]
-    seen = browse(host.site, MEASURE.replace("FRAMES", json.dumps(frames)))
+    seen = browse(host.site, pages, MEASURE)
     for page, found in seen.items():
         assert found["width"] <= int(page.split()[-1]), f"{page} hangs over the edge"
         assert found["right"] <= int(page.split()[-1]), f"{page}: classes are out of sight"
