@@ -10,6 +10,7 @@ too, single figures say little.
 
 import argparse
 import json
+import math
 import os
 import re
 import resource
@@ -138,15 +139,15 @@ def one_connection(url: str, seconds: float, rounds: int) -> bool:
 
 
 def open_model(url: str, seconds: float, rounds: int) -> bool:
-    """Rate and lag of one worker."""
+    """Rate and lag of one worker, which sleeps between requests at low rates and hardly at high ones."""
     met = True
-    for rate in (4000, 6000):
+    for rate in (50, 200, 500, 4000, 6000):
         found = [roaas(url, seconds, "--rate", str(rate)) for _ in range(rounds)]
         runs = [document["generator"] for document in found if document["generator"]["completed"]]
         if not runs:
             print(f"open model, {rate}/s: no run: {found[0]['invalid_because']}")
             return False
-        lags = [run["lag_ms"]["p99"] for run in runs]
+        lags = [run["lag_ms"]["p99"] or math.nan for run in runs]  # null below 1,000 requests
         median = statistics.median(run["lag_ms"]["p50"] for run in runs)
         achieved = statistics.median(run["achieved_rate"] for run in runs)
         good = achieved >= 0.99 * rate and min(lags) < 0.3  # noqa: PLR2004 -- best round: others use the machine

@@ -43,7 +43,8 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     generator = _generator(outcome, measured)
     pacing = executor.pacing if executor else ""
     comparisons = figures.comparisons(measured)
-    reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing)
+    machine, spoilt = conditions(outcome.before, Moment.now())
+    reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing, spoilt)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
     undecided = [] if aborted or reasons else verdict.failures(generator) + verdict.says_nothing(comparisons)
     workers, losses = _workers(outcome, plan)
@@ -52,7 +53,6 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     compared = _against(outcome, measured, noise_floor)
     code = _code(outcome, aborted, Reasons(reasons, undecided), judged, compared)
     reasons += undecided
-    machine, spoilt = conditions(outcome.before, Moment.now())
     words = _plan_words(settings, plan, pacing)
     document = {
         "format": FORMAT,

@@ -51,6 +51,7 @@ def generator_figures(measured: Measured, asked: int, active_s: float, cpu_share
         "lag_ms": plain_quantiles(lag),
         "lag_limits_ms": _lag_limits(service),
         "queued_by_generator": queued,
+        "real_time": recorder.counters.get("real time", 0) > 0,
         "asked_rate": rounded(asked / active_s) if plan.open_model and active_s > 0 else None,
         "achieved_rate": rounded(started / active_s) if active_s > 0 else None,
         "scheduled": asked if plan.open_model else started,
@@ -89,8 +90,13 @@ def _lag_limits(service: Histogram) -> dict[str, float | None]:
     }
 
 
-def invalid_because(figures: dict[str, Any], plan: Plan, pacing: str) -> tuple[list[str], list[str]]:
-    """Reasons why the figures say nothing about the robot; and notes on what is merely worth knowing."""
+def invalid_because(
+    figures: dict[str, Any], plan: Plan, pacing: str, spoilt: Sequence[str]
+) -> tuple[list[str], list[str]]:
+    """Reasons why the figures say nothing about the robot; and notes on what is merely worth knowing.
+
+    `spoilt` are remarks on the generator's machine: what may have made it late.
+    """
     reasons: list[str] = []
     notes: list[str] = []
     if not figures["completed"]:
@@ -103,7 +109,7 @@ def invalid_because(figures: dict[str, Any], plan: Plan, pacing: str) -> tuple[l
         )
     if plan.open_model:
         # Two robots are compared by their service times, which begin at the actual start: lag meets both alike.
-        (notes if plan.robots > 1 else reasons).extend(_late(figures, pacing))
+        (notes if plan.robots > 1 else reasons).extend(_late(figures, pacing, spoilt))
         if figures["scheduled"] and figures["started"] + figures["dropped"] < LEAST_ACHIEVED * figures["scheduled"]:
             share = (figures["started"] + figures["dropped"]) / figures["scheduled"]
             reasons.append(
@@ -120,13 +126,15 @@ def invalid_because(figures: dict[str, Any], plan: Plan, pacing: str) -> tuple[l
     return reasons, notes
 
 
-def _late(figures: dict[str, Any], pacing: str) -> list[str]:
+def _late(figures: dict[str, Any], pacing: str, spoilt: Sequence[str]) -> list[str]:
     lag, limits = figures["lag_ms"], figures["lag_limits_ms"]
     missed = [name for name, limit in limits.items() if limit is not None and (lag[name] or 0.0) > limit]
     if not missed:
         return []
     told = " and ".join(f"{lag[name]:.3f} ms ({name}, at most {limits[name]:.3f} ms)" for name in missed)
-    return [f"requests started {told} after their time: the generator's machine is overloaded ({pacing})"]
+    causes = list(spoilt) or ["the generator's machine is overloaded"]
+    help_ = "" if figures["real_time"] else "; CAP_SYS_NICE would let the generator go before what else runs there"
+    return [f"requests started {told} after their time ({pacing}): {'; '.join(causes)}{help_}"]
 
 
 def failures(figures: dict[str, Any]) -> list[str]:

@@ -1,13 +1,17 @@
+import time
 from collections import Counter
 from dataclasses import replace
 from itertools import pairwise
 
 import gevent
 import pytest
+from gevent.event import Event
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loadtests.clients.wire import now_ns
+from loadtests.measuring.priority import first_in_line
+from loadtests.schedule.alarm import make_alarm
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Pacer
 from loadtests.schedule.plan import CLIENTS, Load, Plan
@@ -159,13 +163,35 @@ def paced(plan, users, work=0.0, timeout_ns=10**10):
 
 def test_arrivals_are_started_at_their_times_and_never_before():
     plan = varied(rate=500.0, duration_s=1.0, warmup_s=0.0, clients=("wire",))
-    taken, dropped, origin = paced(plan, 20)
+    with first_in_line(wanted=True):
+        taken, dropped, origin = paced(plan, 20)
     wanted = everything(plan)
     assert not dropped
     assert sorted((a.segment, a.due_ns - origin, a.operation, a.payload) for a, _ in taken) == sorted(wanted)
     lags = sorted(at - arrival.due_ns for arrival, at in taken)
     assert lags[0] >= 0
     assert lags[len(lags) // 2] < 1_000_000, "half of them within a millisecond, even on a busy machine"
+
+
+def test_an_alarm_never_rings_early_and_stays_awake_for_a_small_part_of_the_time():
+    left, early, waited = 60, [], Event()
+
+    def ring():
+        nonlocal left, due
+        early.append(now_ns() < due)
+        left -= 1
+        due += 5_000_000
+        alarm.set(due) if left else waited.set()
+
+    alarm, began, due = make_alarm(ring), time.process_time(), now_ns() + 5_000_000
+    alarm.set(due)
+    with gevent.Timeout(10):
+        waited.wait()
+    alarm.set(now_ns() + 20_000)
+    alarm.close()
+    gevent.sleep(0.01)
+    assert early == [False] * 60
+    assert time.process_time() - began < 0.3 / 4
 
 
 def test_arrivals_wait_for_a_user_when_all_are_busy_and_are_dropped_after_their_deadline():

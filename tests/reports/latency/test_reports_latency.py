@@ -140,7 +140,7 @@ def test_run_without_an_answer(latency):
 
 
 def test_no_series_at_all(latency):
-    latency.update(series=[], comparisons=[], valid=False, invalid_because=["the robot was gone"], time_series=None)
+    latency.update(series=[], comparisons=[], valid=False, exit_code=4, invalid_because=["the robot was gone"])
     del latency["time_series"]
     shown = text(page(latency))
     assert "✗ Not valid" in shown
@@ -148,7 +148,7 @@ def test_no_series_at_all(latency):
 
 
 def test_invalid_run_says_so_first(latency):
-    latency.update(valid=False, invalid_because=["generator CPU at 97 %"])
+    latency.update(valid=False, exit_code=4, invalid_because=["generator CPU at 97 %"])
     found = verdict(latency, all_series(latency, "x"))
     assert (found.tone, found.words) == ("bad", "Not valid: these figures say nothing about the robot")
 
