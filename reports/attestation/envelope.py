@@ -46,14 +46,15 @@ class Opened(NamedTuple):
 
 
 def read_envelope(path: Path) -> bytes:
-    """Read an envelope's file.
+    """Read an envelope's file, of one that is too large no more than shows it.
 
     Raises:
         ResultMissingError: there is none.
         ResultUnreadableError: it cannot be read.
     """
     try:
-        return path.read_bytes()
+        with path.open("rb") as file:
+            return file.read(_MOST_OCTETS + 1)
     except FileNotFoundError as error:
         raise ResultMissingError(f"{path}: there is no such file") from error
     except OSError as error:
@@ -67,7 +68,7 @@ def open_envelope(octets: bytes) -> Opened:
         EnvelopeRefusedError: it is not as `signature.seal` makes it.
     """
     if len(octets) > _MOST_OCTETS:
-        raise EnvelopeRefusedError(f"it is no certificate: it has {len(octets)} octets")
+        raise EnvelopeRefusedError(f"it is no certificate: it has more than {_MOST_OCTETS} octets")
     try:
         envelope = msgspec.json.decode(octets, type=_Envelope)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

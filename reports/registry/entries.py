@@ -71,7 +71,8 @@ def find_envelopes(places: Iterable[Path]) -> list[Path]:
     """
     found: dict[Path, None] = {}
     for place in places:
-        inside = sorted(place.rglob(ENVELOPE_NAME)) if place.is_dir() else [place]
+        # What others put into a folder may be a pipe, or a device that never ends.
+        inside = sorted(filter(Path.is_file, place.rglob(ENVELOPE_NAME))) if place.is_dir() else [place]
         if not inside:
             raise ResultMissingError(f"{place}: there is no {ENVELOPE_NAME} in it")
         found |= dict.fromkeys(inside)

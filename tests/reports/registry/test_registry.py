@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import re
 
 import msgspec
@@ -9,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 from lxml import html
 
+from reports.attestation.envelope import ENVELOPE_NAME
 from reports.cli.registry import registry
 
 
@@ -298,6 +300,20 @@ def test_what_cannot_be_read_is_told(host, keys, sent, named):
     assert done.exit_code == 2
     assert named in done.stderr
     assert not host.site.exists()
+
+
+def test_what_is_no_file_keeps_nobody_waiting(host):
+    host.sign("one")
+    for name in ("pipe", "folder", "device", "large"):
+        (host.folder / "sent" / name).mkdir()
+    os.mkfifo(host.folder / "sent" / "pipe" / ENVELOPE_NAME)
+    (host.folder / "sent" / "folder" / ENVELOPE_NAME).mkdir()
+    (host.folder / "sent" / "device" / ENVELOPE_NAME).symlink_to("/dev/zero")
+    with (host.folder / "sent" / "large" / ENVELOPE_NAME).open("wb") as large:
+        large.truncate(1 << 40)
+    done = host.build()
+    assert done.exit_code == 1
+    assert done.stdout.startswith("1 of 1 robots have a certificate that counts, 1 refused")
 
 
 def test_a_private_key_among_the_keys_is_left_alone(host):
