@@ -167,23 +167,28 @@ def test_wrong_usage_is_red_and_no_old_result_is_taken_for_new(programs, absent,
     assert on_github(programs, tmp_path, rest=absent, **{"allow-motion": "yes"}).returncode == 2
 
 
+def text_of(image):
+    return (CI.parent / "deploy" / "container" / f"Containerfile.{image}").read_text(encoding="utf-8")
+
+
 def test_the_images_commands_do_what_they_are_for(programs, domain_id):
-    folder = CI.parent / "deploy" / "container"
     said = {
         name: [
             word
-            for found in re.findall(r"^(?:ENTRYPOINT|CMD) (\[.*\])$", text, re.MULTILINE)
+            for found in re.findall(r"^(?:ENTRYPOINT|CMD) (\[.*\])$", text_of(name), re.MULTILINE)
             for word in json.loads(found)
         ]
         for name in ("suite", "robot")
-        for text in [(folder / f"Containerfile.{name}").read_text(encoding="utf-8")]
     }
     environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "ROS_DOMAIN_ID": str(domain_id)}
     assert bash(" ".join(said["suite"]), environment, programs).returncode == 0
     command = [*said["robot"], "--rest-port=0", "--soap-port=0"]
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as robot:
         try:
-            assert robot.stdout.readline().startswith("ready rest=http://0.0.0.0:")
+            ready = re.match(r"ready rest=http://0\.0\.0\.0:(\d+) ", robot.stdout.readline())
+            (check,) = re.findall(r"^ +(\[\"python\".*\])$", text_of("robot"), re.MULTILINE)
+            _, *words = json.loads(check.replace("7003", ready[1]))
+            assert subprocess.run([sys.executable, *words], timeout=10, check=False).returncode == 0
         finally:
             robot.terminate()
 
