@@ -30,8 +30,8 @@ def report(directory: Path, formats: tuple[str, ...]) -> None:
     """Write the pages that belong to the result files in DIR again.
 
     result.json gives certificate.html, certificate.md and junit.xml; latency.json gives latency.html and
-    latency.md. With --format: that file alone, for a CI system or a code host. Exit code 2 where DIR holds no result
-    file, or an unreadable one.
+    latency.md; fleet.json gives fleet.html and fleet.md. With --format: that file alone, for a CI system or a code
+    host. Exit code 2 where DIR holds no result file, or an unreadable one.
     """
     try:
         written = render_formats(directory, formats) if formats else render(directory)

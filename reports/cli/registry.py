@@ -72,7 +72,7 @@ def build(door: FrontDoor, envelopes: tuple[Path, ...], keys: Path, policy: Path
     for one in refused:
         click.echo(f"refused: {excerpt(one.detail, 400)}", err=True)
     counting = sum(history.current.stands for history in found)
-    click.echo(f"{counting} of {len(found)} robots have a certificate that counts, {len(refused)} refused")
+    click.echo(f"{counting} of {len(found)} robots with a certificate that counts, {len(refused)} refused")
     click.echo(f"site: {out / INDEX}")
     if refused:
         raise SystemExit(EXIT_REFUSED)

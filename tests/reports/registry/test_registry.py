@@ -47,7 +47,7 @@ def test_a_robot_has_a_row_and_a_page(host):
     done = host.build()
     assert (done.exit_code, done.stdout.splitlines()[0]) == (
         0,
-        "1 of 1 robots have a certificate that counts, 0 refused",
+        "1 of 1 robots with a certificate that counts, 0 refused",
     )
     assert index(host) == {"Courier 7": ("conformant", {"http": "good", "safety": "good", "describe": "quiet"})}
     row = page_of(host.site / "index.html").xpath("//tbody/tr")[0]
@@ -313,7 +313,7 @@ def test_what_is_no_file_keeps_nobody_waiting(host):
         large.truncate(1 << 40)
     done = host.build()
     assert done.exit_code == 1
-    assert done.stdout.startswith("1 of 1 robots have a certificate that counts, 1 refused")
+    assert done.stdout.startswith("1 of 1 robots with a certificate that counts, 1 refused")
 
 
 def test_a_private_key_among_the_keys_is_left_alone(host):
