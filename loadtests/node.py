@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 
-from loadtests.cli import load
+from loadtests.cli import DEFAULT_OUT, load
 
 PORT = 5557
 LINGER_S = 600.0
@@ -42,7 +42,8 @@ def _work(words: list[str]) -> None:
     token = Path(token_file).read_text("utf-8").strip() if token_file else None
     from loadtests.measuring.worker import serve  # noqa: PLC0415 -- imports Locust, which patches the process
 
-    serve(host, int(_value(words, "--master-port") or PORT), [token, token])  # one for both robots of --against
+    tokens = [token, token]  # one for both robots of --against
+    serve(host, int(_value(words, "--master-port") or PORT), tokens, Path(_value(words, "--out") or DEFAULT_OUT))
 
 
 def _value(words: list[str], option: str) -> str | None:

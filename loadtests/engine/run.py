@@ -214,7 +214,8 @@ class Run:
     def _executor(self) -> Executor:
         generator = self.settings.generator
         if generator.expect:
-            return DistributedExecutor(generator, tell, lambda: self.outcome.interrupted)
+            folder = self.settings.output.folder
+            return DistributedExecutor(generator, folder, tell, lambda: self.outcome.interrupted)
         return LocalExecutor()
 
     @staticmethod

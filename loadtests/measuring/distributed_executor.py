@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import gevent
 from locust.exception import RPCError
-from locust.runners import STATE_MISSING
+from locust.runners import STATE_MISSING, STATE_RUNNING, MasterRunner
 
 from loadtests.clients.library import LIBRARY
+from loadtests.measuring.clocks import Clocks, WorkerClock, clock_id
 from loadtests.measuring.errors import GeneratorError
-from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, boot_id, new_environment, now_ns
+from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, new_environment, now_ns
+from loadtests.schedule.arrivals import Schedule
 from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:
@@ -31,20 +33,36 @@ _READY_S = 60.0
 _GRACE_S = 15.0
 
 
+class _Master(MasterRunner):
+    """Deals the users out once.
+
+    Locust would do so anew whenever a worker comes, in mid-run: users of the others would be killed with the requests
+    that they had under way, which nobody would count.
+    """
+
+    def start(self, *args: Any, **kwargs: Any) -> None:
+        """Have the workers' users come up, unless they are."""
+        if self.state != STATE_RUNNING:
+            super().start(*args, **kwargs)
+
+
 class DistributedExecutor:
     """Workers led by a Locust master.
 
     Args:
         generator: where the master listens; how many workers to start here, and how many to wait for in all.
+        folder: where workers of this machine leave what they recorded, should the master die.
         tell: says how things stand, for the terminal.
         stopped: whether somebody wants an end; asked while waiting for workers.
     """
 
-    def __init__(self, generator: Generator, tell: Callable[[str], None], stopped: Callable[[], bool]) -> None:
+    def __init__(
+        self, generator: Generator, folder: str, tell: Callable[[str], None], stopped: Callable[[], bool]
+    ) -> None:
         host, port = generator.master_host, generator.master_port
         self.environment = new_environment()
         try:
-            self.runner = self.environment.create_master_runner(host, port)
+            self.runner = self.environment.runner = _Master(self.environment, host, port)
         except (SystemExit, RPCError) as error:
             raise GeneratorError(
                 f"the master cannot listen on {host}:{port}: choose another --master-port ({error})"
@@ -55,6 +73,7 @@ class DistributedExecutor:
         self.tell = tell
         self.stopped = stopped
         self._host, self._port = host, self.runner.server.port if port == 0 else port
+        self._folder = folder
         self._processes = generator.processes
         self._expected = max(generator.expect, generator.processes)
         self._children: dict[int, subprocess.Popen[bytes]] = {}
@@ -62,10 +81,12 @@ class DistributedExecutor:
         self._listening: set[str] = set()
         self._refusals: list[str] = []
         self._prepared = 0
+        self._dealt_out = False
         self._began = 0
         self.runner.register_message("roaas_listening", self._on_listening)
         self.runner.register_message("roaas_ready", self._on_ready)
         self.runner.register_message("roaas_done", self._on_done)
+        self._clocks = Clocks(self.runner)
         self.environment.events.worker_report.add_listener(self._on_report)
 
     def prepare(self, robots: Sequence[Robot], plan: Plan) -> None:
@@ -81,7 +102,8 @@ class DistributedExecutor:
             )
             self._children[child.pid] = child
             if child.stdin is not None:
-                child.stdin.write(json.dumps({"tokens": [robot.token for robot in robots]}).encode() + b"\n")
+                told = {"tokens": [robot.token for robot in robots], "folder": self._folder}
+                child.stdin.write(json.dumps(told).encode() + b"\n")
                 child.stdin.close()
         if self._expected > self._processes:
             self.tell(
@@ -95,6 +117,7 @@ class DistributedExecutor:
             "seed": plan.load.seed,
             "library": LIBRARY in plan.clients,
         }
+        self._dealt_out = True
         self.runner.send_message("roaas_prepare", job)
         self._wait(lambda: self._prepared >= self._expected or bool(self._refusals), "workers are ready")
         if self._refusals:
@@ -119,8 +142,21 @@ class DistributedExecutor:
         return node is not None and node.state != STATE_MISSING
 
     def _on_listening(self, environment: Any, msg: Any) -> None:
+        """A worker is there: one of those that are awaited, or one that comes when all has been dealt out."""
         del environment
-        self._listening.add(msg.node_id)
+        if not self._dealt_out:
+            self._listening.add(msg.node_id)
+            return
+        late = max(0.0, (now_ns() - self._began) / _NS) if self._began else 0.0
+        member = self._new_member(msg.data, state="late", joined_at_s=late)
+        self.tell(f"worker {member.id} ({member.host}) came {late:.1f} s into the run, too late to take part")
+        self.runner.send_message("roaas_late", None, msg.node_id)
+
+    def _new_member(self, told: dict[str, Any], **known: Any) -> Member:
+        """Number a worker, which told of itself."""
+        member = Member(str(len(self.members) + 1), host=told["host"], pid=told["pid"], **known)
+        self.members.append(member)
+        return member
 
     def _on_ready(self, environment: Any, msg: Any) -> None:
         del environment
@@ -129,9 +165,8 @@ class DistributedExecutor:
             return
         self._prepared += 1
         self.pacing = msg.data["pacing"]
-        member = Member(str(len(self.members) + 1), host=msg.data["host"], pid=msg.data["pid"])
-        self.members.append(member)
-        self._by_client[msg.node_id] = member
+        clock = WorkerClock(shared=bool(clock_id()) and msg.data["clock"] == clock_id())
+        self._by_client[msg.node_id] = self._new_member(msg.data, clock=clock)
 
     def _on_report(self, client_id: str, data: dict[str, Any]) -> None:
         report, member = data.get("roaas"), self._by_client.get(client_id)
@@ -159,44 +194,60 @@ class DistributedExecutor:
         if not present:
             return
         plan = replace(plan, workers=len(present))
-        origin = now_ns() + int(LEAD_S * _NS)
-        self._began = self._began or origin
-        self._send_off(present, plan, origin, ceiling)
+        self._read_clocks()
+        origin = self._send_off(present, plan, ceiling)
         deadline = plan.length_s + 2 * plan.timeout_s + _GRACE_S
         stopped = False
         while any(not member.done for _, member in present):
             gevent.sleep(0.05)
             elapsed = (now_ns() - origin) / _NS
-            self._look_for_lost(present, overdue=elapsed > deadline)
+            self._look_for_lost(present, plan, overdue=elapsed > deadline)
             if not stopped and watch(elapsed):
                 stopped = True
                 deadline = elapsed + 2 * plan.timeout_s + _GRACE_S
                 for client, member in present:
                     if member.state != "lost":
                         self.runner.send_message("roaas_stop", None, client)
+        self._read_clocks()
 
-    def _send_off(self, present: list[tuple[str, Member]], plan: Plan, origin: int, ceiling: float | None) -> None:
+    def _read_clocks(self) -> None:
+        """Read the clocks of all workers that are there, while nobody sends requests."""
+        there = [client for client, member in self._by_client.items() if member.state != "lost"]
+        for client, reading in self._clocks.read(filter(self._is_there, there)).items():
+            clock = self._by_client[client].clock
+            if clock is not None:
+                clock.add(reading)
+
+    def _send_off(self, present: list[tuple[str, Member]], plan: Plan, ceiling: float | None) -> int:
+        """Tell workers to begin; returns when, in ns of this clock."""
+        clocks = [member.clock for _, member in present if member.clock is not None]
+        lead_ns = int(LEAD_S * _NS) + 4 * max((clock.uncertainty_ns for clock in clocks), default=0)
+        origin = now_ns() + lead_ns
+        self._began = self._began or origin
         for number, (client, member) in enumerate(present):
-            member.done = False
+            member.done, member.accounted = False, 0
             job = {
                 "plan": plan.as_message(),
                 "worker": number,
-                "boot": boot_id(),
-                "origin_ns": origin,
-                "lead_s": LEAD_S,
+                "origin_ns": member.clock.of_master(origin) if member.clock is not None else None,
+                "lead_ns": lead_ns,
                 "ceiling": ceiling / len(present) if ceiling else None,
             }
             self.runner.send_message("roaas_begin", job, client)
+        return origin
 
-    def _look_for_lost(self, present: list[tuple[str, Member]], *, overdue: bool) -> None:
+    def _look_for_lost(self, present: list[tuple[str, Member]], plan: Plan, *, overdue: bool) -> None:
         """Give up members whose process has ended, whose heartbeat has stopped, or that are overdue."""
-        for client, member in present:
+        for number, (client, member) in enumerate(present):
             if member.done:
                 continue
             child = self._children.get(member.pid)
             ended = child is not None and child.poll() is not None
             if overdue or ended or not self._is_there(client):
                 member.state, member.done, member.lost_at_s = "lost", True, (now_ns() - self._began) / _NS
+                if plan.open_model:
+                    schedule = Schedule(plan, number, len(present))
+                    member.share = sum(schedule.share(index) for index in range(schedule.count()))
                 self.tell(f"worker {member.id} ({member.host}) was lost {member.lost_at_s:.1f} s into the run")
 
     def close(self) -> None:

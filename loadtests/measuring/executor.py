@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gevent
@@ -18,6 +17,7 @@ from locust.env import Environment
 from locust.event import Events
 
 from loadtests.clients.library import LIBRARY
+from loadtests.measuring.clocks import WorkerClock
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.user_session import Session
 from loadtests.statistics.recorder import Recorder
@@ -48,7 +48,10 @@ class Member:
     """A process of the executor, as the result tells of it.
 
     Attributes:
-        accounted: arrivals of its share that its reports speak of.
+        state: `finished`, `lost`, or `late`: come when the schedule had been dealt out.
+        accounted: arrivals of the plan under way that its reports speak of.
+        share: arrivals of the plan in which it was lost; None while it is not, and in the closed model.
+        clock: None in the master's own process.
     """
 
     id: str
@@ -59,7 +62,10 @@ class Member:
     cpu_share: float | None = None
     lost_at_s: float | None = None
     last_report_s: float | None = None
+    joined_at_s: float | None = None
     accounted: int = 0
+    share: int | None = None
+    clock: WorkerClock | None = None
     done: bool = True
 
 
@@ -71,14 +77,6 @@ def new_environment() -> Any:
 def busiest(members: list[Member]) -> float | None:
     """The busiest process's share of a core in the plan that was carried out last."""
     return max((member.cpu_share for member in members if member.cpu_share is not None), default=None)
-
-
-def boot_id() -> str:
-    """Which running system this is: processes of one share CLOCK_MONOTONIC. Empty where unknown."""
-    try:
-        return Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip()
-    except OSError:
-        return ""
 
 
 class LocalExecutor:

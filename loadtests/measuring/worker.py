@@ -1,6 +1,7 @@
 """A worker process: `python -m loadtests.measuring.worker HOST PORT`, with a JSON object on its standard input.
 
-The object holds the robots' bearer tokens, `{"tokens": […]}`, which do not travel over the network with the rest.
+The object holds the robots' bearer tokens, which do not travel over the network with the rest, and the folder for what
+the worker leaves when its master dies: `{"tokens": […], "folder": "…"}`.
 """
 
 from __future__ import annotations
@@ -14,27 +15,50 @@ import sys
 import time
 from collections.abc import Sequence
 from itertools import zip_longest
-from typing import Any
+from pathlib import Path
+from typing import Any, NoReturn
 
 import gevent
 import locust.runners
+from gevent.event import Event
 
+from conformance.contract.exit_codes import ExitCode
 from loadtests.clients.robot import Robot
-from loadtests.measuring.executor import REPORT_S, boot_id, new_environment, now_ns
+from loadtests.measuring.clocks import answer_clock, clock_id
+from loadtests.measuring.executor import REPORT_S, new_environment, now_ns
+from loadtests.measuring.left_behind import LeftBehind
 from loadtests.measuring.user_session import Session
 from loadtests.schedule.plan import Plan
 
-_NS = 1_000_000_000
+#: The master answers a heartbeat each second. Silent for so long, it is dead, or the network to it is.
+MASTER_SILENT_S = 20.0
+_LOOK_S = 0.5
+
+
+def _say(message: str) -> None:
+    sys.stderr.write(f"roaas load: worker {os.getpid()}: {message}\n")
+    sys.stderr.flush()
+
+
+def _leave(code: int, message: str) -> NoReturn:
+    """End at once: an ordinary exit would wait for messages to reach the master."""
+    _say(message)
+    os._exit(code)
 
 
 class Worker:
     """Carries out what the master says."""
 
-    def __init__(self, environment: Any, host: str, port: int, tokens: Sequence[str | None]) -> None:
+    def __init__(self, environment: Any, host: str, port: int, tokens: Sequence[str | None], folder: Path) -> None:
         locust.runners.WORKER_REPORT_INTERVAL = REPORT_S
         self.environment = environment
         self.tokens = tokens
         self.session: Session | None = None
+        self.master = f"{host}:{port}"
+        self.left = LeftBehind(folder)
+        self._idle = Event()
+        self._idle.set()
+        self._heard = time.monotonic()
         self._report: dict[str, Any] | None = None
         self._reported = 0.0
         environment.events.report_to_master.add_listener(self._on_report)
@@ -42,7 +66,13 @@ class Worker:
         self.runner.register_message("roaas_prepare", self._on_prepare, concurrent=True)
         self.runner.register_message("roaas_begin", self._on_begin, concurrent=True)
         self.runner.register_message("roaas_stop", self._on_stop)
-        self.runner.send_message("roaas_listening")  # Locust has long said that we are here, and drops what we await
+        self.runner.register_message("roaas_late", self._on_late)
+        answer_clock(self.runner)
+        self._heard = time.monotonic()
+        environment.events.heartbeat_received.add_listener(self._on_heartbeat)
+        self._about = {"pid": os.getpid(), "host": platform.node(), "clock": clock_id()}
+        # Locust has long said that we are here, and drops what we await.
+        self.runner.send_message("roaas_listening", self._about)
 
     def _on_prepare(self, environment: Any, msg: Any) -> None:
         job = msg.data
@@ -58,29 +88,63 @@ class Worker:
         except Exception as trouble:  # noqa: BLE001 -- whatever it is, the master has to hear of it
             error = f"{type(trouble).__name__}: {trouble}"
         pacing = self.session.pacer.pacing if self.session else ""
-        ready = {"error": error, "pacing": pacing, "pid": os.getpid(), "host": platform.node()}
-        self.runner.send_message("roaas_ready", ready)
+        self.runner.send_message("roaas_ready", self._about | {"error": error, "pacing": pacing})
 
     def _on_begin(self, environment: Any, msg: Any) -> None:
         del environment
         job, session = msg.data, self.session
         if session is None:
             return
-        same_clock = job["boot"] and job["boot"] == boot_id()
-        origin = job["origin_ns"] if same_clock else now_ns() + int(job["lead_s"] * _NS)
-        session.run(Plan.from_message(job["plan"]), job["worker"], origin, job["ceiling"])
-        self.runner.send_message("roaas_done", {"roaas": self._packed()})
+        plan, origin = Plan.from_message(job["plan"]), job["origin_ns"]
+        self._idle.clear()
+        self.left.begin(plan, job["worker"])
+        try:
+            session.run(plan, job["worker"], now_ns() + job["lead_ns"] if origin is None else origin, job["ceiling"])
+            report = self._packed()
+        finally:
+            self._idle.set()
+        self.runner.send_message("roaas_done", {"roaas": report})
 
     def _on_stop(self, environment: Any, msg: Any) -> None:
         del environment, msg
         if self.session is not None:
             self.session.stop()
 
+    def _on_late(self, environment: Any, msg: Any) -> None:
+        del environment, msg
+        _say(f"the master at {self.master} had dealt the run out already: this worker takes no part in it")
+
+    def _on_heartbeat(self, **_: Any) -> None:
+        self._heard = time.monotonic()
+
+    def follow(self, parent: int | None) -> None:
+        """End this process when the master is gone: silent for too long, or, on its machine, no parent any more."""
+        while True:
+            gevent.sleep(_LOOK_S)
+            if parent is not None and os.getppid() != parent:
+                self._end(f"the master (process {parent}) has ended")
+            if time.monotonic() - self._heard > MASTER_SILENT_S:
+                self._end(f"nothing was heard of the master at {self.master} for {MASTER_SILENT_S:g} s")
+
+    def _end(self, why: str) -> None:
+        """Stop sending, write down what there is, and end."""
+        if self.session is not None:
+            self.session.stop()
+        self._idle.wait()  # requests under way have deadlines
+        try:
+            path = self.left.write(why)
+            kept = f"what this worker recorded is in {path}" if path else "it had recorded nothing"
+        except OSError as error:
+            kept = f"what it had recorded is lost: {error}"
+        _leave(ExitCode.INCONCLUSIVE, f"{why}: this worker ends; {kept}")
+
     def _packed(self) -> dict[str, Any]:
         """Everything recorded since the last report, in parts."""
         session = self.session
         waiting, self._report = self._report, None
         parts = [session.recorder.take()] if session else []
+        for part in parts:
+            self.left.add(part)
         return {
             "recorded": (waiting["recorded"] if waiting else []) + parts,
             "cpu_share": session.cpu_share if session else None,
@@ -98,25 +162,34 @@ class Worker:
             self._reported = time.monotonic()
 
 
-def serve(host: str, port: int, tokens: Sequence[str | None]) -> None:
-    """Work until the master says quit, or is gone; a token for each robot."""
+def serve(host: str, port: int, tokens: Sequence[str | None], folder: Path, parent: int | None = None) -> None:
+    """Work until the master says quit, or is gone.
+
+    Args:
+        host: where the master listens.
+        port: likewise.
+        tokens: one for each robot.
+        folder: for what is recorded, should the master die.
+        parent: the master's process, where it started this one.
+    """
     logging.getLogger("locust").setLevel(logging.ERROR)
-    Worker(new_environment(), host, port, tokens).runner.greenlet.join()
-
-
-def _follow(parent: int) -> None:
-    """End with the process that started us, however it ended."""
-    while os.getppid() == parent:
-        gevent.sleep(0.5)
-    os._exit(1)
+    try:
+        worker = Worker(new_environment(), host, port, tokens, folder)
+    except ConnectionError:
+        _leave(
+            ExitCode.UNREACHABLE,
+            f"no master answers at {host}:{port}: give its address by --master-host and --master-port",
+        )
+    gevent.spawn(worker.follow, parent)
+    worker.runner.greenlet.join()
 
 
 def main() -> None:
     """A worker of a master on this machine."""
+    parent = os.getppid()
     told = json.loads(sys.stdin.readline() or "{}")
     gevent.signal_handler(signal.SIGINT, lambda: None)  # the master says when to stop
-    gevent.spawn(_follow, os.getppid())
-    serve(sys.argv[1], int(sys.argv[2]), told.get("tokens", []))
+    serve(sys.argv[1], int(sys.argv[2]), told.get("tokens", []), Path(told.get("folder", ".")), parent)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,8 @@ from loadtests.measuring.environment import describe
 from loadtests.measuring.machine import Moment, conditions
 from loadtests.measuring.pauses import PAUSE_S
 from loadtests.result.files import FORMAT
-from loadtests.schedule.arrivals import Schedule, arrivals_due
+from loadtests.result.processes import process_figures
+from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import GAP_S, step_operation
 from loadtests.statistics import against, end_to_end, figures, modes, over_time, steps, threshold, verdict
 from loadtests.statistics.headline import headline
@@ -47,7 +48,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing, spoilt)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
     undecided = [] if aborted or reasons else verdict.failures(generator) + verdict.says_nothing(comparisons)
-    workers, losses = _workers(outcome, plan)
+    workers, losses = process_figures(outcome.executor.members if outcome.executor else [])
     judged = [] if aborted else threshold.judge(measured, settings.thresholds)
     noise_floor = figures.noise_floor(measured)
     compared = _against(outcome, measured, noise_floor)
@@ -201,39 +202,6 @@ def _early_errors(findings: Findings) -> list[dict[str, Any]]:
         }
         for name, failure in findings.failures.items()
     ]
-
-
-def _workers(outcome: Outcome, plan: Plan) -> tuple[list[dict[str, Any]], list[str]]:
-    """The `workers`, and a sentence on each that was lost."""
-    found, losses = [], []
-    present = outcome.executor.members if outcome.executor else []
-    for number, member in enumerate(present):
-        missing = None
-        if member.state == "lost":
-            arrivals = ""
-            if plan.open_model:
-                schedule = Schedule(plan, number, len(present))
-                share = sum(schedule.share(index) for index in range(schedule.count()))
-                missing = max(0, share - member.accounted)
-                arrivals = f", {missing} of its arrivals were never made or never reported"
-            losses.append(
-                f"worker {member.id} ({member.host}) was lost {member.lost_at_s or 0.0:.1f} s into the run: "
-                f"{member.requests} of its requests are in the result{arrivals}"
-            )
-        found.append(
-            {
-                "id": member.id,
-                "host": member.host,
-                "pid": member.pid,
-                "state": member.state,
-                "requests": member.requests,
-                "cpu_share": figures.rounded(member.cpu_share),
-                "lost_at_s": figures.rounded(member.lost_at_s),
-                "last_report_s": figures.rounded(member.last_report_s),
-                "arrivals_lost": missing if member.state == "lost" else 0,
-            }
-        )
-    return found, losses
 
 
 def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:

@@ -43,13 +43,13 @@ class Toy:
 
 @pytest.fixture
 def toy():
-    """Start a toy robot with options; all end with the test."""
+    """Start a toy robot with options, and words before its command; all end with the test."""
     started = []
 
-    def start(*options, host="127.0.0.1"):
+    def start(*options, host="127.0.0.1", on=()):
         words = [str(option) for option in options]
         process = subprocess.Popen(
-            [sys.executable, HERE / "toy_robot.py", "--host", host, *words], stdout=subprocess.PIPE, text=True
+            [*on, sys.executable, HERE / "toy_robot.py", "--host", host, *words], stdout=subprocess.PIPE, text=True
         )
         started.append(process)
         word, port = process.stdout.readline().split()
@@ -91,16 +91,19 @@ COMMAND = [sys.executable, "-c", "from loadtests.cli import load; load(prog_name
 
 @pytest.fixture
 def load(tmp_path):
-    """Run `roaas load`; `begin` gives the process and a function that waits for it. A string may hold several words."""
+    """Run `roaas load`; `begin` gives the process and a function that waits for it. A string may hold several words.
+
+    `on` are words before the command.
+    """
 
     def run(*options):
         return run.begin(*options)[1]()
 
-    def begin(*options):
+    def begin(*options, on=()):
         folder = tmp_path / "out"
         words = [word for option in options for word in (option.split() if isinstance(option, str) else [option])]
         process = subprocess.Popen(
-            [*COMMAND, *words, "--out", folder], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*on, *COMMAND, *words, "--out", folder], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
 
         def finish():

@@ -9,6 +9,7 @@ import sys
 import urllib.request
 from pathlib import Path
 
+import jsonschema
 import pytest
 import yaml
 
@@ -109,9 +110,22 @@ def test_the_web_ui_shows_the_runs_numbers(toy, load, free_port):
     assert 0 < counts[-1] <= 180
 
 
-def test_the_kubernetes_manifest_gives_options_that_there_are():
-    manifest = yaml.safe_load((ROOT / "deploy" / "kubernetes" / "loadtest.yaml").read_text())
-    assert (manifest["apiVersion"], manifest["kind"]) == ("locust.io/v1", "LocustTest")
+def test_the_kubernetes_manifest_is_one_and_gives_options_that_there_are():
+    folder = ROOT / "deploy" / "kubernetes"
+    manifest = yaml.safe_load((folder / "loadtest.yaml").read_text())
+    schema = json.loads((folder / "locusttest.schema.json").read_text())
+    operators = jsonschema.Draft202012Validator(schema)
+    operators.validate(manifest)
+    for wrong in (
+        {"workers": 0},
+        {"image": 1},
+        {"replicas": 2},
+        {"worker": {"resources": {"limits": {"memory": "1 GB"}}}},
+    ):
+        assert not operators.is_valid(manifest | {"spec": manifest["spec"] | wrong}), wrong
+    version = re.search(r"chart ([\d.]+)", schema["title"])[1]
+    assert f"--version {version} " in (folder / "README.md").read_text(), "the operator is pinned"
+    assert f"chart {version}" in (folder / "loadtest.yaml").read_text()
     words = manifest["spec"]["args"].split()
     load_command.make_context("load", list(words), resilient_parsing=False)
     assert words[words.index("--expect-workers") + 1] == str(manifest["spec"]["workers"])
@@ -127,6 +141,14 @@ def test_the_master_lingers_for_its_result_to_be_fetched():
     assert run.returncode == 2
     assert "no endpoint" in run.stderr
     assert "kept for 0.1 s" in run.stderr
+
+
+def test_a_worker_without_a_master_says_so_and_ends(free_port):
+    hasty = "import sys, locust.runners as runners\nrunners.CONNECT_TIMEOUT, runners.CONNECT_RETRY_COUNT = 0.1, 1\n"
+    words = ["--worker", "--master-host=127.0.0.1", f"--master-port={free_port}"]
+    run = ended(sys.executable, "-c", hasty + NODE, *words)
+    assert run.returncode == 3
+    assert f"no master answers at 127.0.0.1:{free_port}" in run.stderr
 
 
 @pytest.mark.parametrize("words", [["--worker"], ["--worker", "--master-port", "1"]])

@@ -1,0 +1,215 @@
+"""Nothing is lost and nothing counted twice, over workers: `python benchmarks/scale.py`.
+
+Two parts, each with a million requests. Recorders: processes record what a seed says, hand it over in reports as
+workers do each second, and the merged whole is compared with one recorder that has seen everything, histogram by
+histogram. A run: `roaas load` with workers against a bare server that counts what reaches it, and the books have to
+balance to the request. The exit code is 1 where anything differs.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import numpy as np
+
+from loadtests.statistics.recorder import Recorder
+
+_SEGMENTS = 600
+_REPORTED = 4000  # requests in a report: what a worker at 4,000/s has to tell after a second
+_GAPS = 1.03  # blocks begin with silence, up to a tenth of a short run
+_BLOCKS = 10  # that it tells of
+_SERIES = {segment: 4 + 2 * (segment % 2) for segment in range(_SEGMENTS)}
+_SERVER = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+import bare
+count = 0
+inner = bare.application(json.loads(sys.argv[2]))
+async def counting(scope, receive, send):
+    global count
+    count += 1
+    await inner(scope, receive, send)
+bare.application = lambda _: counting
+try:
+    bare.main(sys.argv[3])
+except KeyboardInterrupt:
+    print(count, flush=True)
+"""
+_POSE = '{"pose": {"pose": {"position": {"x": 1.0, "y": 2.0, "z": 0.0}}}, "covariance": []}'
+
+
+def record(book: Recorder, seed: int, first: int, requests: int) -> None:
+    """Record requests, numbered from `first`: one in 500 failed, one in 1,000 was never started."""
+    lot = np.random.default_rng([seed, first])
+    service = lot.lognormal(np.log(150_000), 0.6, requests).astype(int).tolist()
+    lag = lot.exponential(30_000, requests).astype(int).tolist()
+    for number in range(requests):
+        segment = (first // _REPORTED * _BLOCKS + number * _BLOCKS // _REPORTED) % _SEGMENTS
+        operation, due = number & 1, (first + number) * 250_000
+        start = due + lag[number]
+        done = start + service[number]
+        if number % 1000 == 999:  # noqa: PLR2004 -- see above
+            book.drop(segment, operation, 10**10)
+        elif number % 500 == 499:  # noqa: PLR2004 -- see above
+            book.fail(segment, operation, "closed", "connection closed", due, (done - start, done - due))
+        else:
+            book.record(segment, operation, due, start, start + 2000, done - 3000, done, service[number] // 2)
+
+
+def reports(first: int, requests: int) -> Iterator[tuple[int, int]]:
+    """The reports that a worker's share makes up: the first request and the number of each."""
+    for at in range(first, first + requests, _REPORTED):
+        yield at, min(_REPORTED, first + requests - at)
+
+
+def work(seed: int, first: int, requests: int, pipe: Any) -> None:
+    """A worker: record, and report as often as one does, packed as for the network."""
+    book = Recorder(_SERIES)
+    for at, number in reports(first, requests):
+        record(book, seed, at, number)
+        pipe.send_bytes(msgpack.dumps(book.take()))
+    pipe.send_bytes(b"")
+
+
+def contents(book: Recorder) -> dict[str, Any]:
+    """Everything that a recorder holds, in an order that does not depend on who reported first."""
+    return {name: sorted(map(repr, dict(part).items())) for name, part in _parts(book).items()}
+
+
+def _parts(book: Recorder) -> dict[str, Any]:
+    cells = {
+        key: [{name: one.pack() for name, one in cell.histograms().items()}, cell.errors, cell.late, cell.dropped]
+        for key, cell in book.cells.items()
+    }
+    spans = {key: {name: one.pack() for name, one in series.parts().items()} for key, series in book.spans.items()}
+    return {"cells": cells, "spans": spans, "failures": book.failures, "counters": book.counters}
+
+
+def recorders(requests: int, workers: int, seed: int) -> bool:
+    """Workers' reports, merged, beside one recorder of all."""
+    share = requests // workers
+    context = multiprocessing.get_context("spawn")
+    ends = []
+    merged, received, octets, spent = Recorder(), 0, 0, 0.0
+    for number in range(workers):
+        ours, theirs = context.Pipe(duplex=False)
+        process = context.Process(target=work, args=(seed, number * share, share, theirs))
+        process.start()
+        theirs.close()
+        ends.append((process, ours))
+    for process, pipe in ends:
+        while report := pipe.recv_bytes():
+            began = time.process_time()
+            merged.merge(Recorder.unpack(msgpack.loads(report, strict_map_key=False)))
+            spent += time.process_time() - began
+            received, octets = received + 1, octets + len(report)
+        process.join()
+    whole = Recorder(_SERIES)
+    for worker in range(workers):
+        for at, number in reports(worker * share, share):
+            record(whole, seed, at, number)
+    whole.flush()
+    found, wanted = contents(merged), contents(whole)
+    cells = merged.cells.values()
+    answered, failed, dropped = (
+        sum(cell.service.total for cell in cells),
+        sum(cell.errors for cell in cells),
+        sum(cell.dropped for cell in cells),
+    )
+    same = found == wanted and answered + failed + dropped == share * workers
+    print(
+        f"recorders: {answered:,} answered, {failed:,} failed, {dropped:,} never started, of {share * workers:,} over "
+        f"{workers} processes; {received} reports, {octets / 1e6:.1f} MB, {spent * 1e3 / received:.1f} ms of the "
+        f"master's processor each; all {sum(map(len, wanted.values())):,} entries of the merged whole are "
+        f"{'the same as' if same else 'NOT those of'} one recorder of all"
+    )
+    return same
+
+
+def run(requests: int, workers: int, rate: float) -> bool:
+    """`roaas load` over workers, beside what the server has counted."""
+    answer = {
+        "status": 200,
+        "body": _POSE,
+        "headers": [["content-type", "application/json"], ["content-length", str(len(_POSE))]],
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        answers = Path(folder) / "answers.json"
+        answers.write_text(json.dumps({"/robot/pose/": answer}))
+        command = [sys.executable, "-c", _SERVER, Path(__file__).parent, answers.read_text(), answers]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+            if server.stdout is None:
+                return False
+            url = f"http://127.0.0.1:{server.stdout.readline().strip()}"
+            load = [sys.executable, "-c", "from loadtests.cli import load; load()", "--rest", url, "--client", "wire"]
+            times = [
+                "--rate",
+                f"{rate:g}",
+                "--duration",
+                f"{_GAPS * requests / rate:g}",
+                "--warmup",
+                "0",
+                "--out",
+                folder,
+            ]
+            subprocess.run([*load, *times, "--processes", str(workers)], check=False)
+            server.send_signal(signal.SIGINT)
+            reached = int(server.stdout.readline())
+        found: dict[str, Any] = json.loads((Path(folder) / "latency.json").read_text())
+    return balance(found, reached)
+
+
+def balance(found: dict[str, Any], reached: int) -> bool:
+    """Whether the books balance: what was due, what workers reported, and what the server has seen."""
+    told = found["generator"]
+    due, answered, failed, dropped = (told[name] for name in ("scheduled", "completed", "errors", "dropped"))
+    reported = sum(worker["requests"] for worker in found["workers"])
+    other = 1 + sum(map(_after_pauses, found["series"]))  # one call looked whether the robot answers
+    good = due == answered + failed + dropped and reported == answered + failed
+    good = good and answered <= reached - other <= answered + failed  # of those that failed some may have reached it
+    print(
+        f"run: {due:,} due; {answered:,} answered, {failed:,} failed, {dropped:,} never started; {reported:,} in the "
+        f"reports of {len(found['workers'])} workers; {reached:,} seen by the server, {other:,} of them before and "
+        f"after the run; lag {told['lag_ms']['p50']:.2f} ms median: the books {'balance' if good else 'do NOT balance'}"
+    )
+    return good
+
+
+def _after_pauses(series: dict[str, Any]) -> int:
+    """How many requests a series' look at pauses made; its first turn is not among the counts."""
+    paused = series["after_pause"]
+    if not paused or not paused["cold_count"]:
+        return 0
+    return int((paused["cold_count"] + 1) * (1 + paused["warm_count"] // paused["cold_count"]))
+
+
+def main() -> int:
+    """Count everything twice."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--requests", type=int, default=1_000_000, help="in each part [1,000,000]")
+    parser.add_argument("--workers", type=int, default=4, help="processes that record or load [4]")
+    parser.add_argument("--rate", type=float, default=4000.0, help="requests a second of the run [4,000]")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", choices=["recorders", "run"], help="one part alone")
+    options = parser.parse_args()
+    print(f"{os.cpu_count()} processors, load average {os.getloadavg()[0]:.1f}")
+    met = []
+    if options.only != "run":
+        met.append(recorders(options.requests, options.workers, options.seed))
+    if options.only != "recorders":
+        met.append(run(options.requests, options.workers, options.rate))
+    return 0 if all(met) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,139 @@
+"""Workers' clocks against the master's, by messages over the channel that they have anyway.
+
+An exchange gives the offset as NTP does (RFC 5905, section 8), with one moment of the worker's in place of two,
+because it answers at once: the worker's clock less the middle between sending and receiving. Of several exchanges the
+one with the shortest round trip counts, for it waited least in queues; it is wrong by half its round trip at most,
+where the whole of it was spent on one way. Clocks are CLOCK_MONOTONIC, in ns, which no administrator sets.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import gevent
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+#: How many exchanges a reading chooses from, and how long they may take in all.
+EXCHANGES = 8
+WITHIN_S = 2.0
+_MESSAGE = "roaas_clock"
+
+
+def clock_id() -> str:
+    """Which monotonic clock this process reads: running system and time namespace. Empty where unknown."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip()
+    except OSError:
+        return ""
+    try:
+        return f"{boot} {Path('/proc/self/ns/time').readlink()}"
+    except OSError:  # a kernel without time namespaces
+        return boot
+
+
+class Reading(NamedTuple):
+    """What one exchange says: the worker's clock less the master's, and the round trip that it took, in ns."""
+
+    offset_ns: int
+    round_trip_ns: int
+
+    @classmethod
+    def of(cls, sent_ns: int, worker_ns: int, received_ns: int) -> Reading:
+        """Read the moments at which the master sent, the worker answered, and the master had the answer."""
+        return cls(worker_ns - (sent_ns + received_ns) // 2, received_ns - sent_ns)
+
+
+def best(readings: Iterable[Reading]) -> Reading | None:
+    """The reading with the shortest round trip."""
+    return min(readings, key=lambda reading: reading.round_trip_ns, default=None)
+
+
+@dataclass(slots=True)
+class WorkerClock:
+    """A worker's clock, as it was read over the run.
+
+    Attributes:
+        shared: it is the master's own.
+        first, last: None until it answered.
+    """
+
+    shared: bool = False
+    first: Reading | None = None
+    last: Reading | None = None
+
+    def add(self, reading: Reading) -> None:
+        """Take a further reading."""
+        self.first = self.first or reading
+        self.last = reading
+
+    def of_master(self, moment_ns: int) -> int | None:
+        """A moment of the master's clock by the worker's; None where that is not known."""
+        if self.shared:
+            return moment_ns
+        return moment_ns + self.last.offset_ns if self.last is not None else None
+
+    @property
+    def uncertainty_ns(self) -> int:
+        """By how much the offset may be wrong: half a round trip."""
+        return self.last.round_trip_ns // 2 if self.last is not None else 0
+
+    def figures(self) -> dict[str, Any] | None:
+        """The `clock` of a worker in latency.json; None where it never answered."""
+        if self.first is None or self.last is None:
+            return None
+        return {
+            "shared": self.shared,
+            "offset_ms": round(self.last.offset_ns / 1e6, 3),
+            "uncertainty_ms": round(self.uncertainty_ns / 1e6, 3),
+            "round_trip_ms": round(self.last.round_trip_ns / 1e6, 3),
+            "change_ms": round((self.last.offset_ns - self.first.offset_ns) / 1e6, 3),
+        }
+
+
+class Clocks:
+    """Reads workers' clocks, from the master."""
+
+    def __init__(self, runner: Any) -> None:
+        self._runner = runner
+        self._asked: dict[str, list[Reading]] = {}
+        runner.register_message(_MESSAGE, self._on_answer)
+
+    def read(self, clients: Iterable[str]) -> dict[str, Reading]:
+        """Exchange messages with all clients side by side; one that answers not once in time is not in the result."""
+        self._asked = {client: [] for client in clients}
+        for client in self._asked:
+            self._ask(client)
+        deadline = time.monotonic() + WITHIN_S
+        while time.monotonic() < deadline and any(len(r) < EXCHANGES for r in self._asked.values()):
+            gevent.sleep(0.002)
+        found = {client: best(readings) for client, readings in self._asked.items()}
+        self._asked = {}
+        return {client: reading for client, reading in found.items() if reading is not None}
+
+    def _ask(self, client: str) -> None:
+        self._runner.send_message(_MESSAGE, {"sent": time.monotonic_ns()}, client)
+
+    def _on_answer(self, environment: Any, msg: Any) -> None:
+        received = time.monotonic_ns()
+        del environment
+        readings = self._asked.get(msg.node_id)
+        if readings is None:
+            return  # too late: the reading has been taken without it
+        readings.append(Reading.of(msg.data["sent"], msg.data["worker"], received))
+        if len(readings) < EXCHANGES:
+            self._ask(msg.node_id)
+
+
+def answer_clock(runner: Any) -> None:
+    """Have a worker answer the master's exchanges, at once."""
+
+    def on_asked(environment: Any, msg: Any) -> None:
+        del environment
+        runner.send_message(_MESSAGE, {"sent": msg.data["sent"], "worker": time.monotonic_ns()})
+
+    runner.register_message(_MESSAGE, on_asked)

@@ -1,0 +1,75 @@
+"""What a worker leaves in a file when its master is gone: the figures of its own share, for people to look at.
+
+Nothing reads the file, and no verdict is in it: the other workers' shares are missing. But a long run that ends so has
+not been for nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from conformance.contract.atomic_write import write_atomically
+from loadtests.statistics.recorder import Recorder
+
+if TYPE_CHECKING:
+    from loadtests.schedule.plan import Plan
+
+FORMAT = "roaas-worker/1"
+
+
+class LeftBehind:
+    """Keeps all that a worker has reported, which is the master's no longer when it dies."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.recorder = Recorder()
+        self.plans: list[Plan] = []
+        self._place = (0, 0)
+
+    def begin(self, plan: Plan, worker: int) -> None:
+        """Know the plan that what follows belongs to; steps are not among the figures."""
+        self._place = (worker, plan.workers)
+        if plan.step_rate is None:
+            self.plans.append(plan)
+
+    def add(self, report: dict[str, Any]) -> None:
+        """Keep a report (see `Recorder.take`)."""
+        self.recorder.merge(Recorder.unpack(report))
+
+    @property
+    def requests(self) -> int:
+        """How many requests are kept."""
+        return sum(cell.service.total + cell.errors for cell in self.recorder.cells.values())
+
+    def write(self, why: str) -> Path | None:
+        """Write the file; None where there is nothing to write.
+
+        Raises:
+            OSError: the folder does not take it.
+        """
+        if not self.plans or not self.requests:
+            return None
+        # SciPy comes with these and takes a second to import, which no worker of a master that lives has to wait for.
+        from loadtests.statistics import figures, over_time  # noqa: PLC0415
+        from loadtests.statistics.measured import Measured  # noqa: PLC0415
+
+        worker, workers = self._place
+        document = {
+            "format": FORMAT,
+            "why": why,
+            "worker": worker + 1,
+            "workers": workers,
+            "host": platform.node(),
+            "pid": os.getpid(),
+            "requests": self.requests,
+            "plan": self.plans[0].as_message(),
+            "series": figures.series(Measured(self.plans, self.recorder), {}),
+            "errors": over_time.errors(self.recorder, self.plans[0].operations),
+        }
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / f"worker-{platform.node()}-{os.getpid()}.json"
+        return write_atomically(path, json.dumps(document, indent=1, allow_nan=False) + "\n")

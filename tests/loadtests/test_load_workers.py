@@ -1,0 +1,156 @@
+"""Workers on other machines: clocks of their own, a slow network, one that dies, one that comes late, no master."""
+
+import json
+import re
+import subprocess
+import sys
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+from network import Network
+
+HERE = Path(__file__).parent
+#: Comes up while the master does, waits for its options, and gives its master up sooner than one would.
+NODE = """
+import sys
+from loadtests import node
+from loadtests.measuring import worker
+worker.MASTER_SILENT_S = 2.5
+node.main(sys.stdin.readline().split())
+"""
+
+
+@pytest.fixture
+def network():
+    with ExitStack() as stack:
+        yield Network(stack)
+
+
+@contextmanager
+def running(*command, **options):
+    """A process that ends with the block, and what it started too."""
+    process = subprocess.Popen([str(word) for word in command], text=True, **options)
+    try:
+        yield process
+    finally:
+        for child in psutil.Process(process.pid).children(recursive=True) if process.poll() is None else []:
+            child.kill()
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def worker(network):
+    """Start workers on the workers' machine; they join when they are told where, see `join`."""
+    with ExitStack() as stack:
+
+        def start(*, own_clock=False):
+            command = (*network.on("workers", own_clock=own_clock), sys.executable, "-c", NODE)
+            return stack.enter_context(running(*command, stdin=subprocess.PIPE, stderr=subprocess.PIPE))
+
+        yield start
+
+
+@pytest.fixture
+def begin(network, toy, load, wait_for, tmp_path):
+    """Begin a run on the master's machine, with a robot and a relay in the middle.
+
+    Gives the run's process, what waits for it, and what has a worker join.
+    """
+    with ExitStack() as stack:
+
+        def run(*options):
+            robot = toy(host=network.address("middle"), on=network.on("middle"))
+            process, finish = load.begin(
+                *robot.both(),
+                *options,
+                f"--client wire --master-host {network.address('master')}",
+                on=network.on("master"),
+            )
+            port = wait_for(process, r"master on [\d.]+:(\d+)")[1]
+            near = network.address("middle", seen_from="workers")
+            command = (sys.executable, HERE / "relay.py", near, network.address("master"), port)
+            relay = stack.enter_context(running(*network.on("middle"), *command, stdout=subprocess.PIPE))
+            told = (
+                f"--worker --master-host {near} --master-port {relay.stdout.readline().strip()} --out {tmp_path}/left"
+            )
+
+            def join(*workers):
+                for one in workers:
+                    one.stdin.write(told + "\n")
+                    one.stdin.flush()
+
+            return process, finish, join
+
+        yield run
+
+
+def python_of(process):
+    """The Python process that a command with words before it has become."""
+    family = [psutil.Process(process.pid), *psutil.Process(process.pid).children(recursive=True)]
+    return next(one for one in reversed(family) if "loadtests" in " ".join(one.cmdline()))
+
+
+def test_nothing_is_lost_in_silence_over_a_slow_network(network, worker, begin, wait_for):
+    other, doomed, late = worker(own_clock=True), worker(), worker()
+    process, finish, join = begin("--rate 80 --duration 4 --warmup 0.4 --processes 0 --expect-workers 2")
+    join(other, doomed)
+    for _ in range(2):
+        wait_for(process, r"[1-9]\d* requests answered")
+    join(late)
+    wait_for(process, r"too late to take part")
+    doomed_pid = python_of(doomed).pid
+    python_of(doomed).kill()
+    run = finish()
+    assert [other.wait(20), late.wait(20)] == [0, 0]
+    assert "takes no part in it" in late.stderr.read()
+    result = run.result
+    workers = {entry["state"]: entry for entry in result["workers"]}
+    assert set(workers) == {"finished", "lost", "late"}, result["notes"]
+    kept, lost, idle = workers["finished"], workers["lost"], workers["late"]
+    assert (lost["pid"], idle["requests"]) == (doomed_pid, 0)
+    assert idle["joined_at_s"] > 0
+    assert lost["requests"] > 0
+    assert abs(lost["requests"] + lost["arrivals_lost"] - kept["requests"]) <= 1, "lost and reported make up a share"
+    assert {f"worker {entry['id']} ({entry['host']})" for entry in (lost, idle)} == {
+        note.split(" was lost")[0].split(" came")[0] for note in result["notes"] if note.startswith("worker ")
+    }
+    for entry, ahead_s in ((kept, network.clock_ahead_s), (lost, 0)):
+        clock = entry["clock"]
+        assert clock["round_trip_ms"] >= 10, "5 ms on each way"
+        assert abs(clock["offset_ms"] - ahead_s * 1e3) <= clock["uncertainty_ms"] + 0.001
+        assert clock["shared"] == (ahead_s == 0)
+    assert result["generator"]["lag_ms"]["p50"] < 5, "all began when they were to, by their own clocks"
+    assert run.series("pose", "rest")["service_ms"]["p50"] < 10, "no request went through the relay"
+    assert run.code == 4
+    assert any("accounted for" in reason for reason in result["invalid_because"])
+
+
+def test_workers_outlive_no_master_and_leave_what_they_recorded(worker, begin, wait_for, tmp_path):
+    remote = worker(own_clock=True)
+    process, finish, join = begin("--rate 80 --duration 60 --warmup 0.2 --processes 1 --expect-workers 2")
+    join(remote)
+    for _ in range(2):
+        wait_for(process, r"[1-9]\d* requests answered")
+    family = psutil.Process(process.pid).children(recursive=True)
+    master = next(one for one in family if one.cmdline()[-2:] == ["-m", "loadtests"])
+    local = next(one for one in family if "loadtests.measuring.worker" in one.cmdline())
+    master.kill()
+    run = finish()
+    assert run.code == 4
+    assert remote.wait(30) == 4
+    psutil.wait_procs([local], timeout=30)
+    assert not local.is_running()
+    for told, why, folder in (
+        (run.err, "has ended", run.folder),
+        (remote.stderr.read(), "nothing was heard of the master at", tmp_path / "left"),
+    ):
+        path = Path(re.search(r"recorded is in (.+\.json)", told)[1])
+        assert path.parent == folder
+        assert why in told
+        left = json.loads(path.read_text())
+        assert left["why"] in told
+        assert left["workers"] == 2
+        assert left["requests"] >= sum(entry["count"] + entry["errors"] for entry in left["series"]) > 20
