@@ -1,9 +1,9 @@
 """Nothing is lost and nothing counted twice, over workers: `python benchmarks/scale.py`.
 
-Two parts, each with a million requests. Recorders: processes record what a seed says, hand it over in reports as
-workers do each second, and the merged whole is compared with one recorder that has seen everything, histogram by
-histogram. A run: `roaas load` with workers against a bare server that counts what reaches it, and the books have to
-balance to the request. The exit code is 1 where anything differs.
+Two parts. Recorders: processes record a million requests that a seed gives and hand them over in reports, as workers do
+each second; the merged whole is compared with one recorder that has seen everything, histogram by histogram. A run:
+`roaas load` with workers against a bare server that counts what reaches it, closed users for as long as is said, and
+the books have to balance to the request. The exit code is 1 where anything differs.
 """
 
 import argparse
@@ -26,7 +26,6 @@ from loadtests.statistics.recorder import Recorder
 
 _SEGMENTS = 600
 _REPORTED = 4000  # requests in a report: what a worker at 4,000/s has to tell after a second
-_GAPS = 1.03  # blocks begin with silence, up to a tenth of a short run
 _BLOCKS = 10  # that it tells of
 _SERIES = {segment: 4 + 2 * (segment % 2) for segment in range(_SEGMENTS)}
 _SERVER = """
@@ -43,6 +42,8 @@ bare.application = lambda _: counting
 try:
     bare.main(sys.argv[3])
 except KeyboardInterrupt:
+    pass
+finally:
     print(count, flush=True)
 """
 _POSE = '{"pose": {"pose": {"position": {"x": 1.0, "y": 2.0, "z": 0.0}}}, "covariance": []}'
@@ -136,7 +137,7 @@ def recorders(requests: int, workers: int, seed: int) -> bool:
     return same
 
 
-def run(requests: int, workers: int, rate: float) -> bool:
+def run(seconds: float, workers: int, users: int) -> bool:
     """`roaas load` over workers, beside what the server has counted."""
     answer = {
         "status": 200,
@@ -152,17 +153,8 @@ def run(requests: int, workers: int, rate: float) -> bool:
                 return False
             url = f"http://127.0.0.1:{server.stdout.readline().strip()}"
             load = [sys.executable, "-c", "from loadtests.cli import load; load()", "--rest", url, "--client", "wire"]
-            times = [
-                "--rate",
-                f"{rate:g}",
-                "--duration",
-                f"{_GAPS * requests / rate:g}",
-                "--warmup",
-                "0",
-                "--out",
-                folder,
-            ]
-            subprocess.run([*load, *times, "--processes", str(workers)], check=False)
+            times = ["--users", str(users), "--duration", f"{seconds:g}", "--warmup", "0"]
+            subprocess.run([*load, *times, "--processes", str(workers), "--out", folder], check=False)
             server.send_signal(signal.SIGINT)
             reached = int(server.stdout.readline())
         found: dict[str, Any] = json.loads((Path(folder) / "latency.json").read_text())
@@ -196,9 +188,10 @@ def _after_pauses(series: dict[str, Any]) -> int:
 def main() -> int:
     """Count everything twice."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--requests", type=int, default=1_000_000, help="in each part [1,000,000]")
+    parser.add_argument("--requests", type=int, default=1_000_000, help="for the recorders [1,000,000]")
     parser.add_argument("--workers", type=int, default=4, help="processes that record or load [4]")
-    parser.add_argument("--rate", type=float, default=4000.0, help="requests a second of the run [4,000]")
+    parser.add_argument("--seconds", type=float, default=150.0, help="of the run [150]")
+    parser.add_argument("--users", type=int, default=16, help="of the run, each with one request under way [16]")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=["recorders", "run"], help="one part alone")
     options = parser.parse_args()
@@ -207,7 +200,7 @@ def main() -> int:
     if options.only != "run":
         met.append(recorders(options.requests, options.workers, options.seed))
     if options.only != "recorders":
-        met.append(run(options.requests, options.workers, options.rate))
+        met.append(run(options.seconds, options.workers, options.users))
     return 0 if all(met) else 1
 
 

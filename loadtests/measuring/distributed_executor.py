@@ -185,8 +185,8 @@ class DistributedExecutor:
         del environment
         self._on_report(msg.node_id, msg.data)
         member = self._by_client.get(msg.node_id)
-        if member is not None:
-            member.done = True
+        if member is not None:  # one that was given up and has done its part all the same is not lost
+            member.state, member.done, member.lost_at_s, member.share = "finished", True, None, None
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
         """Carry out a plan with the workers that are left; returns with what they reported."""
@@ -237,13 +237,17 @@ class DistributedExecutor:
         return origin
 
     def _look_for_lost(self, present: list[tuple[str, Member]], plan: Plan, *, overdue: bool) -> None:
-        """Give up members whose process has ended, whose heartbeat has stopped, or that are overdue."""
+        """Give up members whose process has ended, whose heartbeat has stopped, or that are overdue.
+
+        A heart that beats again takes the word back: a busy machine silences workers that go on with their part.
+        """
         for number, (client, member) in enumerate(present):
-            if member.done:
-                continue
             child = self._children.get(member.pid)
-            ended = child is not None and child.poll() is not None
-            if overdue or ended or not self._is_there(client):
+            there = self._is_there(client) and (child is None or child.poll() is None)
+            if member.state == "lost" and there and not overdue:
+                member.state, member.done, member.lost_at_s, member.share = "finished", False, None, None
+                self.tell(f"worker {member.id} ({member.host}) is back")
+            elif not member.done and (overdue or not there):
                 member.state, member.done, member.lost_at_s = "lost", True, (now_ns() - self._began) / _NS
                 if plan.open_model:
                     schedule = Schedule(plan, number, len(present))
