@@ -4,6 +4,7 @@ Both send the next request of a connection when the answer to the last one is co
 this module is the second kind: ``python loader.py HOST PORT CONNECTIONS SECONDS < request``.
 """
 
+import gc
 import json
 import os
 import re
@@ -16,8 +17,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
+_DEADLINE = 10.0  # seconds for an answer
 _LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
 _SUMMARY = """
 done = function(summary, latency, requests)
@@ -99,9 +101,37 @@ def _by_wrk(call: Call, connections: int, seconds: float, pin: Callable[[], None
     return Load(**json.loads(done.stdout.splitlines()[-1]))
 
 
+def alternately(calls: list[Call], rate: float, seconds: float) -> list[Load]:
+    """Send each request once in turn, so many turns a second, each when the answer before it is complete.
+
+    What the machine does to one server it does to all, which waiting for minutes between them would not say.
+    """
+    connections = [_Connection(call.host, call.port, call.octets()) for call in calls]
+    seen: list[list[tuple[float, bool]]] = [[] for _ in calls]
+    started = time.perf_counter()
+    gc.disable()
+    for turn in range(round(rate * seconds)):
+        time.sleep(max(0.0, started + turn / rate - time.perf_counter()))
+        for connection, answers in zip(connections, seen, strict=True):
+            connection.send()
+            while (outcome := connection.received()) is None:
+                pass
+            answers.append(outcome)
+    gc.enable()
+    took = time.perf_counter() - started
+    for connection in connections:
+        connection.socket.close()
+    return [_load_of([at for at, _ in answers], sum(not ok for _, ok in answers), took) for answers in seen]
+
+
+def _load_of(times: list[float], errors: int, seconds: float) -> Load:
+    p99 = statistics.quantiles(times, n=100)[-1]
+    return Load(len(times), seconds, statistics.median(times) * 1e6, p99 * 1e6, errors)
+
+
 class _Connection:
     def __init__(self, host: str, port: int, request: bytes) -> None:
-        self.socket = socket.create_connection((host, port))
+        self.socket = socket.create_connection((host, port), timeout=_DEADLINE)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._request = request
         self._answer = b""
@@ -142,9 +172,7 @@ def _main(host: str, port: str, connections: str, seconds: str) -> None:
                 times.append(outcome[0])
                 errors += not outcome[1]
                 by_number[number].send()
-    measured = {"requests": len(times), "seconds": time.perf_counter() - started}
-    found = {"median_us": statistics.median(times) * 1e6, "p99_us": statistics.quantiles(times, n=100)[-1] * 1e6}
-    print(json.dumps(measured | found | {"errors": errors}))
+    print(json.dumps(asdict(_load_of(times, errors, time.perf_counter() - started))))
 
 
 if __name__ == "__main__":

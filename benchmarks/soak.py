@@ -26,8 +26,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from fixed import running_bare
 from loader import Call
-from robot import DELIVERY, ENVELOPE, report, running_bare
+from robot import DELIVERY, ENVELOPE, report
 
 RATE = 100.0  # good requests a second, and as many to the bare application
 SLICES = 10  # of a window; its p99 is the median of theirs, so that a neighbour's burst is none of the robot's
@@ -116,7 +117,7 @@ class Soak:
             pid, rest, soap = stack.enter_context(self._web_services())
             pose = Call("127.0.0.1", rest, "GET", "/robot/pose/")
             self._await_pose(rest)
-            bare = stack.enter_context(running_bare([pose]))
+            bare, _ = stack.enter_context(running_bare([pose]))
             clients = {False: Client(rest), True: Client(soap)}
             yardstick = Client(bare)
             before = Footprint.of(pid)

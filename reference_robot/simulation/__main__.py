@@ -5,6 +5,7 @@ the end of its standard input where that is a pipe: a robot does not outlive the
 """
 
 import contextlib
+import gc
 import os
 import stat
 import sys
@@ -53,6 +54,7 @@ def main(
         threading.Thread(target=_await_end_of_stdin, args=(ending,), daemon=True).start()
     with RosRuntime(domain_id, ros_arguments) as ros:
         Simulation(ros, names, time_scale, Realism(seed) if realistic else None)
+        gc.freeze()  # what lives as long as the robot is not looked at again
         ros.start()
         click.echo("ready")
         ending.wait()
