@@ -9,7 +9,7 @@ from reports.latency.distributions import Series
 from reports.latency.figures.spans import means
 from reports.latency.figures.timeline import Stall, stalls
 from reports.latency.numbers import interval, ms, rate, ratio, share
-from reports.latency.of_series import cold, repeated
+from reports.latency.of_series import cold, repeated, work
 
 _MANY_FAR = 0.01
 _MISSED = 1  # the exit code of a run whose thresholds are missed, be it because requests failed
@@ -87,6 +87,7 @@ def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
     """Further findings, a sentence each: noise floor, stalls, knee, failures."""
     return [
         *_noise(result),
+        *work(series),
         *cold(series),
         *repeated(series),
         *_other_ways(result),

@@ -1,9 +1,28 @@
-"""What is said of each series by itself: after a pause, and over several repeats."""
+"""What is said of each series by itself: after a pause, over several repeats, and of the robot's own part in it."""
 
 from collections.abc import Mapping
 
 from reports.latency.distributions import Series
 from reports.latency.numbers import interval, ms
+
+#: Where the robot's own parts differ by this factor, the interfaces make it do different work.
+_OTHER_WORK = 1.5
+
+
+def work(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+    """Where the robot says that it is itself busy for longer over one interface than over the other."""
+    told = []
+    for (operation, client, interface), rest in series.items():
+        soap = series.get((operation, client, "soap"))
+        if interface != "rest" or client != "wire" or soap is None:
+            continue
+        spent = [float((one.data["spans_ms"]["server"] or {}).get("p50") or 0.0) for one in (rest, soap)]
+        if 0 < _OTHER_WORK * min(spent) <= max(spent):
+            told.append(
+                f"{operation.capitalize()}: the robot itself is busy for {ms(spent[0])} ms over REST and "
+                f"{ms(spent[1])} ms over SOAP at the median (its Server-Timing): that is not the same work."
+            )
+    return told
 
 
 def cold(series: Mapping[tuple[str, str, str], Series]) -> list[str]:

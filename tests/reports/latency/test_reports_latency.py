@@ -167,6 +167,14 @@ def test_no_difference_is_not_called_one(latency):
     assert headline(latency, all_series(latency, "x")).startswith("No difference between SOAP and REST can be shown")
 
 
+def test_a_robot_that_works_longer_over_one_interface_is_told_of(latency):
+    said = "Pose: the robot itself is busy for 0.035 ms over REST and 0.065 ms over SOAP at the median"
+    assert sum(said in remark for remark in remarks(latency, all_series(latency, "x"))) == 1
+    for series in latency["series"]:
+        series["spans_ms"]["server"]["p50"] = 0.05
+    assert not any("not the same work" in remark for remark in remarks(latency, all_series(latency, "x")))
+
+
 def test_robot_without_server_timing(latency):
     for series in latency["series"]:
         series["spans_ms"]["server"] = None
