@@ -17,11 +17,11 @@ from loadtests.result.processes import process_figures
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import GAP_S, step_operation
 from loadtests.statistics import against, end_to_end, figures, modes, over_time, steps, threshold, verdict
+from loadtests.statistics.further_interfaces import further_interfaces
 from loadtests.statistics.headline import headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
-from loadtests.statistics.third_way import other_ways
 
 if TYPE_CHECKING:
     from loadtests.measuring.preflight import Findings
@@ -53,18 +53,15 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     noise_floor = figures.noise_floor(measured)
     compared = _against(outcome, measured, noise_floor)
     code = _code(outcome, aborted, Reasons(reasons, undecided), judged, compared)
-    reasons += undecided
     words = _plan_words(settings, plan, pacing)
     document = {
-        "format": FORMAT,
-        "valid": not reasons,
-        "invalid_because": reasons,
+        "valid": not reasons and not undecided,
+        "invalid_because": reasons + undecided,
         "notes": outcome.notes + notes + spoilt + losses,
         "interrupted": outcome.interrupted or outcome.dead_at is not None,
         "exit_code": code,
         "started": _stamp(outcome.started),
         "finished": _stamp(datetime.now(UTC)),
-        "headline": headline(comparisons, words),
         "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers) | {"machine": machine},
         "plan": words,
         "generator": generator,
@@ -76,7 +73,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "comparisons": comparisons,
         "heat_map": modes.heat_map(measured),
         "noise_floor": noise_floor,
-        "other_ways": other_ways(measured),
+        "further_interfaces": further_interfaces(measured),
         **_end_to_end(outcome),
         **({"against": compared} if compared else {}),
         "time_series": over_time.time_series(measured),
@@ -88,7 +85,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "errors": over_time.errors(recorder, plan.operations) + _early_errors(outcome.findings),
         "thresholds": judged,
     }
-    return code, document
+    return code, {"format": FORMAT, "headline": headline(document, reasons, undecided)} | document
 
 
 def _generator(outcome: Outcome, measured: Measured) -> dict[str, Any]:

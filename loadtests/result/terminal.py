@@ -16,8 +16,15 @@ def _ms(value: float | None) -> str:
     return "       -" if value is None else f"{value:8.3f}"
 
 
+def _times(entry: dict[str, Any]) -> str:
+    """A ratio with its interval."""
+    bounds = entry["ci95"]
+    sure = f" (95 %: {bounds[0]:.3f} to {bounds[1]:.3f})" if bounds else ""
+    return f"{entry['ratio']:.3f}{sure} times"
+
+
 def summary(document: dict[str, Any]) -> str:
-    """A table of the series, the comparisons of medians, thresholds, and whether it is worth anything."""
+    """A table of the series, the comparisons of medians, thresholds; at the end, where one looks, the headline."""
     lines = ["operation  interface  client     count  errors  service p50      p90      p99  response p99   (ms)"]
     for entry in document["series"]:
         service, response = entry["service_ms"], entry["response_ms"]
@@ -26,26 +33,40 @@ def summary(document: dict[str, Any]) -> str:
             f"{entry['errors']:7}     {_ms(service['p50'])} {_ms(service['p90'])} {_ms(service['p99'])}      "
             f"{_ms(response['p99'])}"
         )
-    for entry in document["comparisons"]:
-        if entry["quantile"] == "p50" and entry["ratio"] is not None:
-            interval = entry["ci95"]
-            between = f" (95 %: {interval[0]:.3f} to {interval[1]:.3f})" if interval else ""
-            lines.append(
-                f"{entry['operation']} ({entry['client']}): SOAP takes {entry['ratio']:.3f}{between} times as long "
-                f"as REST at the median, {entry['soap_minus_rest_ms']:+.3f} ms: {_JUDGED[entry['judgement']]}"
-            )
-    for entry in document["other_ways"]:
-        if entry["quantile"] == "p50" and entry["ratio"] is not None:
-            interval = entry["ci95"]
-            between = f" (95 %: {interval[0]:.3f} to {interval[1]:.3f})" if interval else ""
-            lines.append(
-                f"{entry['operation']} ({entry['client']}): {entry['interface']} takes {entry['ratio']:.3f}{between} "
-                f"times as long as REST at the median, {entry['minus_rest_ms']:+.3f} ms"
-            )
+    lines += _medians(document)
     lines += _end_to_end(document.get("end_to_end"))
-    if document["headline"]:
-        lines.append(document["headline"]["sentence"])
     lines += _against(document.get("against"))
+    lines += _knees(document)
+    for entry in document["thresholds"]:
+        reason = f": {entry['reason']}" if entry["reason"] else ""
+        lines.append(f"threshold {entry['outcome']}: {entry['name']}{reason}")
+    lines += [f"{entry['count']} errors ({entry['kind']}): {entry['message']}" for entry in document["errors"][:5]]
+    lines += [f"note: {note}" for note in document["notes"]]
+    words, sentence = document["headline"]["words"], document["headline"]["sentence"]
+    lines.append(sentence if sentence.startswith(words) else f"{words}. {sentence}")
+    return "\n".join(lines) + "\n"
+
+
+def _medians(document: dict[str, Any]) -> list[str]:
+    """Each interface's median beside REST's."""
+    soap = [
+        f"{entry['operation']} ({entry['client']}): SOAP takes {_times(entry)} as long as REST at the median, "
+        f"{entry['soap_minus_rest_ms']:+.3f} ms: {_JUDGED[entry['judgement']]}"
+        for entry in document["comparisons"]
+        if entry["quantile"] == "p50" and entry["ratio"] is not None
+    ]
+    further = [
+        f"{entry['operation']} ({entry['client']}): {entry['interface']} takes {_times(entry)} as long as REST at the "
+        f"median, {entry['minus_rest_ms']:+.3f} ms"
+        for entry in document["further_interfaces"]
+        if entry["quantile"] == "p50" and entry["ratio"] is not None
+    ]
+    return soap + further
+
+
+def _knees(document: dict[str, Any]) -> list[str]:
+    """Where the robot gives way, by steps and by bisection."""
+    lines = []
     for entry in document["knee"]:
         highest = entry["highest_rate"]
         reached = (
@@ -53,40 +74,30 @@ def summary(document: dict[str, Any]) -> str:
         )
         lines.append(f"{entry['interface']}: {reached}: {entry['criterion']}")
     for entry in document["knee_search"]:
-        found = entry["rate"] is not None
-        between = (
-            f" ({entry['interval'][0]:.0f} to {entry['interval'][1]:.0f}, {entry['searches']} searches)"
-            if found
-            else ""
-        )
-        held = f"held up to {entry['held_up_to'] or 0:.0f}/s and on"
-        lines.append(f"{entry['interface']}: " + (f"gives way at {entry['rate']:.0f}/s{between}" if found else held))
-    for entry in document["thresholds"]:
-        reason = f": {entry['reason']}" if entry["reason"] else ""
-        lines.append(f"threshold {entry['outcome']}: {entry['name']}{reason}")
-    lines += [f"{entry['count']} errors ({entry['kind']}): {entry['message']}" for entry in document["errors"][:5]]
-    lines += [f"note: {note}" for note in document["notes"]]
-    lines += [f"not valid: {reason}" for reason in document["invalid_because"]]
-    return "\n".join(lines) + "\n"
+        if entry["rate"] is not None:
+            low, high = entry["interval"]
+            found = f"gives way at {entry['rate']:.0f}/s ({low:.0f} to {high:.0f}, {entry['searches']} searches)"
+        elif entry["held_up_to"] is not None:
+            found = f"did not give way up to {entry['held_up_to']:.0f}/s"
+        else:
+            found = "no rate tried meets the criterion"
+        lines.append(f"{entry['interface']}: {found}")
+    return lines
 
 
 def _against(compared: dict[str, Any] | None) -> list[str]:
-    """What the comparison with another robot found, a line for each figure that is judged, and the verdict."""
+    """What the comparison with another robot found, a line for each figure that is judged."""
     if compared is None:
         return []
     lines = []
     for entry in compared["changes"]:
         if entry["verdict"] is None or entry["ratio"] is None:
             continue
-        interval = entry["ci95"]
-        between = f" (95 %: {interval[0]:.3f} to {interval[1]:.3f})" if interval else ""
         lines.append(
-            f"{entry['operation']} over {entry['interface']} ({entry['client']}): {entry['ratio']:.3f}{between} times "
+            f"{entry['operation']} over {entry['interface']} ({entry['client']}): {_times(entry)} "
             f"as long as the other robot at {entry['quantile']}, {entry['difference_ms']:+.3f} ms: {entry['verdict']}"
         )
-    told = {"slower": "slower", "not slower": "shown not to be slower", "unclear": "it cannot be told: measure longer"}
-    tolerance = f"{compared['tolerance']:.3g}"
-    return [*lines, f"against the other robot, tolerance {float(tolerance):.1%}: {told[compared['verdict']]}"]
+    return lines
 
 
 def _end_to_end(found: dict[str, Any] | None) -> list[str]:

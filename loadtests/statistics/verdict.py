@@ -155,4 +155,4 @@ def says_nothing(comparisons: Sequence[dict[str, Any]]) -> list[str]:
     if not medians or any(entry["judgement"] != "none" for entry in medians):
         return []
     reasons = dict.fromkeys(str(entry["judgement_reason"]) for entry in medians)
-    return [f"the duel carries no statement: {'; '.join(reasons)}"]
+    return [f"the duel tells nothing of SOAP and REST: {'; '.join(reasons)}"]

@@ -26,22 +26,24 @@ def work(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
 
 
 def cold(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """What a request costs after a pause, beside one right behind another."""
-    told = []
+    """What a request costs after a pause, beside one right behind another: a sentence for all series."""
+    told, after, behind = [], "", ""
     for one in series.values():
         pause = one.data.get("after_pause")
         if pause and pause["cold_ms"]["p50"] is not None and pause["warm_ms"]["p50"] is not None:
             bounds = pause["cold_ci95_ms"]
-            sure = f" (95 % interval {interval(bounds)})" if bounds else ""
-            told.append(
-                f"{one.name}: {ms(pause['cold_ms']['p50'])} ms{sure} after a pause of {pause['pause_s']:g} s, "
-                f"{ms(pause['warm_ms']['p50'])} ms {_behind(pause['spacing_s'])}."
-            )
-    return told
+            sure = f" ({interval(bounds)})" if bounds else ""
+            after, behind = f"after a pause of {pause['pause_s']:g} s", _behind(pause["spacing_s"])
+            told.append(f"{one.name} {ms(pause['cold_ms']['p50'])} ms{sure} and {ms(pause['warm_ms']['p50'])} ms")
+    if not told:
+        return []
+    return [f"Medians {after}, and {behind}: {'; '.join(told)}."]
 
 
 def _behind(spacing_s: float) -> str:
-    return f"{ms(spacing_s * 1e3)} ms behind another, which is the limit" if spacing_s else "right behind another"
+    return (
+        f"{ms(spacing_s * 1e3)} ms behind another request, which is the limit" if spacing_s else "right behind another"
+    )
 
 
 def repeated(series: Mapping[tuple[str, str, str], Series]) -> list[str]:

@@ -74,7 +74,7 @@ def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         "verdict": verdict(result, series),
         "remarks": remarks(result, series),
         "paper": paper_rows(result, series),
-        "reasons": sorted({reason for one in series.values() for reason in one.data.get("reasons", {}).values()}),
+        "reasons": _missing(series),
         "means": means,
         "spans": SPANS,
         "quantiles": QUANTILES,
@@ -89,6 +89,12 @@ def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         "dash": NONE,
         "tag": against.tag,
     }
+
+
+def _missing(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+    """Why figures are missing, each reason once however many requests a series had."""
+    reasons = (reason for one in series.values() for reason in one.data.get("reasons", {}).values())
+    return sorted({reason.rpartition("; ")[2] for reason in reasons})
 
 
 def _rounds(result: Mapping[str, Any]) -> list[str]:

@@ -12,6 +12,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from reports.latency.page import latency_markdown
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in `roaas load`: its threads spin on a busy machine
 
 HERE = Path(__file__).parent
@@ -72,9 +74,13 @@ class Loaded:
 
     @property
     def result(self):
-        """The result file, which keeps to its schema whatever became of the run."""
+        """The result file; whatever became of the run it keeps to its schema, and all reports say its headline."""
         result = json.loads((self.folder / "latency.json").read_text())
         jsonschema.Draft202012Validator(SCHEMA).validate(result)
+        short, sentence = latency_markdown(result), result["headline"]["sentence"]
+        assert sentence in short
+        assert self.out.rstrip().endswith(sentence)
+        assert not re.search(r"\b(None|nan)\b", short + self.out)
         return result
 
     def series(self, operation, interface):

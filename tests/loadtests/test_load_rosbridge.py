@@ -45,7 +45,9 @@ def test_rosbridge_is_a_third_line_of_the_duel(toy, bridge, load):
     assert delivery["service_ms"]["p50"] >= 3, "an echo takes the bridge 3 ms"
     assert 3 <= pose["service_ms"]["p50"] <= 40, "there is odometry every 20 ms"
     ratio = next(
-        entry for entry in result["other_ways"] if (entry["operation"], entry["quantile"]) == ("delivery", "p50")
+        entry
+        for entry in result["further_interfaces"]
+        if (entry["operation"], entry["quantile"]) == ("delivery", "p50")
     )
     assert ratio["ratio"] > 1
     assert ratio["minus_rest_ms"] > 1

@@ -11,7 +11,7 @@ from reports.latency.figures.canvas import COLOUR, MARK, Panel, Picture, drawing
 def load(result: Mapping[str, Any]) -> Picture | None:
     """Latency over the offered rate, the knee as a vertical line; and over the number of busy connections."""
     steps = [step for step in result.get("steps", []) if step["offered_rate"] > 0]
-    crowds = result.get("over_connections", [])
+    crowds = [one for one in result.get("over_connections", []) if one["p50_ms"] is not None]
     with drawing():
         panels = [_latency(steps, result.get("knee", []))] if steps else []
         panels += [_crowd(crowds)] if crowds else []

@@ -78,16 +78,18 @@ def timeline(result: Mapping[str, Any]) -> Picture | None:
             log_time_axis(panel.axes, "y", "response time, ms")
             panel.axes.xaxis.set_major_locator(MaxNLocator(7, integer=True))
             panel.axes.set_xlabel("seconds since the start")
-            for stall in own[:3]:
-                if stall.longest_ms is not None:
-                    panel.axes.annotate(
-                        f"{stall.longest_ms:,.0f} ms",
-                        (stall.end_s, stall.longest_ms),
-                        (4, 0),
-                        textcoords="offset points",
-                        va="center",
-                        color=INK,
-                    )
+            longest = max(own, key=lambda stall: stall.longest_ms or 0.0, default=None)
+            if longest is not None and longest.longest_ms is not None:
+                late = longest.end_s > 0.8 * panel.axes.get_xlim()[1]  # there is no room to the right
+                panel.axes.annotate(
+                    f"{longest.longest_ms:,.0f} ms",
+                    (longest.start_s if late else longest.end_s, longest.longest_ms),
+                    (-4 if late else 4, 0),
+                    textcoords="offset points",
+                    ha="right" if late else "left",
+                    va="center",
+                    color=INK,
+                )
             panel.legend()
             panels.append(panel)
         return gather(

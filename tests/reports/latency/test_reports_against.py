@@ -9,15 +9,8 @@ CHANGE = {"operation": "pose", "interface": "rest", "client": "wire", "quantile"
 FIGURES = {"difference_ms": 0.021, "ratio": 1.21, "ci95": [1.14, 1.29], "ci95_difference_ms": [0.014, 0.029]}
 
 
-@pytest.mark.parametrize(
-    ("verdict", "words"),
-    [
-        ("slower", "Slower than the other robot"),
-        ("not slower", "Not slower than the other robot"),
-        ("unclear", "Whether it is slower cannot be told"),
-    ],
-)
-def test_the_verdict_leads_with_its_interval(latency, verdict, words):
+@pytest.mark.parametrize(("verdict", "sign"), [("slower", "✗"), ("not slower", "✓"), ("unclear", "?")])
+def test_the_headline_leads_with_the_sign_of_its_verdict(latency, verdict, sign):
     judged = CHANGE | FIGURES | {"verdict": verdict}
     shown = CHANGE | FIGURES | {"quantile": "mean", "verdict": None}
     none = CHANGE | dict.fromkeys(FIGURES) | {"quantile": "p99", "verdict": "unclear", "reason": "9 samples"}
@@ -29,13 +22,14 @@ def test_the_verdict_leads_with_its_interval(latency, verdict, words):
         "changes": [judged, shown, none],
         "series": [],
     }
+    latency["headline"] = {"words": f"So it is {verdict}", "sentence": "This robot takes 1.21 times as long."}
     validator(LATENCY_FORMAT).validate(latency)
     text = latency_markdown(latency)
-    assert words in text
-    assert "1.14 to 1.29 times as long as the other one" in text
+    assert f"{sign} So it is {verdict}" in text
+    assert "This robot takes 1.21 times as long." in text
     assert "None" not in text
     if verdict == "slower":  # drawing takes its time: one page for all three
         page = latency_html(latency)
-        assert words in page
+        assert f"{sign} So it is {verdict}" in page
         assert "http://old:7003" in page
         assert 'id="against-0"' in page, "the ratios are drawn"

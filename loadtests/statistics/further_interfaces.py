@@ -1,4 +1,4 @@
-"""Interfaces beside SOAP and REST, each over REST: the `other_ways` of latency.json."""
+"""Interfaces beside SOAP and REST, such as rosbridge, each over REST: the `further_interfaces` of latency.json."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _BASE = "rest"
 _WEB_SERVICES = (_BASE, "soap")
 
 
-def other_ways(measured: Measured) -> list[dict[str, Any]]:
+def further_interfaces(measured: Measured) -> list[dict[str, Any]]:
     """Every further interface's service time over REST's, by operation, client and quantile."""
     plan = measured.plan
     names = set(plan.series_names())
