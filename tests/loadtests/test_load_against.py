@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from conformance.contract.exit_codes import ExitCode
 from loadtests.cli import load as command
 
-FAST = "--rate 150 --duration 3.2 --warmup 0.2 --client wire"
+FAST = "--rate 100 --duration 2.4 --warmup 0.2 --client wire"
 
 
 def against(other):
@@ -27,14 +27,14 @@ def change(result, interface, quantile="p50"):
 
 
 def test_a_robot_that_is_slower_than_another_is_told_from_it(toy, load):
-    quick, slow = toy(), toy("--delay", "0.004")
+    quick, slow = toy(), toy("--delay", "0.03")  # beyond what a busy machine adds
     run = load(*slow.both(), *against(quick), FAST, "--tolerance 50%")
     result = run.result
     assert run.code == (ExitCode.FAILED if result["valid"] else ExitCode.INCONCLUSIVE), run.out + run.err
     assert result["against"]["verdict"] == "slower"
     for interface in ("rest", "soap"):
         found = change(result, interface)
-        assert found["difference_ms"] > 2.5
+        assert found["difference_ms"] > 15
         assert found["ci95"][0] > 1.5
         assert found["verdict"] == "slower"
     assert result["comparisons"] == [], "no interface met another one: robots did"
