@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from conformance.contract.exit_codes import ExitCode
 from loadtests.cli import load as command
 
-FAST = "--rate 100 --duration 2.4 --warmup 0.2 --client wire"
+FAST = "--rate 150 --duration 3.2 --warmup 0.2 --client wire"
 
 
 def against(other):
