@@ -242,6 +242,7 @@ def resources_of(contract: Contract) -> tuple[Resource, ...]:
     return tuple(Resource(template, operations) for template, operations in by_path.items())
 
 
+@lru_cache(maxsize=512)
 def resource_at(contract: Contract, path: str) -> Resource | None:
     """The resource that a path is for; a literal path wins over a template (OpenAPI 3.1, 4.8.8.2)."""
     found = [item for item in resources_of(contract) if item.pattern.fullmatch(path)]
@@ -259,6 +260,7 @@ def known_path(contract: Contract, path: str) -> bool:
     return resource_at(contract, path) is not None
 
 
+@lru_cache(maxsize=512)
 def is_normal(path: str) -> bool:
     """Whether a path has no segment that servers take away by themselves: an empty one, ``.`` or ``..``."""
     segments = [unquote(segment) for segment in path.split("/")]

@@ -1,11 +1,12 @@
 """Whether a document is a valid OpenAPI description: by the schema of its version, its references and its paths."""
 
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 from conformance.documents.json_schema import UnresolvedError
-from conformance.documents.openapi import PARAMETER, read_operations
+from conformance.documents.openapi import PARAMETER, Operation, read_operations
 
 
 def openapi_fault(document: Any) -> str:
@@ -23,12 +24,12 @@ def openapi_fault(document: Any) -> str:
         where = ".".join(str(part) for part in error.instance_path)
         return f"at {where or 'its root'}: {error.message[:200]}"
     try:
-        read_operations(document)
+        operations = read_operations(document)
     except UnresolvedError as unresolved:
         return str(unresolved)
     except (AttributeError, TypeError, KeyError, RecursionError) as broken:
         return f"it is not built as one: {broken!r}"
-    return _path_fault(document)
+    return _path_fault(operations)
 
 
 @lru_cache(maxsize=4)
@@ -40,9 +41,9 @@ def _validator(version: str) -> Any:
     return jsonschema_rs.validator_for(schema)
 
 
-def _path_fault(document: dict[str, Any]) -> str:
+def _path_fault(operations: Sequence[Operation]) -> str:
     """A path parameter that is used and not described, or described and not used (OpenAPI 3.1, 4.8.8.2)."""
-    for operation in read_operations(document):
+    for operation in operations:
         used = set(PARAMETER.findall(operation.template))
         described = {item.name for item in operation.parameter("path")}
         if used != described:

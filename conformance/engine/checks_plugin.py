@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from conformance.verdict.explorer import Explorer
     from conformance.verdict.run import Run
 
-# Reading first; then what needs a robot at rest; deliveries late, because a robot drives long after them; attacks last.
-PHASES = ("reach", "reading", "describe", "motion", "input", "delivery", "attack")
+# Reading first; then what needs a robot at rest; deliveries late, because a robot drives long after them, and what only
+# reads descriptions while it is seen whether more comes of them; attacks last.
+PHASES = ("reach", "reading", "motion", "input", "delivery", "arrival", "describe", "late", "attack")
 
 _NO_ADDRESS = "the robot's {} interface has no address"
 _Interface = TypeVar("_Interface")

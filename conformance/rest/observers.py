@@ -6,6 +6,7 @@ They judge only what the request itself makes applicable; strange requests are l
 import re
 from collections.abc import Iterable
 from email.utils import parsedate_to_datetime
+from functools import lru_cache
 from http import HTTPStatus
 
 from conformance.documents.json_text import read_json
@@ -170,6 +171,7 @@ def _other_charset(answer: Response) -> str:
         return ""
 
 
+@lru_cache(maxsize=64)
 def _is_date(value: str | None) -> bool:
     try:
         return value is not None and parsedate_to_datetime(value) is not None

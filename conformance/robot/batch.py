@@ -4,6 +4,7 @@ Whether each has arrived is seen as soon as all have; that none comes twice is s
 watched for a while, so that the batches need no pause between them.
 """
 
+import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -78,6 +79,8 @@ class Batch:
         self._strange = 0
         # Of what was sent without an answer, by its key: it may arrive, whenever.
         self._maybe: set[bytes] = set()
+        # When the last batch had been collected, s of the monotonic clock.
+        self._collected = time.monotonic()
         observer.mark()
 
     def run(self, orders: Sequence[Order]) -> bool:
@@ -107,14 +110,16 @@ class Batch:
         return self._judge_only(sent, seen) and well
 
     def finish(self, watched_s: float) -> None:
-        """Judge what arrives later than it should, for so long, s."""
-        self._judge_only([], self._observer.collect(0, watched_s))
+        """Judge what arrived later than it should, in so many seconds since the last batch, which may have passed."""
+        left_s = self._collected + watched_s - time.monotonic()
+        self._judge_only([], self._observer.collect(0, max(0.0, left_s)))
 
     def _collect(self, sent: Sequence[_Sent]) -> list[Seen]:
         """What arrived since this was asked last; what is not just what was sent is looked at for a little longer."""
         seen = self._observer.collect(len(sent), 0.0)
         if sorted(self._key(one.delivery) for one in seen) != sorted(self._key(one.delivery) for one in sent):
             seen += self._observer.collect(0)
+        self._collected = time.monotonic()
         return seen
 
     def _send(self, order: Order) -> list[_Sent]:

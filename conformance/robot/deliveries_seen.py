@@ -10,7 +10,7 @@ from conformance.robot.message_shapes import DELIVERIES as LIST
 from conformance.robot.message_shapes import read_as
 from conformance.robot.probe.client import Probe, ProbeError, RosProbe
 from conformance.robot.robot import ACCEPT_JSON, DELIVERIES
-from conformance.transport.client import HttpClient
+from conformance.transport.client import Connection, HttpClient
 from conformance.transport.pace import Patience
 
 # How long messages are waited for, and how long after the last one another is still looked for, s.
@@ -116,19 +116,20 @@ class ProbeObserver:
 
     Args:
         probe: its process.
+        connection: tells whether anything was sent meanwhile.
     """
 
     exact = True
 
-    def __init__(self, probe: Probe) -> None:
+    def __init__(self, probe: Probe, connection: Connection) -> None:
         self._probe = probe
-        self._marked = False
+        self._connection = connection
 
     def mark(self) -> None:
         """See DeliveryObserver."""
-        if not self._marked:
-            time.sleep(QUIET_S)  # what others sent may still be on its way; later collect() has waited
-            self._marked = True
+        if self._probe.heard != self._connection.sent:
+            time.sleep(QUIET_S)  # what was sent since somebody collected may still be on its way
+            self._probe.heard = self._connection.sent
         self._probe.deliveries()
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
@@ -141,6 +142,8 @@ class ProbeObserver:
         if then_s:
             time.sleep(then_s)
             seen += self._probe.deliveries()
+        if then_s >= QUIET_S:
+            self._probe.heard = self._connection.sent
         return [Seen(delivery) for delivery in seen]
 
 
@@ -153,7 +156,7 @@ def observer_of(api: RestInterface, probe: RosProbe) -> DeliveryObserver:
     reason = "no ROS domain is given (--ros-domain-id)"
     if api.run.statement.ros.domain_id is not None:
         try:
-            return ProbeObserver(probe.ready())
+            return ProbeObserver(probe.ready(), api.client.connection)
         except ProbeError as error:
             reason = f"the ROS probe does not work: {error}"
     exchange = api.client.send("GET", DELIVERIES, headers=ACCEPT_JSON)

@@ -45,6 +45,15 @@ def stop_robot(api: RestInterface) -> None:
         bring_to_rest(api)
 
 
+def halt(api: RestInterface) -> None:
+    """Cancel and stop what the robot may be doing, without waiting until it stands still.
+
+    Between checks for which it does not matter that the robot still slows down; the others bring it to rest.
+    """
+    if api.run.allow_motion and api.run.contract.own:
+        _Stiller(api.client, _slowest(api)).halt(_CANCEL_S)
+
+
 def leave_at_rest(api: RestInterface) -> None:
     """Stop the robot at the end of a run, also one that was interrupted, and also a robot that hardly answers.
 
@@ -95,12 +104,14 @@ class _Stiller:
 
     def bring(self, cancel_s: float, settle_s: float) -> str:
         """Cancel and stop; what bring_to_rest() says of it."""
+        return self.halt(cancel_s) or self._wait(self._patience(settle_s))
+
+    def halt(self, cancel_s: float) -> str:
+        """Cancel what is there within so many seconds, and command rest; empty, or why something is still active."""
         cancelled = self._no_goal_left(self._patience(cancel_s))
         # Also where the goal could not be cancelled: a robot that takes velocities meanwhile stops for a moment.
         self._ask("PUT", VELOCITY, JSON_BODY, body_of(STILL.twist))
-        if not cancelled:
-            return f"its goal is still active after {cancel_s:g} s of cancelling it"
-        return self._wait(self._patience(settle_s))
+        return "" if cancelled else f"its goal is still active after {cancel_s:g} s of cancelling it"
 
     def _patience(self, seconds: float) -> Patience:
         return Patience(self._client.connection.pace, seconds)

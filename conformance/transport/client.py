@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 import httpcore
 
-from conformance.transport.deadlines import MAX_ANSWER, DeadlineBackend, set_deadline, tls_context
+from conformance.transport.deadlines import MAX_ANSWER, DeadlineBackend, has_connected, set_deadline, tls_context
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, NoAnswerError, Request, Response, Unanswered
 from conformance.transport.pace import Pace, time_to_arrive
 
@@ -81,6 +81,7 @@ class HttpClient:
         self.port = parts.port or (443 if parts.scheme == "https" else 80)
         self.prefix = parts.path
         self.authority = parts.netloc.rsplit("@", 1)[-1]
+        self._origin = (parts.scheme.encode(), self.host.encode("idna"))
         self._hangs: defaultdict[str, list[float]] = defaultdict(list)
         self._kept = 0
         self._dropped = 0
@@ -169,36 +170,23 @@ class HttpClient:
     def _exchange(
         self, method: str, path: str, fields: list[tuple[str, str]], body: bytes, deadline: float, *, fresh: bool
     ) -> Response:
-        url = httpcore.URL(
-            scheme=self.scheme.encode(),
-            host=self.host.encode("idna"),
-            port=self.port,
-            target=(self.prefix + path).encode("utf-8", "surrogateescape") or b"/",
-        )
+        scheme, host = self._origin
+        target = (self.prefix + path).encode("utf-8", "surrogateescape") or b"/"
+        url = httpcore.URL(scheme=scheme, host=host, port=self.port, target=target)
         request_headers = [(name.encode("latin-1"), value.encode("utf-8")) for name, value in fields]
-        opened: list[str] = []
+        # A read ends at the deadline of the exchange.
+        extensions = {"timeout": dict.fromkeys(("connect", "write", "pool"), deadline)}
         for attempt in (1, 2):
             self.connection.take_slot()
             set_deadline(deadline, len(body))
-            opened.clear()
             started = time.perf_counter()
             pool = self._new_pool() if fresh or attempt > 1 else self._pool
             try:
                 answer = pool.handle_request(
-                    httpcore.Request(
-                        method,
-                        url,
-                        headers=request_headers,
-                        content=body,
-                        extensions={
-                            # A read ends at the deadline of the exchange.
-                            "timeout": dict.fromkeys(("connect", "write", "pool"), deadline),
-                            "trace": lambda event, _info: opened.append(event) if "connect_tcp" in event else None,
-                        },
-                    )
+                    httpcore.Request(method, url, headers=request_headers, content=body, extensions=extensions)
                 )
                 content = _read(answer)
-                self._kept += not opened
+                self._kept += not has_connected()
                 return Response(
                     answer.status,
                     tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in answer.headers),
@@ -209,7 +197,7 @@ class HttpClient:
                 )
             except Exception as error:
                 none = _no_answer(error, deadline + time_to_arrive(len(body)))
-                if none.kind is NoAnswer.CLOSED and not opened and attempt == 1 and not self._drops_requests():
+                if none.kind is NoAnswer.CLOSED and not has_connected() and attempt == 1 and not self._drops_requests():
                     continue
                 raise none from error
             finally:

@@ -29,7 +29,12 @@ def set_deadline(seconds: float, octets: int = 0) -> None:
     seconds, there is nothing to give more time for.
     """
     _clock.at = time.monotonic() + seconds + time_for(octets)
-    _clock.seconds, _clock.unsent, _clock.octets = seconds, octets, octets
+    _clock.seconds, _clock.unsent, _clock.octets, _clock.connects = seconds, octets, octets, False
+
+
+def has_connected() -> bool:
+    """Whether the exchange that this thread started last had to open a connection, or tried to."""
+    return bool(getattr(_clock, "connects", False))
 
 
 def _left(timeout: float | None, error: type[Exception]) -> float:
@@ -85,6 +90,7 @@ class DeadlineBackend(httpcore.NetworkBackend):
         socket_options: Iterable[Any] | None = None,
     ) -> httpcore.NetworkStream:
         """See httpcore.NetworkBackend."""
+        _clock.connects = True
         left = _left(timeout, httpcore.ConnectTimeout)
         return _DeadlineStream(self._backend.connect_tcp(host, port, left, local_address, socket_options))
 

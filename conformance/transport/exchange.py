@@ -5,6 +5,7 @@ import gzip
 import shlex
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 
 _CURL_PLAIN_LIMIT = 4000
 
@@ -100,17 +101,24 @@ class Response:
     http_version: str = "HTTP/1.1"
     received_s: float = field(default=0.0, compare=False)
 
+    @cached_property
+    def _by_name(self) -> dict[str, list[str]]:
+        """The values of each field, by its name in lower case: every answer is looked through by many."""
+        found: dict[str, list[str]] = {}
+        for name, value in self.headers:
+            found.setdefault(name.lower(), []).append(value)
+        return found
+
     def header(self, name: str) -> str | None:
         """The value of a field, several joined by commas (RFC 9110 5.3); None where there is none."""
-        values = [value for key, value in self.headers if key.lower() == name.lower()]
+        values = self._by_name.get(name.lower())
         return ", ".join(values) if values else None
 
     def repeated(self, *names: str) -> str:
         """The first of these fields that stands more than once; empty where none does."""
-        there = [key.lower() for key, _ in self.headers]
-        return next((name for name in names if there.count(name.lower()) > 1), "")
+        return next((name for name in names if len(self._by_name.get(name.lower(), ())) > 1), "")
 
-    @property
+    @cached_property
     def media_type(self) -> str:
         """Content-Type without parameters, in lower case; empty where there is none."""
         return (self.header("content-type") or "").split(";", 1)[0].strip().lower()

@@ -1,4 +1,6 @@
-"""One request, one identical message, whichever interface it came by."""
+"""One request, one identical message, whichever interface it came by, and none that follows."""
+
+from typing import Final
 
 import pytest
 from hypothesis import strategies as st
@@ -14,7 +16,17 @@ from conformance.soap.service import SoapService
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
-pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest", "publishers"), pytest.mark.motion]
+pytestmark = [pytest.mark.needs("rest", "publishers"), pytest.mark.motion]
+_IDS: Final = (
+    "equivalence/delivery-rest",
+    "equivalence/delivery-soap",
+    "equivalence/coffee-soap",
+    "equivalence/delivery-same",
+    "equivalence/delivery-order",
+    "equivalence/delivery-repeated",
+    "equivalence/delivery-concurrent",
+    "equivalence/delivery-only",
+)
 # A robot's list holds at least the last fifty: no batch makes more messages than half of that.
 _ORDERS = 12
 _ENOUGH = 3
@@ -33,22 +45,26 @@ _ROUNDS = 3
 _LATER_S = (2.0, 0.6)
 
 
-@pytest.mark.requirement(
-    "equivalence/delivery-rest",
-    "equivalence/delivery-soap",
-    "equivalence/coffee-soap",
-    "equivalence/delivery-same",
-    "equivalence/delivery-order",
-    "equivalence/delivery-repeated",
-    "equivalence/delivery-concurrent",
-    "equivalence/delivery-only",
-)
+@pytest.fixture(scope="session")
+def watched() -> list[Batch]:
+    """The deliveries that were sent, of which more may come."""
+    return []
+
+
+@pytest.mark.phase("arrival")
+@pytest.mark.requirement(*_IDS)
 def test_deliveries_arrive(
-    api: RestInterface, publishers: SoapService, probe: RosProbe, judge: Judge, explore: Explorer
+    api: RestInterface,
+    publishers: SoapService,
+    probe: RosProbe,
+    judge: Judge,
+    explore: Explorer,
+    watched: list[Batch],
 ) -> None:
     """Deliveries over REST and SOAP, of any values, arrive once, unchanged and in order; also those of many clients."""
     try:
         batch = Batch(api.client, publishers, observer_of(api, probe), judge)
+        watched.append(batch)
         failed: list[list[Order]] = []
 
         def try_batch(orders: list[Order]) -> None:
@@ -63,7 +79,17 @@ def test_deliveries_arrive(
         for turn in range(api.run.effort.cases(8)):
             if len(failed) < _ENOUGH and not batch.run_together(_crowd(turn)):
                 failed.append([])
-        batch.finish(_LATER_S[api.run.effort.name == "quick"])
+    except (NoObserverError, ProbeError) as nobody:
+        pytest.skip(str(nobody))
+
+
+@pytest.mark.phase("late")
+@pytest.mark.requirement(*_IDS)
+def test_nothing_follows(api: RestInterface, watched: list[Batch]) -> None:
+    """No delivery is one more message later: meanwhile descriptions were read, and nobody sent another one."""
+    try:
+        for batch in watched:
+            batch.finish(_LATER_S[api.run.effort.name == "quick"])
     except (NoObserverError, ProbeError) as nobody:
         pytest.skip(str(nobody))
 

@@ -11,7 +11,7 @@ from conformance.rest.calls import JSON, Call, example_call
 from conformance.rest.interface import RestInterface
 from conformance.rest.number_forms import at_integer_ends, with_numbers
 from conformance.rest.statuses import is_cut_off, is_taken, judge_status
-from conformance.robot.stopping import stop_robot
+from conformance.robot.stopping import halt
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError
@@ -42,7 +42,7 @@ def _valid(api: RestInterface, judge: Judge, ids: tuple[str, ...]) -> Iterator[C
     """A valid request for each operation that takes JSON and is answered as one should be."""
     tried = 0
     for operation in applicable_operations(api, ids, lambda item: JSON in item.bodies, "takes JSON"):
-        stop_robot(api)
+        halt(api)
         call = example_call(api, operation)
         exchange = call.send(api)
         if is_taken(exchange):
@@ -51,7 +51,7 @@ def _valid(api: RestInterface, judge: Judge, ids: tuple[str, ...]) -> Iterator[C
         else:
             for id_ in ids:
                 judge.note(id_, f"a valid {operation.id} is answered {exchange.came}, so it was not tried")
-    stop_robot(api)
+    halt(api)
 
 
 @pytest.mark.requirement("http/unsupported-media-type")

@@ -11,7 +11,7 @@ from conformance.rest.calls import JSON, example_call
 from conformance.rest.interface import RestInterface
 from conformance.rest.mutations import mutations
 from conformance.rest.refusals import judge_refusal
-from conformance.robot.stopping import stop_robot
+from conformance.robot.stopping import halt
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
@@ -57,7 +57,7 @@ def test_problem_of_a_query(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement(*_IDS, "strict-input/json-missing", "strict-input/json-type")
 def test_problem_of_a_body(api: RestInterface) -> None:
     """A field that is missing or of another type is named in the problem."""
-    stop_robot(api)
+    halt(api)
     for operation in applicable_operations(api, (), lambda item: JSON in item.bodies, "takes JSON"):
         call = example_call(api, operation)
         made = [
@@ -75,4 +75,4 @@ def test_problem_of_a_body(api: RestInterface) -> None:
                 shown=item.shown,
                 malformed=item.malformed,
             )
-    stop_robot(api)
+    halt(api)

@@ -10,7 +10,7 @@ from conformance.rest.effects import reader_of, settles_at
 from conformance.rest.interface import RestInterface
 from conformance.rest.snapshot import changed, changes_by_itself, flatten, take_snapshots
 from conformance.rest.statuses import is_taken, judge_status
-from conformance.robot.stopping import stop_robot
+from conformance.robot.stopping import halt, stop_robot
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
@@ -48,7 +48,7 @@ def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
     calls = [Call(call.operation, call.values) for call in reads(api)]
     others = api.run.effort.subsample(calls, 1)
     for operation in applicable_operations(api, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts"):
-        stop_robot(api)
+        halt(api)
         call = example_call(api, operation)
         reader = reader_of(api, call)
         if reader is None or reader.send(api).response.ok:
@@ -66,7 +66,7 @@ def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
             "what was put still there after HEAD and OPTIONS",
             found=f"{operation.template} is answered {exchange.came} after HEAD and OPTIONS, and 200 before",
         )
-    stop_robot(api)
+    halt(api)
 
 
 def _put_and_watch(
@@ -77,7 +77,7 @@ def _put_and_watch(
     Returns:
         Whether it does, the last reading, and how long all of it took, s.
     """
-    stop_robot(api)
+    halt(api)
     call.send(api)
     started = time.monotonic()
     exchange = reader.send(api)
@@ -166,7 +166,7 @@ def test_put_twice(api: RestInterface, judge: Judge) -> None:
                 found=f"after the second {operation.id}, {once}",
                 cause=f"{operation.id} effect",
             )
-    stop_robot(api)
+    halt(api)
 
 
 def _pair(api: RestInterface, call: Call) -> tuple[Exchange, str | None, Exchange]:
@@ -184,7 +184,7 @@ def test_delete_twice(api: RestInterface, judge: Judge) -> None:
     by_path = {call.operation.template: call for call in reads(api)}
     for operation in wanted:
         for attempt in (1, 2):
-            stop_robot(api)
+            halt(api)
             call = example_call(api, operation)
             call.send(api)
             read = by_path.get(operation.template)

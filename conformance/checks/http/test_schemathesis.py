@@ -16,7 +16,7 @@ from conformance.rest.interface import RestInterface
 from conformance.rest.motion_guard import MotionGuard
 from conformance.rest.refusals import judge_refusal
 from conformance.rest.validity import INVALID, VALID, validity
-from conformance.robot.stopping import stop_robot
+from conformance.robot.stopping import halt
 from conformance.transport.client import HttpClient
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
@@ -61,7 +61,7 @@ def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
     return [target for target in targets(api.run.contract) if target.label in labels]
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("describe")
 @pytest.mark.requirement(*_IDS, "strict-input/query-parameter", "strict-input/query-missing")
 def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """What moves nothing."""
@@ -75,10 +75,10 @@ def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer)
 def test_moving_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """What may move the robot: invalid requests, and a few valid ones made fit for it."""
     guard = MotionGuard(api)
-    stop_robot(api)
+    halt(api)
     for target in _targets(api, moving=True):
         _run(api, judge, explore, guard, target)
-        stop_robot(api)
+        halt(api)
 
 
 def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard, target: Target) -> None:
@@ -151,6 +151,6 @@ def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge
         def validate_response(self, *_: Any, **__: Any) -> None:
             """The observers have judged it."""
 
-    stop_robot(api)
+    halt(api)
     explore.machine(Walk, cases=4, steps=5)
-    stop_robot(api)
+    halt(api)

@@ -14,7 +14,7 @@ from conformance.rest.effects import reader_of, settles_at
 from conformance.rest.formats import judge_same_values
 from conformance.rest.interface import RestInterface
 from conformance.rest.statuses import is_taken
-from conformance.robot.stopping import stop_robot
+from conformance.robot.stopping import halt, stop_robot
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
@@ -31,7 +31,7 @@ def test_formats_of_what_was_put(api: RestInterface, judge: Judge) -> None:
     for operation in applicable_operations(
         api, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts something"
     ):
-        stop_robot(api)
+        halt(api)
         call = example_call(api, operation)
         reader = reader_of(api, call)
         if reader is None or reader.send(api).response.ok or not call.send(api).response.ok:
@@ -50,7 +50,7 @@ def test_formats_of_what_was_put(api: RestInterface, judge: Judge) -> None:
                 "a root named after the type",
                 found=f"the root element is {local_name(form)!r} and not {wanted!r}",
             )
-    stop_robot(api)
+    halt(api)
 
 
 @pytest.mark.requirement(_ID)
@@ -91,7 +91,7 @@ def test_xml_is_taken(api: RestInterface, judge: Judge) -> None:
                     found=other,
                     cause=f"{operation.id} effect",
                 )
-    stop_robot(api)
+    halt(api)
 
 
 def _sent_form(api: RestInterface, call: Call) -> etree._Element | None:

@@ -11,7 +11,7 @@ from conformance.rest.interface import RestInterface
 from conformance.rest.mutations import MUTATED, Mutation, mutations
 from conformance.rest.refusals import judge_refusal
 from conformance.rest.statuses import is_taken
-from conformance.robot.stopping import stop_robot
+from conformance.robot.stopping import halt
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
@@ -29,7 +29,7 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
     """Each named mutation of a valid body is refused with 4xx, and the next valid one is taken as before."""
     possible: set[str] = set()
     for operation in applicable_operations(api, (*_IDS, *_STATUSES), lambda item: JSON in item.bodies, "takes JSON"):
-        stop_robot(api)
+        halt(api)
         call = example_call(api, operation)
         by_name = _by_requirement(call, operation)
         possible |= {name for name, made in by_name.items() if made}
@@ -42,7 +42,7 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
             drawn = effort.draw(made, _count(effort, name), f"{api.run.seed}/{operation.id} {name}")
             for item in effort.subsample(drawn, 1):
                 _try(api, judge, call, item)
-        stop_robot(api)
+        halt(api)
         again = call.send(api)
         judge.check(
             "http/no-server-error",
@@ -51,7 +51,7 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
             f"a valid {operation.id} taken after all that was refused",
             found=again.came,
         )
-    stop_robot(api)
+    halt(api)
     for name in MUTATED if possible else ():
         if name not in possible:
             judge.unclaimed(f"strict-input/{name}", "no body of the contract can be wrong in this way")
@@ -85,4 +85,4 @@ def _try(api: RestInterface, judge: Judge, call: Call, item: Mutation) -> None:
         closing=item.requirement == "json-depth",
     )
     if not refused:
-        stop_robot(api)
+        halt(api)

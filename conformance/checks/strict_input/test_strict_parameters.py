@@ -12,7 +12,7 @@ from conformance.rest.interface import RestInterface
 from conformance.rest.parameters import Wrong, wrong_texts
 from conformance.rest.refusals import judge_refusal
 from conformance.rest.statuses import is_taken
-from conformance.robot.stopping import stop_robot
+from conformance.robot.stopping import halt
 
 pytestmark = pytest.mark.needs("rest")
 _QUERY = "strict-input/query-parameter"
@@ -63,7 +63,7 @@ def test_path_parameters(api: RestInterface) -> None:
             if item.text:
                 _try(api, call, item, _PATH)
         if call.operation.motion:
-            stop_robot(api)
+            halt(api)
 
 
 def _valid_calls(
@@ -106,4 +106,4 @@ def _try(api: RestInterface, call: Call, item: Wrong, requirement: str) -> None:
         json=False,
     )
     if not refused and call.operation.motion:
-        stop_robot(api)
+        halt(api)

@@ -10,7 +10,7 @@ from conformance.rest.interface import RestInterface
 from conformance.rest.refusals import judge_refusal
 from conformance.rest.statuses import is_taken
 from conformance.rest.xml_mutations import xml_mutations
-from conformance.robot.stopping import stop_robot
+from conformance.robot.stopping import halt
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
@@ -24,7 +24,7 @@ def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
     taken = 0
     operations = applicable_operations(api, [_ID], lambda item: XML in item.bodies, "takes XML")
     for operation in operations:
-        stop_robot(api)
+        halt(api)
         call = example_call(api, operation, XML)
         exchange = call.send(api)
         if not is_taken(exchange):
@@ -38,7 +38,7 @@ def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
         ):
             wrong = call.carrying(body)
             if not judge_refusal(api, partial(wrong.send, api), _ID, name, json=False):
-                stop_robot(api)
-    stop_robot(api)
+                halt(api)
+    halt(api)
     if not taken and "rest-formats" not in api.run.claims:
         judge.unclaimed(_ID, "the robot takes no XML")

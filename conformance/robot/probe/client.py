@@ -31,9 +31,14 @@ class Probe:
     Args:
         ros: the robot's ROS side.
 
+    Attributes:
+        heard: how many requests of the run had been sent when all that came of them had arrived.
+
     Raises:
         ProbeError: no process can be started.
     """
+
+    heard = -1
 
     def __init__(self, ros: Ros) -> None:
         command = [sys.executable, "-m", "conformance.robot.probe", "--domain-id", str(ros.domain_id)]
@@ -175,6 +180,6 @@ class RosProbe:
         return self._probe
 
     def close(self) -> None:
-        """End it."""
+        """End it; nobody waits for that but the program's own end."""
         if self._probe is not None:
-            self._probe.close()
+            threading.Thread(target=self._probe.close, name="probe's end").start()
