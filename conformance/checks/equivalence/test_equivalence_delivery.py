@@ -54,12 +54,7 @@ def watched() -> list[Batch]:
 @pytest.mark.phase("arrival")
 @pytest.mark.requirement(*_IDS)
 def test_deliveries_arrive(
-    api: RestInterface,
-    publishers: SoapService,
-    probe: RosProbe,
-    judge: Judge,
-    explore: Explorer,
-    watched: list[Batch],
+    api: RestInterface, publishers: SoapService, probe: RosProbe, judge: Judge, explore: Explorer, watched: list[Batch]
 ) -> None:
     """Deliveries over REST and SOAP, of any values, arrive once, unchanged and in order; also those of many clients."""
     try:
