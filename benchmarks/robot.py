@@ -60,6 +60,14 @@ def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seconds", type=float, default=2.0, help="length of each measurement")
     options.add_argument("--domain-id", default=os.environ.get("ROS_DOMAIN_ID", "0"))
+    options.add_argument(
+        "--beside",
+        type=beside,
+        action="append",
+        default=[],
+        metavar="NAME=REST,SOAP",
+        help="measure another server on loopback too, by its ports, such as Jersey and JAX-WS (docs/design.md)",
+    )
     chosen = options.parse_args()
     met = []
     with ExitStack() as stack:
@@ -77,18 +85,27 @@ def main() -> int:
         calls = [call for call, _ in asked.values()]
         bare, bare_pid = stack.enter_context(running_bare(calls))
         nginx = stack.enter_context(running_nginx(calls))
-        servers = [(name, port) for name, port in (("bare", bare), ("nginx", nginx)) if port]
+        servers = [("bare", bare, bare), *([("nginx", nginx, nginx)] if nginx else []), *chosen.beside]
+
+        def yardsticks(call: Call) -> dict[str, Call]:
+            return {name: replace(call, port=soap if call.body else rest) for name, rest, soap in servers}
+
         with pinned(robot.pids[0]), pinned(bare_pid):
             for name, (call, most) in asked.items():
-                yardsticks = {server: replace(call, port=port) for server, port in servers}
-                met.append(back_to_back(name, call, yardsticks, most, chosen.seconds))
+                met.append(back_to_back(name, call, yardsticks(call), most, chosen.seconds))
             for name, (call, _) in asked.items():
-                yardsticks = {server: replace(call, port=port) for server, port in servers}
-                met.append(now_and_then(name, call, yardsticks, 5 * chosen.seconds))
+                met.append(now_and_then(name, call, yardsticks(call), 5 * chosen.seconds))
         met += many_connections(robot, chosen.seconds)
         met.append(growth(robot, before))
     print("all targets met" if all(met) else "targets missed")
     return 0 if all(met) else 1
+
+
+def beside(text: str) -> tuple[str, int, int]:
+    """Read ``NAME=REST,SOAP``."""
+    name, _, ports = text.partition("=")
+    rest, _, soap = ports.partition(",")
+    return name, int(rest), int(soap)
 
 
 def back_to_back(name: str, call: Call, yardsticks: dict[str, Call], most: float, seconds: float) -> bool:

@@ -78,7 +78,7 @@ class RobotWebServiceNodesRunner:
                 listening.proxies,
                 listening.tls,
             )
-            gc.freeze()  # what lives as long as the robot is not looked at again: 50 ms, in which nobody is answered
+            gc.freeze()  # what lives as long as the robot is not looked at again: that takes 80 ms
             with contextlib.closing(velocity):
                 uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
 
