@@ -62,6 +62,13 @@ def _in_lists(before: list[Any], between: Any, after: list[Any], slack: Slack, w
     return ""
 
 
+def unstamped(value: Any) -> Any:
+    """A message without its stamps: of what is made anew for each request they differ by right."""
+    if isinstance(value, dict):
+        return {name: unstamped(item) for name, item in value.items() if name != "stamp"}
+    return [unstamped(item) for item in value] if isinstance(value, list) else value
+
+
 def stamp_of(message: Any) -> tuple[float, float]:
     """The stamp in a message's header, (sec, nanosec); zeros where there is none that can be read."""
     header = message.get("header") if isinstance(message, dict) else None

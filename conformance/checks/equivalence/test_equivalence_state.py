@@ -8,7 +8,7 @@ import pytest
 
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element, projected
-from conformance.robot.agreement import Slack, disagreement, entries_of, stamp_of
+from conformance.robot.agreement import Slack, disagreement, entries_of, stamp_of, unstamped
 from conformance.robot.drive import Drive
 from conformance.robot.geometry import Pose
 from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
@@ -182,8 +182,8 @@ def _compare_plans(
     if before is None or after is None:
         return
     problem = problem or GET_PLAN.problem(between)
-    if not problem and not disagreement(before, after, before, _SAME):
-        problem = disagreement(before, between, after, _SAME)
+    if not problem and unstamped(before) == unstamped(after):
+        problem = disagreement(unstamped(before), unstamped(between), unstamped(after), _SAME)
     elif not problem and plan_of(between).poses[-1].distance(goal) > _END_OFF:
         # A planner may answer the same question in another way each time; then only what was asked for is the same.
         problem = "the end is another one"

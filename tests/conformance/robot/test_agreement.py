@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from conformance.robot.agreement import Slack, disagreement
+from conformance.robot.agreement import Slack, disagreement, unstamped
 
 _SLACK = Slack(0.02, 0.05)
 
@@ -32,3 +32,9 @@ def test_what_is_missing_or_of_another_length_is_named():
 def test_a_stamp_counts_only_while_it_stands_still():
     assert disagreement(_pose(1.0), _pose(1.0, sec=2), _pose(1.0), _SLACK) == "header.stamp.sec is 2 for 1.0"
     assert disagreement(_pose(1.0), _pose(1.0, sec=2), _pose(1.0, sec=3), _SLACK) == ""
+
+
+def test_what_is_made_anew_is_compared_without_its_stamps():
+    poses = {"poses": [_pose(1.0), _pose(2.0)]}
+    assert unstamped(poses) == unstamped({"poses": [_pose(1.0, sec=5), _pose(2.0, sec=6)]})
+    assert unstamped(poses)["poses"][1] == {"header": {}, "pose": {"x": 2.0, "covariance": [2.0, 0.0]}}
