@@ -5,6 +5,7 @@ import json
 import os
 import random
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -30,6 +31,8 @@ def main() -> int:
     parser.add_argument("--duration", type=float, default=25.0, help="seconds of load [25]")
     options = parser.parse_args()
     started = time.monotonic()
+    # What ends a CI job takes the robot with it, like Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     # A domain of its own, so that no other robot on this machine is in the conversation.
     domain = random.SystemRandom().randint(1, 101)
     _say("1/3", f"starting the reference robot on ROS domain {domain}")
