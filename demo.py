@@ -15,6 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from conformance.contract.exit_codes import ExitCode
+
 _ROAAS = (sys.executable, "-m", "roaas")
 _START_S = 60
 _STOP_S = 10
@@ -25,7 +27,10 @@ _STATEMENT = Path(__file__).parent / "reference_robot" / "statement.toml"
 
 
 def main() -> int:
-    """Run the demo; the exit code is the certification's, or the load test's where the robot conforms."""
+    """Run the demo; the exit code is the certification's, or the load test's where the robot conforms.
+
+    A measurement that carries no statement is no failure here: it says so, and tells of a busy machine.
+    """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for results and reports [out]")
     parser.add_argument("--duration", type=float, default=25.0, help="seconds of load [25]")
@@ -45,7 +50,7 @@ def main() -> int:
         _say("3/3", f"measuring SOAP against REST for {options.duration:g} s")
         loaded = _roaas("load", *common, *_MEASURED, "--duration", f"{options.duration:g}")
     _summary(options.out, time.monotonic() - started)
-    return certified or loaded
+    return certified or (0 if loaded == ExitCode.INCONCLUSIVE else loaded)
 
 
 @contextmanager
