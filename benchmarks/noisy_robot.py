@@ -50,9 +50,9 @@ class Noise:
     """The level, and when it was looked at last."""
 
     def __init__(self, seed: int, shift: float) -> None:
-        self._lot = random.Random(seed)  # noqa: S311 -- noise, no secret
+        self._random = random.Random(seed)  # noqa: S311 -- noise, no secret
         self._shift = shift
-        self._level = self._lot.gauss(0.0, DRIFT)
+        self._level = self._random.gauss(0.0, DRIFT)
         self._at = time.monotonic()
         self._lock = Lock()
 
@@ -61,9 +61,9 @@ class Noise:
         with self._lock:
             now = time.monotonic()
             kept = math.exp(-(now - self._at) / MEMORY_S)
-            self._level = kept * self._level + math.sqrt(1 - kept * kept) * self._lot.gauss(0.0, DRIFT)
+            self._level = kept * self._level + math.sqrt(1 - kept * kept) * self._random.gauss(0.0, DRIFT)
             self._at = now
-            return LEVEL_S * math.exp(self._level + self._lot.gauss(0.0, FAST)) * (self._shift if soap else 1.0)
+            return LEVEL_S * math.exp(self._level + self._random.gauss(0.0, FAST)) * (self._shift if soap else 1.0)
 
 
 class Answers(StreamRequestHandler):

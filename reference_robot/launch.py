@@ -23,6 +23,7 @@ from reference_robot.ending import Ending
 from reference_robot.ros import RosArgumentsError, RosRuntime
 from reference_robot.simulated import SimulatedRobot, SimulationError
 from reference_robot.simulation.delivery import Delivery
+from reference_robot.simulation.requests import DeliveryRequests
 from reference_robot.webservices.assembly import Endpoints
 from reference_robot.webservices.configuration import load_configuration
 from reference_robot.webservices.endpoint import PortInUseError
@@ -144,7 +145,7 @@ def _deliver(options: Options) -> None:
     try:
         names = load_configuration(options.config)
         with RosRuntime(options.domain_id, options.ros_arguments) as ros:
-            Delivery(ros.create_node("delivery"), names)
+            Delivery(ros.create_node("delivery"), DeliveryRequests(ros, names), names)
             ros.start()
             sys.stdout.write(f"ready delivery={names.topics.delivery} domain={options.domain_id}\n")
             sys.stdout.flush()

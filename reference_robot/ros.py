@@ -17,7 +17,8 @@ import os
 import threading
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -31,6 +32,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as rclpy_c
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor as RosExecutor
@@ -87,12 +89,15 @@ class RosRuntime:
         self._awake: list[float] = []  # for each thread, when it last had nothing or one thing less to do
         self._nodes: list[Node] = []
         self._threads: list[threading.Thread] = []
+        self._watches: list[tuple[rclpy_c.GuardCondition, threading.Thread]] = []
         self._closing = threading.Event()
 
-    def create_node(self, name: str, *, apart: bool = False) -> Node:
+    def create_node(self, name: str, *, apart: bool = False, spun: bool = True) -> Node:
         """Make a node that this runtime spins and destroys; ``apart``, in a thread of its own.
 
         What comes to a node apart, however much, does not wait in one queue with what the other nodes have to do.
+        A node that is not spun has no callbacks of its own; ``watch`` tells that something waits at its subscriptions,
+        and ``taken`` takes it.
 
         Raises:
             RosArgumentsError: A parameter among ROS's arguments is none that a node can have.
@@ -103,10 +108,23 @@ class RosRuntime:
         except ParameterException as error:
             raise RosArgumentsError(f"a node does not take its parameter: {error}") from error
         self._nodes.append(node)
+        if not spun:
+            return node
         if apart:
             self._executors.append(RosExecutor(context=self.context))
         self._executors[-1 if apart else 0].add_node(node)
         return node
+
+    def watch(self, subscription: Subscription, node: Node, callback: Callable[[], None], pause_s: float) -> None:
+        """Call back in a node's thread when something waits at a subscription of a node that is not spun.
+
+        It is called at once when the first message comes, and then at most every ``pause_s``: who takes many messages
+        at a time is woken once for them. The runtime must not be started yet.
+        """
+        executor = next(executor for executor in self._executors if node in executor.get_nodes())
+        wake = rclpy_c.GuardCondition(self.context.handle)
+        arguments = (subscription, wake, partial(executor.create_task, callback), pause_s)
+        self._watches.append((wake, threading.Thread(target=self._watch, args=arguments, name="ros", daemon=True)))
 
     def start(self) -> None:
         """Run callbacks in threads of their own from now on; a second call does nothing."""
@@ -116,6 +134,7 @@ class RosRuntime:
                 threading.Thread(target=self._spin, args=(number, executor), name="ros", daemon=True)
                 for number, executor in enumerate(self._executors)
             ]
+            self._threads += [thread for _, thread in self._watches]
             for thread in self._threads:
                 thread.start()
 
@@ -132,6 +151,8 @@ class RosRuntime:
         if self._closing.is_set():
             return
         self._closing.set()
+        for wake, _ in self._watches:
+            wake.trigger_guard_condition()
         # In this order, or the process may end in "terminate called without an active exception".
         give_up = time.monotonic() + _CLOSING_S
         for executor in self._executors:
@@ -165,3 +186,24 @@ class RosRuntime:
             except Exception:  # noqa: BLE001 - one node's failing callback must not stop the robot's others
                 if not self._closing.is_set():
                     get_logger("ros").error(f"a callback failed:\n{traceback.format_exc()}")
+
+    def _watch(
+        self, subscription: Subscription, wake: rclpy_c.GuardCondition, tell: Callable[[], object], pause_s: float
+    ) -> None:
+        waiting = rclpy_c.WaitSet(1, 1, 0, 0, 0, 0, self.context.handle)
+        while not self._closing.is_set() and self.context.ok():
+            waiting.clear_entities()
+            waiting.add_subscription(subscription.handle)
+            waiting.add_guard_condition(wake)
+            waiting.wait(-1)
+            if waiting.is_ready("subscription", 0):
+                tell()
+                self._closing.wait(pause_s)
+
+
+def taken(subscription: Subscription) -> Iterator[bytes]:
+    """Take what waits at a subscription of a node that is not spun: the octets of each message, as ROS sent them."""
+    handle = subscription.handle
+    with handle:
+        while (found := handle.take_message(subscription.msg_type, True)) is not None:  # noqa: FBT003 - rclpy's own
+            yield found[0]

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, Final
 
-_START: Final = 30.0  # seconds
+_START: Final = 60.0  # seconds
 _STOP: Final = 5.0  # seconds
 
 

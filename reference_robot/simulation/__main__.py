@@ -48,7 +48,7 @@ def main(
         names = load_names(names_file)
     except TomlFileError as error:
         raise click.UsageError(str(error)) from error
-    os.nice(_NICENESS)
+    _give_way()
     ending = Ending()
     if _stdin_is_pipe():
         threading.Thread(target=_await_end_of_stdin, args=(ending,), daemon=True).start()
@@ -58,6 +58,19 @@ def main(
         ros.start()
         click.echo("ready")
         ending.wait()
+
+
+def _give_way() -> None:
+    """Let the web services and their client go first: of a processor's time, and when a message wakes this process.
+
+    A batch process waits until whoever runs has nothing to do or has had its turn (sched(7)). Otherwise each publish of
+    the web services would hand over the processor on which a client waits for the answer. Whoever gave it another
+    policy, such as real time, is obeyed.
+    """
+    os.nice(_NICENESS)
+    with contextlib.suppress(AttributeError, OSError):  # a system that has none, or that does not allow it
+        if os.sched_getscheduler(0) == os.SCHED_OTHER:
+            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _stdin_is_pipe() -> bool:

@@ -16,15 +16,12 @@ import time
 import uuid
 from collections import deque
 from functools import partial
-from operator import attrgetter
 from typing import Any, Final
 
 from action_msgs.msg import GoalStatus
-from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
 from rclpy.node import Node
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header, String
 from unique_identifier_msgs.msg import UUID
 
@@ -34,14 +31,11 @@ from reference_robot.goal_statuses import GoalStatuses
 from reference_robot.names import RosNames
 from reference_robot.simulation.messages import MISSION_REPORTS, stamped_pose
 from reference_robot.simulation.missions import Missions, MissionState
+from reference_robot.simulation.requests import DeliveryRequests
 
 _CODES: Final = frozenset({COURIER, COFFEE})
 _REPORT_PERIOD_S: Final = 0.05  # at least this between two reports, however fast requests come
 _RETRY_PERIOD_S: Final = 0.2  # after a refused leg, and while navigation's action server is not there
-
-# No request is lost: what has not been taken yet is kept, and a publisher that keeps all as well is held back.
-_REQUESTS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
-_FIELDS_OF: Final = attrgetter(*DeliveryRequest._fields)
 
 _CANCELED: Final = frozenset({GoalStatus.STATUS_CANCELING, GoalStatus.STATUS_CANCELED})
 _REMEMBERED: Final = 100  # legs, and goals of others that were cancelled
@@ -50,14 +44,16 @@ _REMEMBERED: Final = 100  # legs, and goals of others that were cancelled
 class Delivery:
     """Runs missions."""
 
-    def __init__(self, node: Node, names: RosNames) -> None:
+    def __init__(self, node: Node, requests: DeliveryRequests, names: RosNames) -> None:
         self._node = node
+        self._requests = requests
         self._frames = names.frames
         self._missions = Missions()
         self._legs: list[tuple[float, float, float]] = []
         self._leg = ""  # the id of the goal that is being driven
         self._own: deque[str] = deque(maxlen=_REMEMBERED)
         self._seen_canceled: deque[str] = deque(maxlen=_REMEMBERED)
+        self._knows_goals = False
         self._losses = 0
         self._reported_at = -math.inf
         self._report_is_due = False
@@ -67,15 +63,18 @@ class Delivery:
         self._begin_later.cancel()
         self._navigate = ActionClient(node, NavigateToPose, names.actions.navigate_to_pose)
         self._goals = GoalStatuses(node, names.actions.navigate_to_pose, self._note_goals)
-        node.create_subscription(DeliveryRequestMsg, names.topics.delivery, self._take, _REQUESTS)
+        requests.tell(node, self._take)
 
-    def _take(self, message: DeliveryRequestMsg) -> None:
-        if message.message_code not in _CODES:
+    def _take(self) -> None:
+        for request in self._requests.taken():
+            self._add(request)
+
+    def _add(self, request: DeliveryRequest) -> None:
+        if request.message_code not in _CODES:
             self._node.get_logger().info(
-                f"ignored a request with the unknown message code {message.message_code}", throttle_duration_sec=1.0
+                f"ignored a request with the unknown message code {request.message_code}", throttle_duration_sec=1.0
             )
             return
-        request = DeliveryRequest(*_FIELDS_OF(message))
         mission = self._missions.add(request, divmod(time.time_ns(), 1_000_000_000))
         if mission.state is MissionState.QUEUED and self._begin_later.is_canceled():
             self._begin()
@@ -89,10 +88,12 @@ class Delivery:
             if goal.status in _CANCELED and goal.identity not in self._own and goal.identity not in self._seen_canceled
         ]
         self._seen_canceled.extend(canceled)
-        # A leg of ours that is cancelled drops the queue when it ends.
-        if canceled and self._missions.active is None:
+        # A leg of ours that is cancelled drops the queue when it ends. What the first report has as cancelled was so
+        # before any request, though a request may be taken before the report is.
+        if canceled and self._knows_goals and self._missions.active is None:
             self._missions.abandon()
             self._changed()
+        self._knows_goals = True
         if self._goals.losses != self._losses:
             self._losses = self._goals.losses
             if self._leg and self._leg not in {goal.identity for goal in self._goals.active()}:

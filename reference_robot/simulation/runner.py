@@ -12,6 +12,7 @@ from reference_robot.simulation.planner import Planner
 from reference_robot.simulation.planning import Planning
 from reference_robot.simulation.pursuit import EXACT
 from reference_robot.simulation.realism import NEAR_ENOUGH, Realism
+from reference_robot.simulation.requests import DeliveryRequests
 from reference_robot.simulation.sensors import Sensors
 
 
@@ -39,4 +40,5 @@ class Simulation:
         self.planning = Planning(navigation_node, names, planner, localisation)
         tolerances = NEAR_ENOUGH if realism else EXACT
         self.navigation = Navigation(navigation_node, names, planner, localisation, time_scale, tolerances)
-        self.delivery = Delivery(ros.create_node("delivery", apart=True), names)
+        requests = DeliveryRequests(ros, names)
+        self.delivery = Delivery(ros.create_node("delivery", apart=True), requests, names)

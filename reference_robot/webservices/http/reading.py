@@ -4,7 +4,7 @@ import re
 from typing import Final
 
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field
-from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.representation.problems import Problem, not_yet
 
 TARGET_LIMIT: Final = 8000  # octets (RFC 9110 4.1 asks for at least that)
 HEAD_LIMIT: Final = 64 * 1024  # octets: request line and fields (RFC 6585 5)
@@ -79,3 +79,8 @@ def require_bounded(octets: int) -> None:
 def no_request(error: BaseException) -> Problem:
     """Return the refusal of what the parser does not take (RFC 9112 2.2)."""
     return Problem(400, f"no valid HTTP request: {error}")
+
+
+def full() -> Problem:
+    """Return the refusal of what there is no room for (RFC 9110 15.6.4)."""
+    return not_yet("clients make the robot keep as much as it can")

@@ -40,6 +40,10 @@ class RobotPublishersNode:
         self.node = ros.create_node("robot_publishers")
         self._names = names
         self._delivery = self.node.create_publisher(DeliveryRequestMsg, names.topics.delivery, _DELIVERY_QOS)
+        # rclpy's Publisher does no more than this, but for keeping itself from being destroyed meanwhile: 0.4 µs each
+        # time. Ours is destroyed when nobody is served any more.
+        self._count_readers = self._delivery.handle.get_subscription_count
+        self._publish_octets = self._delivery.handle.publish_raw
         self._behind_until = 0.0
         self._velocity: dict[str, Any] = {}
         self._navigation = ActionClient(self.node, NavigateToPose, names.actions.navigate_to_pose)
@@ -51,17 +55,19 @@ class RobotPublishersNode:
 
     def delivery_is_served(self) -> bool:
         """Tell whether anybody on the graph takes delivery requests."""
-        return bool(self._delivery.get_subscription_count())
+        return bool(self._count_readers())
 
     def publish_delivery(self, request: DeliveryRequest) -> bool:
         """Publish one delivery request; return False, with nothing published, while readers cannot keep up."""
         now = monotonic()
         if now < self._behind_until:
             return False
-        if _published(self._delivery, request.octets()):
-            return True
-        self._behind_until = now + _RECOVERY
-        return False
+        try:
+            self._publish_octets(request.octets())
+        except rclpy_c.RCLError:
+            self._behind_until = now + _RECOVERY
+            return False
+        return True
 
     # Velocity
 
@@ -127,7 +133,7 @@ class RobotPublishersNode:
 
 
 def _published(publisher: Any, message: Any) -> bool:
-    """Publish a message, or its octets; return False where the middleware could not take it within its own deadline."""
+    """Publish a message; return False where the middleware could not take it within its own deadline."""
     try:
         publisher.publish(message)
     except rclpy_c.RCLError:

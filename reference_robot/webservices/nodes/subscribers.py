@@ -1,6 +1,7 @@
 """RobotSubscribersNode: everything that the web services learn from ROS."""
 
 from collections import deque
+from collections.abc import Callable
 from functools import partial
 from time import monotonic
 from typing import Final
@@ -33,6 +34,7 @@ class RobotSubscribersNode:
     Attributes:
         odometry: The octets of the odometry received last, to be read by whoever asks, None before the first; and when
             they were received, by ``time.monotonic``.
+        on_odometry: Is called with the octets then, in the executor's thread.
         mission_reports: The JSON of what changed in the missions (see ``names.toml``), oldest first, to be taken off.
         goals: The goals of the robot's navigation, whoever sent them.
         map_transform: Where the odometry frame lies in the map.
@@ -46,6 +48,7 @@ class RobotSubscribersNode:
         self._ros = ros
         self._namespace = self.node.get_namespace().rstrip("/") + "/"  # several robots may be on one graph
         self.odometry: tuple[bytes | None, float] = (None, 0.0)
+        self.on_odometry: Callable[[bytes], None] = lambda _: None
         self.mission_reports: deque[str] = deque(maxlen=_MISSION_REPORTS)
         self.current_goal: str | None = None
         self.last_rejection = ""
@@ -63,6 +66,7 @@ class RobotSubscribersNode:
         self._planner_action = ActionClient(self.node, ComputePathToPose, names.actions.compute_path_to_pose)
 
     def _keep_odometry(self, octets: bytes) -> None:
+        self.on_odometry(octets)
         self.odometry = octets, monotonic()
 
     def _keep_text(self, attribute: str, message: String) -> None:

@@ -1,33 +1,23 @@
 """/robot/pose/: the robot's pose."""
 
-from typing import Any
+from functools import partial
+from typing import Final
 
 from reference_robot.webservices.http.messages import Request, Response
-from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
+from reference_robot.webservices.resources.resource import FORMATS, Resource, represented, wanted_format
 from reference_robot.webservices.robot.odometry import LatestOdometry
+
+_WRITERS: Final = {media_type: partial(represented, root="Odometry", media_type=media_type) for media_type in FORMATS}
 
 
 class Pose(Resource):
-    """The odometry received last, nav_msgs/Odometry in full.
-
-    Each message is written at most once in each format, however often it is asked for.
-    """
+    """The odometry received last, nav_msgs/Odometry in full."""
 
     path = "/robot/pose/"
 
     def __init__(self, odometry: LatestOdometry) -> None:
         self._odometry = odometry
-        self._written_from: Any = None
-        self._written: dict[str, Response] = {}
 
     def get(self, request: Request) -> Response:
         """Return the odometry; 503 before the first."""
-        media_type = wanted_format(request)
-        message = self._odometry.message()
-        if message is not self._written_from:
-            self._written, self._written_from = {}, message
-        response = self._written.get(media_type)
-        if response is None:
-            response = represented(self._odometry.plain(), "Odometry", media_type)
-            self._written[media_type] = response
-        return response
+        return self._odometry.written(_WRITERS[wanted_format(request)])

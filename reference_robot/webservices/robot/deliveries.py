@@ -3,7 +3,7 @@
 import math
 import time
 from collections import deque
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 from conformance.contract.delivery import COFFEE, COURIER
 from reference_robot.deliveries import DeliveryRequest
@@ -32,10 +32,7 @@ class UnusableFieldError(ValueError):
         return Problem(422, f"{name} {self.rule}, not {shown(sent)}")
 
 
-class _Accepted(NamedTuple):
-    request: DeliveryRequest
-    nanoseconds: int
-    interface: Literal["rest", "soap"]
+Sender = Literal["rest", "soap"]
 
 
 class Deliveries:
@@ -45,9 +42,10 @@ class Deliveries:
         self._publishers = publishers
         self._reports = subscribers.mission_reports
         self._missions = MissionTable()
-        self._accepted: deque[_Accepted] = deque(maxlen=_REMEMBERED)
+        # Each with the time in nanoseconds and the interface; plain, for one is made with each request.
+        self._accepted: deque[tuple[DeliveryRequest, int, Sender]] = deque(maxlen=_REMEMBERED)
 
-    def accept(self, request: DeliveryRequest, interface: Literal["rest", "soap"]) -> None:
+    def accept(self, request: DeliveryRequest, interface: Sender) -> None:
         """Publish a request: exactly one message.
 
         Raises:
@@ -63,20 +61,20 @@ class Deliveries:
         at = time.time_ns()  # before a mission can begin
         if not self._publishers.publish_delivery(request):
             raise not_yet("the delivery application cannot keep up with the requests")
-        self._accepted.append(_Accepted(request, at, interface))
+        self._accepted.append((request, at, interface))
 
     def listed(self) -> list[dict[str, Any]]:
         """Return the requests accepted last, newest first, with the state that the application reports, and why."""
         self._catch_up()
         find = self._missions.finder()
         listed = []
-        for accepted in reversed(self._accepted):
-            mission = find(accepted.request, accepted.nanoseconds)
+        for request, nanoseconds, interface in reversed(self._accepted):
+            mission = find(request, nanoseconds)
             entry = {
-                "request": accepted.request._asdict(),
+                "request": request._asdict(),
                 "state": mission.state,
-                "accepted": dict(zip(("sec", "nanosec"), divmod(accepted.nanoseconds, _NANOSECONDS), strict=True)),
-                "interface": accepted.interface,
+                "accepted": dict(zip(("sec", "nanosec"), divmod(nanoseconds, _NANOSECONDS), strict=True)),
+                "interface": interface,
             }
             listed.append(entry | {"reason": mission.reason} if mission.reason else entry)
         return listed

@@ -5,17 +5,20 @@ from typing import Final
 
 from lxml import etree
 
-from conformance.contract.delivery import COFFEE, COORDINATES
+from conformance.contract.delivery import COFFEE
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.http.authorization import Scope
+from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
 from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import SoapService
+from reference_robot.webservices.soap.service import SoapService, answered
 
 PATH: Final = "/turtlesim_publisher_ws"
 
-# The XSD has a sequence, and what comes here is valid: to ask libxml2 for seven names takes 2 µs.
+# The XSD has a sequence, and what comes here is valid: to ask libxml2 for seven names takes 2 µs. But for the code, it
+# is the order of the message.
 _ORDER: Final = ("depot_x", "depot_y", "destination_x", "destination_y", "message_code", "source_x", "source_y")
+_CODE: Final = _ORDER.index("message_code")
 
 
 class PublishersWebService(SoapService):
@@ -29,7 +32,7 @@ class PublishersWebService(SoapService):
         self._deliveries = deliveries
         self._done = {name: self._empty_response(name) for name in codes}
 
-    def _execute(self, operation: str, code: int | None, wrapper: etree._Element) -> bytes:
+    def _execute(self, operation: str, code: int | None, wrapper: etree._Element) -> Response:
         """Hand over a request that is valid by the XSD, which allows ``INF``, ``NaN`` and a missing ``arg0``.
 
         Raises:
@@ -38,24 +41,25 @@ class PublishersWebService(SoapService):
         """
         if not len(wrapper):
             raise client_fault("arg0 is missing: it holds the delivery request")
-        sent = dict(zip(_ORDER, [element.text or "" for element in wrapper[0]], strict=True))
+        sent = [element.text or "" for element in wrapper[0]]
         try:
             self._deliveries.accept(_request(sent, code), "soap")
         except UnusableFieldError as error:
-            raise error.refusal(error.field, sent[error.field]) from error
+            raise error.refusal(error.field, sent[_ORDER.index(error.field)]) from error
         return self._done[operation]
 
-    def _empty_response(self, operation: str) -> bytes:
-        return (
+    def _empty_response(self, operation: str) -> Response:
+        envelope = (
             f'<soap:Envelope xmlns:soap="{SOAP}"><soap:Body>'
             f'<tns:{operation}Response xmlns:tns="{self.description.namespace}"/>'
             "</soap:Body></soap:Envelope>"
-        ).encode()
+        )
+        return answered(envelope.encode())
 
 
-def _request(sent: dict[str, str], code: int | None) -> DeliveryRequest:
+def _request(sent: list[str], code: int | None) -> DeliveryRequest:
     try:
-        asked = int(sent["message_code"])
+        asked = int(sent[_CODE])
     except ValueError as error:  # thousands of leading zeros: valid, and more than Python reads as an integer
         raise UnusableFieldError("message_code", "must be an integer of fewer digits") from error
-    return DeliveryRequest(asked if code is None else code, *(float(sent[name]) for name in COORDINATES))
+    return DeliveryRequest(asked if code is None else code, *map(float, sent[:_CODE]), *map(float, sent[_CODE + 1 :]))

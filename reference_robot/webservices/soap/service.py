@@ -18,7 +18,7 @@ from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.envelope import operation_element
 from reference_robot.webservices.soap.faults import Fault, FaultCode, client_fault
 
-Operation = Callable[[etree._Element], bytes | Awaitable[bytes]]  # noqa: SLF001 - lxml's only name for the class
+Operation = Callable[[etree._Element], Response | Awaitable[Response]]  # noqa: SLF001 - lxml's only name for the class
 
 _LOGGER: Final = logging.getLogger(__name__)
 _MEDIA_TYPE: Final = "text/xml"
@@ -28,7 +28,7 @@ _SERVERS_FAULT: Final = 500
 class SoapService:
     """A service: a subclass gives the operations by local name.
 
-    An operation takes the wrapper element, valid by the XSD, and returns the answering envelope.
+    An operation takes the wrapper element, valid by the XSD, and returns the answer: ``answered`` with its envelope.
 
     Attributes:
         scope: What a token must be good for to send it messages.
@@ -61,9 +61,9 @@ class SoapService:
             outcome = self._answer(root)
         except Exception as error:  # noqa: BLE001 - whatever went wrong, the client gets a fault
             return _faulted(root, error)
-        return content(200, _MEDIA_TYPE, outcome) if isinstance(outcome, bytes) else _awaited(root, outcome)
+        return outcome if isinstance(outcome, Response) else _awaited(root, outcome)
 
-    def _answer(self, root: etree._Element) -> bytes | Awaitable[bytes]:
+    def _answer(self, root: etree._Element) -> Response | Awaitable[Response]:
         element = operation_element(root)
         operation = self._operations.get(str(element.tag))
         if operation is None:
@@ -72,9 +72,14 @@ class SoapService:
         return operation(element)
 
 
-async def _awaited(root: etree._Element, outcome: Awaitable[bytes]) -> Response:
+def answered(envelope: bytes) -> Response:
+    """Return an operation's answer."""
+    return content(200, _MEDIA_TYPE, envelope)
+
+
+async def _awaited(root: etree._Element, outcome: Awaitable[Response]) -> Response:
     try:
-        return content(200, _MEDIA_TYPE, await outcome)
+        return await outcome
     except Exception as error:  # noqa: BLE001 - as above
         return _faulted(root, error)
 

@@ -7,6 +7,7 @@ from typing import Any, Final
 from lxml import etree
 
 from reference_robot.webservices.http.authorization import Scope
+from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.writing import element_of
@@ -15,7 +16,7 @@ from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.robot.velocity import Velocity
 from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import Operation, SoapService
+from reference_robot.webservices.soap.service import Operation, SoapService, answered
 
 PATH: Final = "/turtlesim_subscriber_ws"
 
@@ -45,37 +46,32 @@ class SubscribersWebService(SoapService):
         operations |= {"GetPose": self._get_pose, "GetPlan": self._get_plan}
         super().__init__("subscribers", PATH, operations)
         self._odometry = odometry
-        self._pose_from: Any = None
-        self._pose = b""
+        self._write_pose = lambda pose: self._response("GetPose", [pose])
         self._planner = planner
 
-    def _tell(self, operation: str, values: Callable[[], list[Any]], _wrapper: etree._Element) -> bytes:
+    def _tell(self, operation: str, values: Callable[[], list[Any]], _wrapper: etree._Element) -> Response:
         return self._response(operation, values())
 
-    def _get_pose(self, _wrapper: etree._Element) -> bytes:
+    def _get_pose(self, _wrapper: etree._Element) -> Response:
         """Return the odometry, written once for each message as REST's is."""
-        message = self._odometry.message()
-        if message is not self._pose_from:
-            self._pose = self._response("GetPose", [self._odometry.plain()])
-            self._pose_from = message
-        return self._pose
+        return self._odometry.written(self._write_pose)
 
-    async def _get_plan(self, wrapper: etree._Element) -> bytes:
+    async def _get_plan(self, wrapper: etree._Element) -> Response:
         given: dict[str, Any] = {}
         for element in wrapper:
             name, text = str(element.tag), element.text or ""
             given[name] = text if name == "frame_id" else _finite(name, text)
         return self._response("GetPlan", [await self._planner.plan(PlanQuery(**given))])
 
-    def _response(self, operation: str, returned: list[Any]) -> bytes:
-        """Return the envelope with one unqualified ``return`` element for each value."""
+    def _response(self, operation: str, returned: list[Any]) -> Response:
+        """Return an envelope with one unqualified ``return`` element for each value."""
         namespace = self.description.namespace
         root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
         wrapper = etree.SubElement(
             etree.SubElement(root, f"{{{SOAP}}}Body"), f"{{{namespace}}}{operation}Response", nsmap={"tns": namespace}
         )
         wrapper.extend([element_of(value, "return") for value in returned])
-        return etree.tostring(root, encoding="utf-8", xml_declaration=True)
+        return answered(etree.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
 def _finite(name: str, text: str) -> float:

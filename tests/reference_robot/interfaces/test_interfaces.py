@@ -11,6 +11,8 @@ import pytest
 from lxml import etree
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import ComputePathToPose, NavigateToPose
+from rclpy.impl.implementation_singleton import rclpy_implementation as rclpy_c
+from rclpy.serialization import serialize_message
 from tf2_msgs.msg import TFMessage
 
 import reference_robot
@@ -38,7 +40,7 @@ def take(message):
 with RosRuntime() as ros:
     ros.create_node("listener").create_subscription(DeliveryRequestMsg, "/DeliveryRequestMsg/from_json", take, 1000)
     ros.start()
-    ended.wait(60)
+    ended.wait(200)
 print("\\n".join(got))
 """
 
@@ -79,8 +81,28 @@ def test_delivery_requests_reach_another_process_bit_for_bit(domain_id):
             fields = dict(zip(COORDINATES, doubles, strict=True))
             message = DeliveryRequestMsg(message_code=code, **fields)
             publisher.publish(message if number % 2 else DeliveryRequest(code, *doubles).octets())
-        received, _ = listener.communicate(timeout=90)
+        received, _ = listener.communicate(timeout=240)
     assert received.split() == [struct.pack(">i6d", code, *doubles).hex() for code, doubles in sent]
+
+
+def test_octets_of_any_sender_are_read_as_they_were_meant():
+    for code, doubles in requests():
+        request = DeliveryRequest(code, *doubles)
+        fields = dict(zip(COORDINATES, doubles, strict=True))
+        octets = [
+            request.octets(),
+            serialize_message(DeliveryRequestMsg(message_code=code, **fields)),
+            struct.pack("<4si4x6d", b"\x00\x01\x00\x03", code, *doubles),  # the options' octets may say anything
+            struct.pack(">4si4x6d", b"\x00\x00\x00\x00", code, *doubles),  # big endian
+        ]
+        for each in octets:
+            assert DeliveryRequest.of(each).octets() == request.octets()
+
+
+@pytest.mark.parametrize("octets", [b"", b"\x00\x01\x00\x00", b"\x00\x01\x00\x00" + bytes(55)])
+def test_octets_that_are_no_message_are_refused(octets):
+    with pytest.raises(rclpy_c.RMWError):
+        DeliveryRequest.of(octets)
 
 
 def test_the_delivery_request_has_the_papers_fields():

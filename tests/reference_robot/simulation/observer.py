@@ -16,7 +16,7 @@ from std_msgs.msg import String
 from conformance.contract.delivery import COORDINATES
 from reference_robot.simulation.messages import LATCHED, MISSION_REPORTS, quaternion_of, yaw_of
 
-_PATIENCE_S = 30.0
+_PATIENCE_S = 60.0
 
 
 def until(condition, seconds=_PATIENCE_S):

@@ -9,6 +9,7 @@ from observer import until
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import BatteryState, Imu, LaserScan
 
+from reference_robot.simulation.base import HOLD_S
 from reference_robot.simulation.office import DEPOT, OFFICE
 
 REAL_TIME = pytest.mark.parametrize("robot", [{"time_scale": 1.0}], indirect=True)
@@ -22,7 +23,10 @@ def test_a_setpoint_is_reached_held_for_a_second_and_given_up(robot):
     until(lambda: robot.rests)
     held = [at for at, message in robot.odometry if message.twist.twist.linear.x == 0.5]
     assert held[0] - commanded < 0.6
-    assert 0.9 < held[-1] - commanded < 1.6
+    assert held[-1] - commanded < 1.6
+    # The last report of it may be older than a second: on a busy machine there are gaps between reports.
+    given_up = next(at for at, _ in robot.odometry if at > held[-1])
+    assert given_up - commanded > HOLD_S
 
 
 @REAL_TIME

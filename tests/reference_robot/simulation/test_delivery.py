@@ -3,11 +3,20 @@
 import json
 
 import pytest
-from action_msgs.msg import GoalStatus
+from action_msgs.msg import GoalInfo, GoalStatus, GoalStatusArray
+from mybot_delivery_app.msg import DeliveryRequestMsg
 from observer import pose, until
+from rclpy.qos import qos_profile_action_status_default
+from std_msgs.msg import String
+from unique_identifier_msgs.msg import UUID
 
 from conformance.contract.delivery import EXAMPLE
+from reference_robot.names import RosNames
+from reference_robot.ros import RosRuntime
+from reference_robot.simulation.delivery import Delivery
+from reference_robot.simulation.messages import MISSION_REPORTS
 from reference_robot.simulation.office import DEPOT, DESTINATION, SOURCE
+from reference_robot.simulation.requests import DeliveryRequests
 
 FAST = pytest.mark.parametrize("robot", [{"time_scale": 20.0}], indirect=True)
 NEAR = ((69.0, 38.7), (69.0, 39.2), (68.3, 38.7))  # a mission of a few seconds
@@ -50,6 +59,41 @@ def test_a_request_with_another_code_is_ignored(robot):
     robot.request(*NEAR, code=0)
     robot.request(*NEAR, code=3)
     until(lambda: robot.states == ["done"])
+
+
+def test_what_was_cancelled_before_the_application_came_drops_nothing(domain_id):
+    names, states = RosNames(), {}
+
+    def note(report):
+        states.update((mission["number"], mission["state"]) for mission in json.loads(report.data)["missions"])
+
+    def cancelled(*octets):
+        goals = [GoalInfo(goal_id=UUID(uuid=[octet] * 16)) for octet in octets]
+        statuses.publish(
+            GoalStatusArray(
+                status_list=[GoalStatus(goal_info=goal, status=GoalStatus.STATUS_CANCELED) for goal in goals]
+            )
+        )
+
+    with RosRuntime(domain_id) as ros, RosRuntime(domain_id) as there:
+        node = there.create_node("navigation_and_client")
+        requests = node.create_publisher(DeliveryRequestMsg, names.topics.delivery, 10)
+        statuses = node.create_publisher(
+            GoalStatusArray, f"{names.actions.navigate_to_pose}/_action/status", qos_profile_action_status_default
+        )
+        node.create_subscription(String, names.topics.missions, note, MISSION_REPORTS)
+        delivery = Delivery(ros.create_node("delivery", apart=True), DeliveryRequests(ros, names), names)
+        ros.start()
+        there.start()
+        until(requests.get_subscription_count)
+        requests.publish(DeliveryRequestMsg(message_code=4))
+        until(lambda: list(states.values()) == ["queued"])
+        cancelled(1)
+        requests.publish(DeliveryRequestMsg(message_code=3))
+        until(lambda: list(states.values()) == ["queued", "queued"])
+        cancelled(1, 2)
+        until(lambda: list(states.values()) == ["dropped", "dropped"])
+        assert delivery
 
 
 @FAST

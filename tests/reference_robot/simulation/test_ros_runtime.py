@@ -4,10 +4,12 @@ import threading
 
 import pytest
 from observer import until
+from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from reference_robot.names import RosNames
-from reference_robot.ros import RosRuntime
+from reference_robot.ros import RosRuntime, taken
 from reference_robot.simulation.runner import Simulation
 
 
@@ -60,6 +62,52 @@ def test_without_a_number_the_domain_is_the_environments(domain_id):
         publisher.publish(String(data="hello"))
         until(lambda: got)
     assert here.domain_id == domain_id
+
+
+def test_what_comes_to_a_node_that_is_not_spun_is_taken_by_hand_in_order(domain_id):
+    keep_all = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+    called = []
+    with RosRuntime(domain_id) as ros:
+        waiting = ros.create_node("waits", spun=False).create_subscription(
+            String, "word", called.append, keep_all, raw=True
+        )
+        publisher = ros.create_node("says").create_publisher(String, "word", keep_all)
+        ros.start()
+        until(publisher.get_subscription_count)
+        assert list(taken(waiting)) == []
+        words = [f"word {number}" for number in range(100)]
+        for word in words:
+            publisher.publish(String(data=word))
+        came = []
+        until(lambda: came.extend(taken(waiting)) or len(came) == len(words))
+        assert [deserialize_message(octets, String).data for octets in came] == words
+        assert list(taken(waiting)) == []
+    assert called == []
+
+
+def test_who_watches_is_called_once_for_what_waits_in_the_thread_of_a_node(domain_id):
+    batches, threads = [], []
+    with RosRuntime(domain_id) as ros, RosRuntime(domain_id) as there:
+        node = ros.create_node("takes", apart=True)
+        waiting = ros.create_node("waits", spun=False).create_subscription(String, "word", print, 1000, raw=True)
+
+        def take():
+            threads.append(threading.current_thread())
+            batches.append(list(taken(waiting)))
+
+        ros.watch(waiting, node, take, 0.2)
+        node.create_timer(0.01, lambda: threads.append(threading.current_thread()))
+        publisher = there.create_node("says").create_publisher(String, "word", 1000)
+        ros.start()
+        until(publisher.get_subscription_count)
+        for number in range(100):
+            publisher.publish(String(data=str(number)))
+        until(lambda: sum(map(len, batches)) == 100)
+        publisher.publish(String(data="last"))
+        until(lambda: sum(map(len, batches)) == 101)
+    assert len(batches) <= 4
+    assert len(set(threads)) == 1
+    assert deserialize_message(batches[-1][-1], String).data == "last"
 
 
 @pytest.mark.parametrize("domain", [-1, 102])

@@ -7,7 +7,8 @@ base: tells ``velocity``; ``{"odometry": X}`` publishes odometry at x = X, null 
 or TwistStamped. ``{"clock": S}`` publishes /clock with S seconds.
 navigator: tells ``goal`` and ``cancel``, plans straight ahead; ``{"state": "inactive"}`` refuses goals and plans, as
 a bt_navigator and a planner_server do that are not active; ``{"answers": false}`` lets goals wait for their answer;
-``{"finish": true}`` ends its goal with success.
+``{"finish": true}`` ends its goal with success; ``{"server": false}`` takes its action server off the graph and
+nothing else, ``{"server": true}`` makes another one; tells ``server`` when that is done.
 client: ``{"goal": X}`` sends a goal to x = X, as RViz does; tells ``accepted`` with its id, ``ended`` with its status.
 """
 
@@ -86,14 +87,18 @@ class Navigator(Node):
             goal_callback=lambda _: GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT,
             callback_group=group,
         )
-        self._server = ActionServer(
+        self._group = group
+        self._server: ActionServer | None = self._serve()
+
+    def _serve(self) -> ActionServer:
+        return ActionServer(
             self,
             NavigateToPose,
             "navigate_to_pose",
             execute_callback=self._drive,
             goal_callback=self._goal,
             cancel_callback=self._cancel,
-            callback_group=group,
+            callback_group=self._group,
         )
 
     def _get_state(self, _request: GetState.Request, response: GetState.Response) -> GetState.Response:
@@ -134,6 +139,13 @@ class Navigator(Node):
             self._answers.clear()
         if "finish" in command:
             self._finished.set()
+        if "server" in command and command["server"] != (self._server is not None):
+            if self._server is None:
+                self._server = self._serve()
+            else:
+                self._server.destroy()
+                self._server = None
+            tell(server=self._server is not None)
 
 
 class Client(Node):

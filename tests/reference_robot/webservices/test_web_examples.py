@@ -11,7 +11,7 @@ EXAMPLES = Path(__file__).parents[3] / "examples"
 
 def run(example: str, url: str) -> str:
     command = [sys.executable, str(EXAMPLES / example), url]
-    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=120).stdout
+    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=240).stdout
 
 
 def test_the_examples_deliver_coffee(domain_id):

@@ -22,7 +22,7 @@ from click.testing import CliRunner
 
 from reference_robot.cli import robot
 
-_PATIENCE = 20.0  # seconds
+_PATIENCE = 60.0  # seconds
 
 
 @dataclass

@@ -1,0 +1,230 @@
+"""The half of a connection that answers: requests in their order, answers out, and how it all ends.
+
+What a resource answers at once is written before the parser returns; for what has to wait there is a task, and what the
+client sends meanwhile waits its turn. So many requests may wait; then no more is read, nor while the client does not
+read.
+"""
+
+import asyncio
+import contextlib
+import math
+import socket
+import struct
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Coroutine
+from functools import partial
+from time import perf_counter
+from typing import Any, Final
+
+from reference_robot.webservices.http.interface import described
+from reference_robot.webservices.http.messages import Request, Response
+from reference_robot.webservices.http.port import Port
+from reference_robot.webservices.http.reading import full
+
+FIELD_OCTETS: Final = 200  # that a field takes besides its own: two objects, and where they are
+NEVER: Final = math.inf
+
+_LINGER: Final = 2.0  # seconds in which what a refused client still sends is read and dropped
+_PIPELINED: Final = 16  # requests that may wait on a connection before no more is read from it
+_NO_LINGER: Final = struct.pack("ii", 1, 0)  # SO_LINGER: closing resets the connection
+
+
+class AnsweringConnection(asyncio.Protocol, ABC):
+    """A connection to one port, without the half that makes requests of octets; that derives from it.
+
+    Attributes:
+        due: When the client must have moved on, by the event loop's clock; infinity while it is the robot's turn.
+    """
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self._respond = port.interface.respond
+        self._now = port.loop.time
+        self._transport: asyncio.Transport
+        self.due = NEVER
+        self._has_begun = False  # a request arrives
+        # Those that have arrived, and how they end
+        self._waiting: deque[tuple[Request, Response | None, int]] = deque()
+        self._task: asyncio.Task[Response] | None = None
+        self._held = 0  # octets of what waits, of what arrives, and of what is not read
+        self._unread = 0  # of them, those of answers
+        self._reading = True
+        self._stalled = False  # the client does not read
+        self._ended = False  # the client sends no more
+        self._leaving = False  # nor is anything more read from it
+
+    @abstractmethod
+    def expire(self) -> None:
+        """End what is overdue."""
+
+    # The transport's side
+
+    def connection_lost(self, _error: Exception | None) -> None:
+        """Forget what waits; what the robot works on is finished all the same."""
+        self._port.remove(self)
+        self._hold(-self._held)
+        self._leaving = True
+        self._waiting.clear()
+
+    def eof_received(self) -> bool:
+        """Keep the connection for the answers that are still to come; under TLS, both sides end at once."""
+        self._ended = True
+        return self._transport.can_write_eof() and (self._task is not None or bool(self._waiting))
+
+    def pause_writing(self) -> None:
+        """Answer no more: the client does not read."""
+        self._stalled = True
+        self._pause_reading()
+        self.due = self._now() + self._port.patience
+        self._unread = self._transport.get_write_buffer_size()
+        self._hold(self._unread)
+        if self._port.is_full():
+            self._reset()
+
+    def resume_writing(self) -> None:
+        """Answer what has waited."""
+        self._stalled = False
+        self._hold(-self._unread)
+        self._unread = 0
+        self._advance()
+
+    # Answers, in the order of the requests
+
+    def _is_busy(self) -> bool:
+        return self._task is not None or self._stalled or bool(self._waiting)
+
+    def _queue(self, request: Request, response: Response | None) -> None:
+        """Answer a request, or let it wait its turn; ``response`` is set where it has been refused already."""
+        if self._leaving:
+            return  # it follows one that was to be the last
+        if (
+            self._task is None and not self._stalled and not self._waiting
+        ):  # as a rule, so it is not _is_busy that says so
+            self._serve(request, response)
+            return
+        weight = _weight(request)
+        self._hold(weight)
+        if response is None and self._port.is_full():
+            response = described(full(), request.headers.get(b"accept"))
+        self._waiting.append((request, response, weight))
+        if not self._stalled:
+            self.due = NEVER
+        if len(self._waiting) >= _PIPELINED:
+            self._pause_reading()
+
+    def _serve(self, request: Request, response: Response | None) -> None:
+        outcome = response or self._respond(request)
+        if isinstance(outcome, Response):
+            self._write(request, outcome)
+        else:
+            self._await(request, outcome)
+
+    def _await(self, request: Request, outcome: Coroutine[Any, Any, Response]) -> None:
+        if not self._has_begun:
+            self.due = NEVER
+        weight = _weight(request)
+        self._hold(weight)
+        self._task = self._port.loop.create_task(outcome)
+        self._task.add_done_callback(partial(self._finish, request, weight))
+
+    def _finish(self, request: Request, weight: int, task: asyncio.Task[Response]) -> None:
+        self._task = None
+        if task.cancelled() or self._transport.is_closing():
+            return
+        self._hold(-weight)
+        self._write(request, task.result())
+        self._advance()
+
+    def _advance(self) -> None:
+        while self._waiting and self._task is None and not self._stalled:
+            request, response, weight = self._waiting.popleft()
+            self._hold(-weight)
+            self._serve(request, response)
+        if self._is_busy():
+            return
+        if self._ended:
+            self._leave()
+        elif not self._reading and not self._leaving:
+            self._reading = True
+            self._transport.resume_reading()
+            self.due = self._now() + (self._port.patience if self._has_begun else self._port.keep_alive)
+
+    def _write(self, request: Request, response: Response) -> None:
+        """Write an answer whole.
+
+        ``Server-Timing: app;dur=MS`` is the time from the complete head of the request to the answer, in milliseconds
+        (W3C Server Timing), by which a load test tells the robot's part from the network's.
+        """
+        keep_alive = request.keep_alive and not self._port.is_stopping
+        took = (perf_counter() - request.began) * 1000
+        self._transport.write(
+            b"%b%bserver-timing: app;dur=%.3f\r\n%b\r\n%b"
+            % (
+                response.head,
+                self._port.date,
+                took,
+                b"" if keep_alive else b"connection: close\r\n",
+                b"" if request.method == "HEAD" else response.body,
+            )
+        )
+        if not keep_alive:
+            self._leave()
+        elif not self._has_begun and not self._stalled:
+            self.due = self._now() + self._port.keep_alive
+
+    # The ends
+
+    def _leave(self) -> None:
+        """Close once everything is written; whoever is still sending gets the time to read the answer.
+
+        Closing at once with octets unread would reset the connection, and the answer with it (RFC 9112 9.6).
+        """
+        lingers = self._has_begun and not self._ended
+        self._leaving = True
+        self._waiting.clear()
+        if lingers:
+            if self._transport.can_write_eof():  # TLS cannot: there the client goes, or its time is up
+                self._transport.write_eof()
+            self.due = self._now() + _LINGER
+        else:
+            self._close()
+
+    def _close(self) -> None:
+        self._leaving = True
+        self._transport.close()
+        self.due = self._now() + self._port.patience
+
+    def stop(self) -> None:
+        """Close, unless an answer is under way: that is the connection's last."""
+        if not self._is_busy():
+            self._close()
+
+    def abort(self) -> None:
+        """Drop the connection, and what the robot works on for it."""
+        if self._task is not None:
+            self._task.cancel()
+        self._transport.abort()
+
+    def _reset(self) -> None:
+        """Drop the connection, and with it what the kernel would keep for minutes for a client that does not read."""
+        with contextlib.suppress(OSError):  # it may be closed, but for the word of it
+            self._transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
+        self._transport.abort()
+
+    def _pause_reading(self) -> None:
+        if self._reading and not self._leaving:
+            self._reading = False
+            self.due = NEVER
+            self._transport.pause_reading()
+
+    def _hold(self, octets: int) -> None:
+        self._held += octets
+        self._port.held.octets += octets
+
+
+def _weight(request: Request) -> int:
+    """Return what a request takes, in octets."""
+    fields = request.headers.items()
+    head = sum(FIELD_OCTETS + len(name) + len(value) for name, value in fields)
+    return len(request.path) + len(request.query) + head + len(request.body)
