@@ -198,9 +198,9 @@ def recorder(millions: int) -> bool:
 
 def _report(seed: int) -> dict[str, Any]:
     """What a worker reports each second at 4,000 requests a second: ten blocks of two operations."""
-    lot = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     book = Recorder({segment: 4 + 2 * (segment % 2) for segment in range(10)})
-    for number, service in enumerate(lot.lognormal(np.log(150_000), 0.4, 4000).astype(int).tolist()):
+    for number, service in enumerate(rng.lognormal(np.log(150_000), 0.4, 4000).astype(int).tolist()):
         book.record(number // 400, number & 1, 0, 50_000, 51_000, 50_000 + service, 52_000 + service, 30_000)
     return book.take()
 

@@ -51,9 +51,9 @@ _POSE = '{"pose": {"pose": {"position": {"x": 1.0, "y": 2.0, "z": 0.0}}}, "covar
 
 def record(book: Recorder, seed: int, first: int, requests: int) -> None:
     """Record requests, numbered from `first`: one in 500 failed, one in 1,000 was never started."""
-    lot = np.random.default_rng([seed, first])
-    service = lot.lognormal(np.log(150_000), 0.6, requests).astype(int).tolist()
-    lag = lot.exponential(30_000, requests).astype(int).tolist()
+    rng = np.random.default_rng([seed, first])
+    service = rng.lognormal(np.log(150_000), 0.6, requests).astype(int).tolist()
+    lag = rng.exponential(30_000, requests).astype(int).tolist()
     for number in range(requests):
         segment = (first // _REPORTED * _BLOCKS + number * _BLOCKS // _REPORTED) % _SEGMENTS
         operation, due = number & 1, (first + number) * 250_000

@@ -12,6 +12,7 @@ import contextlib
 import itertools
 import multiprocessing
 import os
+import signal
 import statistics
 import sys
 import time
@@ -33,6 +34,8 @@ _CONFORMANT, _NOT_CONFORMANT = 0, 1
 
 def main() -> int:
     """Certify, print, and return the exit code."""
+    # What ends a CI job takes the robots with it, like Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     options = _parser().parse_args()
     robots, links = options.robot or [REFERENCE], options.link or [NO_LINK]
     seeds = range(options.first_seed, options.first_seed + options.seeds)

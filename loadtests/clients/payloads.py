@@ -60,9 +60,9 @@ def variants(operation: str, seed: int) -> list[Values]:
     code = CATALOGUE[operation].code
     if code is None:
         return [{} for _ in range(VARIANTS)]
-    lot = np.random.default_rng([seed, 5])
+    rng = np.random.default_rng([seed, 5])
     return [
-        {name: value + float(lot.uniform(-5, 5)) for name, value in EXAMPLE.items()} | {"message_code": code}
+        {name: value + float(rng.uniform(-5, 5)) for name, value in EXAMPLE.items()} | {"message_code": code}
         for _ in range(VARIANTS)
     ]
 

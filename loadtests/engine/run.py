@@ -25,12 +25,12 @@ from loadtests.measuring.distributed_executor import DistributedExecutor, Execut
 from loadtests.measuring.end_to_end import end_to_end
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
-from loadtests.measuring.knee import Ladder
 from loadtests.measuring.metrics import Collector, serve
 from loadtests.measuring.pauses import after_pauses
 from loadtests.measuring.preflight import preflight
 from loadtests.measuring.restart import start_anew
-from loadtests.measuring.step_load import step_load
+from loadtests.measuring.rising_load import RisingLoad
+from loadtests.measuring.robot_process import RobotProcess
 from loadtests.probe.client import ProbeError
 from loadtests.result.document import compose
 from loadtests.result.files import write
@@ -62,7 +62,6 @@ class Run:
         self.collector: Collector | None = None
         self._liveness = Liveness(REPORT_S if settings.generator.expect else 0.0)
         self._told = 0.0
-        self._numbered: dict[int, int] = {}
         self._parent = os.getppid()
 
     def interrupt(self) -> None:
@@ -137,6 +136,7 @@ class Run:
                     ExitCode.INTERRUPTED if self.outcome.interrupted else ExitCode.USAGE, str(error)
                 ) from None
             self._tell_plan(plan, executor)
+            self.outcome.robot_process = RobotProcess.find(self.robots[0])
             plan = self._repeat(plan, executor)
             if self._over:
                 return
@@ -155,17 +155,11 @@ class Run:
 
     def _load_more(self, plan: Plan, executor: Executor) -> None:
         """What comes after the duel: the stepped load, the searches for the knee, more and more connections."""
-        outcome, settings = self.outcome, self.settings
-
-        def stopped() -> bool:
-            return outcome.interrupted
-
-        outcome.steps += step_load(plan, executor, settings, stopped, self._number, tell)
-        used = max(plan.first_segment + len(plan.segments), *(number + 1 for number in self._numbered))
-        ladder = Ladder(plan, executor, settings, stopped, self._number, tell, used)
-        if settings.steps.knee_searches:
-            outcome.knee_searches += ladder.knees()
-        outcome.over_connections += ladder.over_connections()
+        outcome = self.outcome
+        load = RisingLoad(plan, executor, self.settings, lambda: outcome.interrupted, self._number, tell)
+        outcome.steps += load.steps()
+        outcome.knee_searches += load.knees()
+        outcome.over_connections += load.over_connections()
 
     @property
     def _over(self) -> bool:
@@ -256,7 +250,6 @@ class Run:
 
     def _number(self, plan: Plan) -> None:
         """Have the metrics know a plan's segments."""
-        self._numbered.update(plan.series_of())
         if self.collector is not None:
             self.collector.series_of.update(plan.series_of())
 

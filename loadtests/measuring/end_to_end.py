@@ -31,12 +31,13 @@ if TYPE_CHECKING:
     from loadtests.clients.wire import Connection, Request
     from loadtests.settings.settings import EndToEnd
 
+#: What has not arrived by then is lost.
+LOST_S = 2.0
 #: What publishes without a web service.
 NATIVE = "ros"
 _DELIVERY = "delivery"
 _NS = 1_000_000_000
 _WARMING = 5  # rounds that open connections, and are not counted
-_LOST_S = 2.0  # what has not arrived by then is lost
 _FEWEST = 20  # rounds, however long they take
 _MOST_RATE = 50.0  # deliveries per second
 
@@ -134,15 +135,15 @@ def _rounds(
     stopped: Callable[[], bool],
     tell: Callable[[str], None],
 ) -> dict[str, Journeys]:
-    lot = np.random.default_rng([seed, 8])
+    rng = np.random.default_rng([seed, 8])
     found = {way: Journeys() for way in ways}
     pause_s = 1 / min(_MOST_RATE, settings.most_rate or _MOST_RATE)
     began_ns = told_ns = now_ns()
     for number in range(_WARMING + settings.rounds):
-        for way in lot.permutation(ways).tolist():
+        for way in rng.permutation(ways).tolist():
             if stopped() or (number > _WARMING + _FEWEST and now_ns() - began_ns > settings.longest_s * _NS):
                 return found
-            values = {name: value + float(lot.uniform(-5, 5)) for name, value in EXAMPLE.items()}
+            values = {name: value + float(rng.uniform(-5, 5)) for name, value in EXAMPLE.items()}
             _journey(courier, listener, way, values | {"message_code": COURIER}, found[way])
             gevent.sleep(pause_s)
         if number == _WARMING - 1:  # connections are open and DDS has matched by now
@@ -161,6 +162,6 @@ def _journey(courier: Courier, listener: Probe, way: str, values: Values, journe
         journeys.to_application_ns.append(None)
         journeys.answer_ns.append(None)
         return
-    arrived = listener.arrival_ns(in_order(values), _LOST_S)
+    arrived = listener.arrival_ns(in_order(values), LOST_S)
     journeys.to_application_ns.append(None if arrived is None else arrived - began)
     journeys.answer_ns.append(None if answered is None else answered - began)

@@ -69,10 +69,10 @@ def after_pauses(
         name: Connection(Endpoint.parse(robot.address(name[1], name[0]) or ""), robot.timeout_s, robot.tls)
         for name in names
     }
-    lot = np.random.default_rng([seed, 8])
+    rng = np.random.default_rng([seed, 8])
     try:
         for turn in range(turns):
-            for index in lot.permutation(len(names)).tolist():
+            for index in rng.permutation(len(names)).tolist():
                 if stopped():
                     return found
                 name = names[index]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,6 +10,7 @@ from conformance.contract.exit_codes import ExitCode
 from loadtests.clients.library import LIBRARY
 from loadtests.clients.payloads import CATALOGUE
 from loadtests.measuring.command_line import without_folders
+from loadtests.measuring.end_to_end import LOST_S
 from loadtests.measuring.environment import describe
 from loadtests.measuring.machine import Moment, conditions
 from loadtests.measuring.pauses import PAUSE_S
@@ -17,6 +19,7 @@ from loadtests.result.processes import process_figures
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import GAP_S, step_operation
 from loadtests.statistics import against, end_to_end, figures, modes, over_time, steps, threshold, verdict
+from loadtests.statistics.between_runs import between_runs
 from loadtests.statistics.further_interfaces import further_interfaces
 from loadtests.statistics.headline import headline
 from loadtests.statistics.intervals import order_interval_ms
@@ -43,8 +46,9 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     measured = Measured([carried.plan for carried in outcome.carried] or [plan], recorder)
     generator = _generator(outcome, measured)
     pacing = executor.pacing if executor else ""
-    comparisons = figures.comparisons(measured)
     machine, spoilt = conditions(outcome.before, Moment.now())
+    deviation = between_runs(machine, os.cpu_count() or 1, len(measured.plans))
+    comparisons = figures.comparisons(measured, deviation)
     reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing, spoilt)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
     undecided = [] if aborted or reasons else verdict.failures(generator) + verdict.says_nothing(comparisons)
@@ -62,7 +66,8 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "exit_code": code,
         "started": _stamp(outcome.started),
         "finished": _stamp(datetime.now(UTC)),
-        "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers) | {"machine": machine},
+        "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers, outcome.robot_process)
+        | {"machine": machine},
         "plan": words,
         "generator": generator,
         "workers": workers,
@@ -147,6 +152,7 @@ def _end_to_end(outcome: Outcome) -> dict[str, Any]:
         {way: one.to_application_ns for way, one in journeys.items()},
         {way: one.answer_ns for way, one in journeys.items()},
         {way: len(one.errors) for way, one in journeys.items()},
+        int(LOST_S * 1e9),
     )
     return {"end_to_end": {"domain_id": settings.domain_id, "topic": outcome.robots[0].delivery_topic, "ways": ways}}
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from loadtests.measuring.distributed_executor import Executor
     from loadtests.measuring.end_to_end import Journeys
     from loadtests.measuring.pauses import Paused
+    from loadtests.measuring.robot_process import RobotProcess
     from loadtests.schedule.plan import Plan, SeriesName
     from loadtests.settings.settings import Settings
 
@@ -47,6 +48,7 @@ class Outcome:
         carried: each repeat's plan, and how many seconds of it were carried out.
         paused: what requests cost after a pause and behind one another, by series.
         before: the machine when the run began.
+        robot_process: who listened at the robot's address before the first request of the duel, where that is known.
         cpu_share: the busiest worker's share of a core in the duel.
         steps: results of the stepped load.
         knee_searches: results of the searches for the knee; over_connections: of more and more connections.
@@ -65,6 +67,7 @@ class Outcome:
     carried: list[Carried] = field(default_factory=list)
     paused: dict[SeriesName, Paused] = field(default_factory=dict)
     before: Moment = field(default_factory=Moment.now)
+    robot_process: RobotProcess | None = None
     cpu_share: float | None = None
     steps: list[dict[str, Any]] = field(default_factory=list)
     knee_searches: list[dict[str, Any]] = field(default_factory=list)

@@ -35,7 +35,7 @@ class Schedule:
             return [0] * len(plan.segments)
         if plan.load.arrivals == "poisson":
             return [
-                int(self._lot(index, 2).poisson(segment.rate * segment.active_s))
+                int(self._rng(index, 2).poisson(segment.rate * segment.active_s))
                 for index, segment in enumerate(plan.segments)
             ]
         owed: dict[tuple[str, str, str], float] = {}
@@ -47,7 +47,7 @@ class Schedule:
             owed[key] -= counts[-1]
         return counts
 
-    def _lot(self, segment: int, purpose: int) -> np.random.Generator:
+    def _rng(self, segment: int, purpose: int) -> np.random.Generator:
         return np.random.default_rng([self.plan.load.seed, purpose, self.plan.first_segment + segment])
 
     def count(self) -> int:
@@ -83,11 +83,11 @@ class Schedule:
         """The offsets of all arrivals in a segment, over all workers, in order."""
         count = self._counts[segment]
         start, end = self.starts_ns(segment), self.ends_ns(segment)
-        lot = self._lot(segment, 3)
+        rng = self._rng(segment, 3)
         if self.plan.load.arrivals == "poisson":
-            places = np.sort(lot.random(count))
+            places = np.sort(rng.random(count))
         else:  # a phase by lot, lest the schedule beat with the robot's own clock
-            places = (np.arange(count) + lot.random()) / max(count, 1)
+            places = (np.arange(count) + rng.random()) / max(count, 1)
         due: list[int] = (start + places * (end - start)).astype(np.int64).tolist()
         return due
 
@@ -95,9 +95,9 @@ class Schedule:
         """This worker's arrivals in a segment: (offset in ns, operation, payload), in order."""
         due = self.due_ns(segment)
         kinds = np.resize(np.array(self.operations(segment)), len(due))
-        lot = self._lot(segment, 4)
-        lot.shuffle(kinds)
-        payloads = lot.integers(VARIANTS, size=len(due)).tolist()
+        rng = self._rng(segment, 4)
+        rng.shuffle(kinds)
+        payloads = rng.integers(VARIANTS, size=len(due)).tolist()
         mine = slice((self.worker + segment) % self.workers, None, self.workers)
         return list(zip(due[mine], kinds.tolist()[mine], payloads[mine], strict=True))
 

@@ -195,5 +195,9 @@ class Pacer:
         wanted = schedule.users()
         waiting, self._idle = self._idle[:wanted], self._idle[wanted:]
         for waiter in waiting:
-            waiter.switch(self._in_turn(schedule, now_ns()))
+            now = now_ns()
+            if now < self._closes:
+                waiter.switch(self._in_turn(schedule, now))
+            else:  # this process was held up until the segment was over: a request of now is none of its
+                self._idle.append(waiter)
         self._arm(schedule)

@@ -167,10 +167,10 @@ class Plan:
         if self.load.rate:
             least = max(least, _ARRIVALS_PER_BLOCK / self.load.rate)
         most = int(self.load.duration_s / least + 1e-9)
-        lot = np.random.default_rng([self.load.seed, 1, self.repeat])
+        rng = np.random.default_rng([self.load.seed, 1, self.repeat])
         made: list[Segment] = []
         for number in count():
-            turn = self._round(number, swapped=bool(lot.integers(2)))
+            turn = self._round(number, swapped=bool(rng.integers(2)))
             if len(made) + len(turn) > most:
                 return made or turn[: len(turn) // 2]
             made += turn

@@ -114,12 +114,8 @@ def _compared(settings: Settings, other: Statement, tolerance: float) -> Setting
     if not 0 < tolerance <= _MOST_TOLERANCE:
         raise SettingsError(f"--tolerance {tolerance:.3%} is out of range: above 0, at most {_MOST_TOLERANCE:.0%}")
     operations, load = settings.selection.operations, settings.load
-    most, why = _ceiling(other, operations)
-    longest, reason = _longest(other, operations)
-    if most is not None and load.rate is not None and load.rate > most:
-        raise SettingsError(f"--rate {load.rate:g} exceeds {most:g} requests/s ({why}; of the robot of --against)")
-    if longest is not None and load.duration_s > longest:
-        raise SettingsError(f"--duration {load.duration_s:g} exceeds {longest:g} s ({reason}; of that of --against)")
+    _check_limits(other, operations, load.rate, load.duration_s, settings.repeats.number, "; of the robot of --against")
+    most = _ceiling(other, operations)[0]
     ceilings = [rate for rate in (settings.limits.max_rate, most) if rate is not None]
     return replace(
         settings,
@@ -222,17 +218,29 @@ def _longest(statement: Statement, operations: tuple[str, ...]) -> tuple[float |
 
 def _bounded(options: CliOptions, statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, float]:
     """Rate and duration within what is allowed; defaults bend, options are refused."""
+    most, longest = _ceiling(statement, operations)[0], _longest(statement, operations)[0]
+    rate = None if options.users is not None else (options.rate or min(DEFAULT_RATE, most or DEFAULT_RATE))
+    duration_s = options.duration_s or min(DEFAULT_DURATION_S, longest or DEFAULT_DURATION_S)
+    _check_limits(statement, operations, rate, duration_s, options.repeats.number)
+    return rate, duration_s
+
+
+def _check_limits(
+    statement: Statement,
+    operations: tuple[str, ...],
+    rate: float | None,
+    duration_s: float,
+    repeats: int,
+    whose: str = "",
+) -> None:
+    """Refuse what a robot's statement does not allow."""
     most, why = _ceiling(statement, operations)
     longest, reason = _longest(statement, operations)
-    rate = None if options.users is not None else (options.rate or min(DEFAULT_RATE, most or DEFAULT_RATE))
     if rate is not None and most is not None and rate > most:
-        raise SettingsError(f"--rate {rate:g} exceeds {most:g} requests/s ({why})")
-    duration_s = options.duration_s or min(DEFAULT_DURATION_S, longest or DEFAULT_DURATION_S)
-    repeats = options.repeats.number
+        raise SettingsError(f"--rate {rate:g} exceeds {most:g} requests/s ({why}{whose})")
     if longest is not None and duration_s * repeats > longest:
         times = f" {repeats} times" if repeats > 1 else ""
-        raise SettingsError(f"--duration {duration_s:g}{times} exceeds {longest:g} s ({reason})")
-    return rate, duration_s
+        raise SettingsError(f"--duration {duration_s:g}{times} exceeds {longest:g} s ({reason}{whose})")
 
 
 def _steps(options: CliOptions, statement: Statement, operations: tuple[str, ...]) -> Steps:

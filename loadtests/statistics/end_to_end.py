@@ -1,18 +1,23 @@
-"""The `end_to_end` of latency.json: journeys from the request to the application, as figures."""
+"""The `end_to_end` of latency.json: journeys from the request to the application, as figures.
+
+A delivery that failed or never arrived counts in every figure, as at least the time for which it was waited: a robot
+that loses what it is slow at is not quick.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from loadtests.statistics.figures import plain_quantiles, rounded, rounded_interval
 from loadtests.statistics.histogram import Histogram
-from loadtests.statistics.intervals import at_most, order_interval_ms
+from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.rounds import SHARES
 
-_TAIL = 0.025
 _BASE = "rest"
 
 #: Nanoseconds by round; None for a round without any.
@@ -20,7 +25,7 @@ Journey = Sequence[int | None]
 
 
 def ways(
-    arrivals: Mapping[str, Journey], answers: Mapping[str, Journey], errors: Mapping[str, int]
+    arrivals: Mapping[str, Journey], answers: Mapping[str, Journey], errors: Mapping[str, int], waited_ns: int
 ) -> list[dict[str, Any]]:
     """An entry for each way.
 
@@ -28,22 +33,34 @@ def ways(
         arrivals: nanoseconds from the request's start to the application, by round; None where it never came.
         answers: likewise to the request's answer; None where the way has none.
         errors: requests that brought no good answer.
+        waited_ns: how long was waited for each.
     """
     return [
-        {
-            "interface": way,
-            "count": sum(time is not None for time in times),
-            "lost": sum(time is None for time in times) - errors[way],
-            "errors": errors[way],
-            "to_application_ms": plain_quantiles(_histogram(times)),
-            "ci95_ms": {
-                name: rounded_interval(order_interval_ms(_histogram(times), SHARES[name])) for name in ("p50", "p99")
-            },
-            "answer_ms": plain_quantiles(_histogram(answers[way])) if any(answers[way]) else None,
-            "over_rest": _over(times, arrivals[_BASE]) if way != _BASE and _BASE in arrivals else None,
-        }
+        _way(way, times, answers[way], errors[way], waited_ns)
+        | {"over_rest": _over(times, arrivals[_BASE]) if way != _BASE and _BASE in arrivals else None}
         for way, times in arrivals.items()
     ]
+
+
+def _way(way: str, times: Journey, answers: Journey, errors: int, waited_ns: int) -> dict[str, Any]:
+    arrived = [time for time in times if time is not None]
+    missing = len(times) - len(arrived)
+    whole = _histogram([*arrived, *[max([waited_ns, *arrived])] * missing])
+    figures = plain_quantiles(whole)
+    return {
+        "interface": way,
+        "count": len(arrived),
+        "lost": missing - errors,
+        "errors": errors,
+        "to_application_ms": figures,
+        "at_least": [
+            name
+            for name, figure in figures.items()
+            if missing and figure is not None and (name not in SHARES or SHARES[name] > len(arrived) / len(times))
+        ],
+        "ci95_ms": {name: rounded_interval(order_interval_ms(whole, SHARES[name])) for name in ("p50", "p99")},
+        "answer_ms": plain_quantiles(_histogram(answers)) if any(answers) else None,
+    }
 
 
 def _histogram(times: Journey) -> Histogram:
@@ -53,11 +70,18 @@ def _histogram(times: Journey) -> Histogram:
 
 
 def _over(times: Journey, base: Journey) -> dict[str, Any]:
-    """The median of the ratios of neighbours, and its interval from their order (the sign test's)."""
-    pairs = zip(times, base, strict=False)
-    ratios = sorted(one / other for one, other in pairs if one is not None and other)
-    rank = max((rank for rank in range(len(ratios) // 2) if at_most(rank, len(ratios), 0.5) <= _TAIL), default=None)
+    """The median of the ratios of neighbours, and its interval from their order (the sign test's).
+
+    One that never arrived took longer than any; of two that did not nothing is known.
+    """
+    taken = ([math.inf if time is None else time for time in side] for side in (times, base))
+    ratios = [one / other for one, other in zip(*taken, strict=False) if other and min(one, other) < math.inf]
+    if not ratios:
+        return {"ratio": None, "ci95": None}
+    interval = stats.quantile_test(ratios, p=0.5).confidence_interval(0.95)
+    bounds = float(interval.low), float(interval.high)  # NaN where they are too few
+    median = float(np.median(ratios))
     return {
-        "ratio": rounded(float(np.median(ratios))) if ratios else None,
-        "ci95": None if rank is None else rounded_interval((ratios[rank], ratios[-1 - rank])),
+        "ratio": rounded(median) if math.isfinite(median) else None,
+        "ci95": rounded_interval(bounds) if all(map(math.isfinite, bounds)) else None,
     }

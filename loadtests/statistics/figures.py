@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from loadtests.statistics.between_runs import Interval
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.intervals import (
     LEAST_ROUNDS,
     Compared,
-    Drawn,
-    Interval,
+    Replicates,
     compare,
     figure_interval_ms,
+    pooled_interval,
     samples_for_point,
-    together,
 )
 from loadtests.statistics.judgement import Judgement, judge
 from loadtests.statistics.measured import Measured, Side
@@ -63,17 +63,17 @@ def plain_quantiles(histogram: Histogram) -> dict[str, float | None]:
     return quantiles(histogram)[0]
 
 
-def rounds_of(drawn: Drawn | None, pair_s: float) -> dict[str, Any] | None:
-    """What an interval was drawn from: how many rounds of which length, and how they hang together."""
-    if drawn is None:
+def rounds_of(replicates: Replicates | None, pair_s: float) -> dict[str, Any] | None:
+    """What was resampled for an interval: how many rounds of which length, and how they depend on one another."""
+    if replicates is None:
         return None
-    rounds = drawn.rounds
+    rounds = replicates.rounds
     return {
         "number": rounds.sample.size,
         "pairs": rounds.length,
         "length_s": rounded(rounds.length * pair_s),
         "autocorrelation": {"pairs": rounded(rounds.unit_correlation), "rounds": rounded(rounds.correlation)},
-        "widened": rounded(drawn.widening),
+        "widened": rounded(replicates.widening),
     }
 
 
@@ -115,7 +115,7 @@ def _one_series(measured: Measured, name: SeriesName, request: int | None, respo
             if estimate.reason:
                 reasons[f"ci95 {quantile}"] = estimate.reason
             if time == "service":
-                rounds[quantile] = rounds_of(estimate.drawn, pair_s(measured, "duel", name))
+                rounds[quantile] = rounds_of(estimate.replicates, pair_s(measured, "duel", name))
     return named(name) | {
         "count": whole.service.total,
         "errors": whole.errors,
@@ -163,10 +163,11 @@ def _repeats(measured: Measured, name: SeriesName) -> list[dict[str, Any]]:
     return found
 
 
-def comparisons(measured: Measured) -> list[dict[str, Any]]:
+def comparisons(measured: Measured, deviation: float) -> list[dict[str, Any]]:
     """SOAP against REST, by operation, client and quantile, over the service time, judged by the A/A run.
 
-    The library clients have no A/A run of their own: the wire client's judges them too.
+    The library clients have no A/A run of their own: the wire client's judges them too. `deviation` is the relative
+    standard deviation of the ratio between runs, as far as this run cannot see it.
     """
     found: list[dict[str, Any]] = []
     if measured.plan.robots > 1:
@@ -180,7 +181,7 @@ def comparisons(measured: Measured) -> list[dict[str, Any]]:
         ]
         floor = {quantile: noise(measured, operation, quantile) for quantile in COMPARED} if clients else {}
         found += [
-            comparison(measured, operation, client, quantile, floor[quantile])
+            comparison(measured, operation, client, quantile, floor[quantile], deviation)
             for client in clients
             for quantile in COMPARED
         ]
@@ -188,17 +189,18 @@ def comparisons(measured: Measured) -> list[dict[str, Any]]:
 
 
 def comparison(
-    measured: Measured, operation: str, client: str, quantile: str, floor: Interval | None
+    measured: Measured, operation: str, client: str, quantile: str, floor: Interval | None, deviation: float
 ) -> dict[str, Any]:
     """SOAP against REST at one quantile, judged by the interval that an interface came to against itself."""
     rest, soap = (Side("duel", (operation, interface, client)) for interface in _COMPARED_INTERFACES)
     length = pair_s(measured, "duel", rest.name)
-    entry = compared(measured.paired(rest, soap), quantile, measured, "soap_minus_rest_ms", length)
+    entry = compared(measured.paired(rest, soap), quantile, measured, "soap_minus_rest_ms", length, deviation)
     verdict = judge(entry["ratio"], entry["ci95"], floor) if entry["ratio"] is not None else Judgement("none")
     return (
         {"operation": operation, "client": client}
         | entry
         | {
+            "between_runs": rounded(deviation),
             "noise_ci95": rounded_interval(floor),
             "judgement": verdict.verdict,
             "bound": rounded(verdict.bound),
@@ -211,15 +213,12 @@ def noise(measured: Measured, operation: str, quantile: str) -> Interval | None:
     """The ratio that SOAP and REST came to against themselves, both together: its interval."""
     client = measured.plan.clients[0]
     parts = []
-    for interface in _COMPARED_INTERFACES:
+    for stream, interface in enumerate(_COMPARED_INTERFACES):
         name = (operation, interface, client)
         if name in measured.plan.series_names():
-            parts.append(_enough(_against_itself(measured, name), quantile, measured.plan.load.seed))
+            parts.append(_enough(_against_itself(measured, name), quantile, measured.plan.load.seed, stream=stream))
     known = [part for part in parts if part is not None]
-    if not known or len(known) < len(parts):
-        return None
-    whole = together(known)
-    return whole.ci95 if whole else None
+    return pooled_interval(known) if len(known) == len(parts) else None
 
 
 def _against_itself(measured: Measured, name: SeriesName) -> list[Unit]:
@@ -249,14 +248,17 @@ def _needed(quantile: str) -> int:
     return 2 if quantile == "mean" else samples_for_point(SHARES[quantile])
 
 
-def _enough(units: list[Unit], quantile: str, seed: int) -> Compared | None:
+def _enough(units: list[Unit], quantile: str, seed: int, *, stream: int = 0, deviation: float = 0.0) -> Compared | None:
     """Compare two sides where both have enough samples."""
-    return compare(units, quantile, seed) if _samples(units) >= _needed(quantile) else None
+    enough = _samples(units) >= _needed(quantile)
+    return compare(units, quantile, seed, stream=stream, deviation=deviation) if enough else None
 
 
-def compared(units: list[Unit], quantile: str, measured: Measured, difference: str, pair_s: float) -> dict[str, Any]:
-    """Two sides at one quantile: what latency.json says, `difference` being its key."""
-    result = _enough(units, quantile, measured.plan.load.seed)
+def compared(
+    units: list[Unit], quantile: str, measured: Measured, difference: str, pair_s: float, deviation: float = 0.0
+) -> dict[str, Any]:
+    """Two sides at one quantile: what latency.json says, `difference` being its key; `deviation` as in `compare`."""
+    result = _enough(units, quantile, measured.plan.load.seed, deviation=deviation)
     reason = None
     if result is None:
         reason = f"{_samples(units)} samples on one side; {quantile} needs {_needed(quantile)}"
@@ -268,6 +270,6 @@ def compared(units: list[Unit], quantile: str, measured: Measured, difference: s
         "ratio": rounded(result.ratio) if result else None,
         "ci95": rounded_interval(result.ci95) if result else None,
         "ci95_difference_ms": rounded_interval(result.ci95_difference_ms) if result else None,
-        "rounds": rounds_of(result.drawn, pair_s) if result else None,
+        "rounds": rounds_of(result.replicates, pair_s) if result else None,
         "reason": reason,
     }

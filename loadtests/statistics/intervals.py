@@ -1,7 +1,7 @@
 """Confidence intervals of medians, p99s and other quantiles, and of their ratios and differences.
 
 By scipy's bootstrap over rounds (see `rounds`), or over repeats and the rounds within them (Davison and Hinkley 1997,
-section 3.8) where the run was repeated often enough. Percentile intervals of few draws are too narrow; they are taken
+section 3.8) where the run was repeated often enough. Percentile intervals of few rounds are too narrow; they are taken
 at the level that makes them as wide as Student's t (Hesterberg 2015), and widened by what correlation is left between
 rounds and by what the repeats differ beyond what each run's own scatter explains (Birge 1932). How often they are
 right is measured by `benchmarks/calibration.py`.
@@ -10,27 +10,24 @@ right is measured by `benchmarks/calibration.py`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 
+from loadtests.statistics.between_runs import LEAST_REPEATS, Interval, widened_difference, widened_ratio
 from loadtests.statistics.histogram import Floats, Histogram, Ints
 from loadtests.statistics.rounds import SHARES, Rounds, Sample, Unit, in_rounds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-DRAWS = 2000
+RESAMPLES = 2000
 LEAST_ROUNDS = 6
-#: With fewer repeats the rounds of all are drawn from, and the interval is widened by what the repeats differ.
-LEAST_REPEATS = 4
-_AT_ONCE = 100  # draws held in memory together
+_AT_ONCE = 100  # resamples held in memory together
 _TAIL = 0.025
 _UPPER_TAIL = 0.99
-
-Interval = tuple[float, float]
 
 
 def samples_for_point(quantile: float) -> int:
@@ -49,89 +46,95 @@ def samples_for_interval(quantile: float) -> int:
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """A figure of each side, and what it came to in each draw.
+class Replicates:
+    """A figure of each side, and what it came to in each resample (Davison and Hinkley's bootstrap replicates).
 
     Attributes:
-        figures: of the whole, shape (sides,), milliseconds.
-        draws: shape (sides, draws).
-        rounds: what was drawn.
+        estimates: of the whole, shape (sides,), milliseconds.
+        values: shape (sides, resamples).
+        rounds: what was resampled.
         degrees: of freedom, Student's.
-        widening: factor on the width that the draws do not show.
+        widening: factor on the width that the replicates do not show.
     """
 
-    figures: Floats
-    draws: Floats
+    estimates: Floats
+    values: Floats
     rounds: Rounds
     degrees: int
     widening: float
 
     def interval(self, combined: Floats, estimate: float) -> Interval | None:
-        """The 95 % interval of a positive figure that was `combined` from each draw's, about its `estimate`."""
+        """The 95 % interval of a positive figure, `combined` from the sides' replicates, about its `estimate`."""
         known = combined[np.isfinite(combined) & (combined > 0)]
-        if len(known) < DRAWS / 2 or estimate <= 0:
+        if len(known) < RESAMPLES / 2 or estimate <= 0:
             return None
-        low, high = np.log(known_quantiles(known, self.degrees)) - math.log(estimate)
+        low, high = (np.log(expanded_percentiles(known, self.degrees)) - math.log(estimate)).tolist()
         return estimate * math.exp(low * self.widening), estimate * math.exp(high * self.widening)
 
     def difference_interval(self) -> Interval | None:
         """The 95 % interval of the second side's figure less the first's."""
-        combined = self.draws[1] - self.draws[0]
+        combined = self.values[1] - self.values[0]
         known = combined[np.isfinite(combined)]
-        if len(known) < DRAWS / 2:
+        if len(known) < RESAMPLES / 2:
             return None
-        estimate = float(self.figures[1] - self.figures[0])
-        low, high = known_quantiles(known, self.degrees) - estimate
+        estimate = float(self.estimates[1] - self.estimates[0])
+        low, high = (expanded_percentiles(known, self.degrees) - estimate).tolist()
         return estimate + low * self.widening, estimate + high * self.widening
 
 
-def known_quantiles(draws: Floats, degrees: int) -> Floats:
-    """The two quantiles of the draws between which Student's 95 % lie, for so many degrees of freedom."""
+def expanded_percentiles(replicates: Floats, degrees: int) -> Floats:
+    """The two quantiles of the replicates between which Student's 95 % lie, for so many degrees of freedom."""
     reach = stats.t.ppf(1 - _TAIL, degrees) * math.sqrt((degrees + 1) / degrees)
     tail = float(stats.norm.cdf(-reach))
-    found: Floats = np.quantile(draws, [tail, 1 - tail])
+    found: Floats = np.quantile(replicates, [tail, 1 - tail])
     return found
 
 
-def draw(units: Sequence[Unit], name: str, seed: int) -> Drawn | None:
-    """Draw from units again and again; None where there are fewer than LEAST_ROUNDS with samples on each side."""
+def resample(units: Sequence[Unit], name: str, seed: int, stream: int = 0) -> Replicates | None:
+    """Resample units again and again; None where there are fewer than LEAST_ROUNDS with samples on each side."""
     filled = [unit for unit in units if all(side.total for side in unit.sides)]
     if len(filled) < LEAST_ROUNDS:
         return None
     rounds = in_rounds(Sample.of(filled), name)
-    sample, lot = rounds.sample, np.random.default_rng([seed, 6])
+    sample, rng = rounds.sample, np.random.default_rng([seed, 6, stream])
     repeats = len(np.unique(sample.repeats))
     nested = repeats >= LEAST_REPEATS
     outer = repeats if nested else sample.size
 
     def figures(chosen: Ints, axis: int = -1) -> Floats:
-        """The figures of draws, each given by the numbers of what was drawn, shape (draws, outer)."""
+        """The figures of resamples, each given by the numbers of what was chosen, shape (resamples, outer)."""
         del axis
         times = _times(np.atleast_2d(chosen), outer)
-        return sample.statistic_ms(_within(times, sample.repeats, lot) if nested else times, name)
+        return sample.statistic_ms(_within(times, sample.repeats, rng) if nested else times, name)
 
     found = stats.bootstrap(
-        (np.arange(outer),), figures, n_resamples=DRAWS, batch=_AT_ONCE, vectorized=True, method="percentile", rng=lot
+        (np.arange(outer),),
+        figures,
+        n_resamples=RESAMPLES,
+        batch=_AT_ONCE,
+        vectorized=True,
+        method="percentile",
+        rng=rng,
     )
     whole = sample.statistic_ms(np.ones((1, sample.size)), name)[:, 0]
     widening = rounds.widening * (1.0 if nested else birge_ratio(rounds))
-    return Drawn(whole, found.bootstrap_distribution, rounds, outer - 1, widening)
+    return Replicates(whole, found.bootstrap_distribution, rounds, outer - 1, widening)
 
 
 def _times(chosen: Ints, number: int) -> Floats:
-    """How often each of `number` things was chosen, shape (draws, number), from the choices' numbers."""
+    """How often each of `number` things was chosen, shape (resamples, number), from the choices' numbers."""
     rows = np.arange(len(chosen))[:, None] * number
     counted = np.bincount((chosen + rows).ravel(), minlength=len(chosen) * number)
     return counted.reshape(len(chosen), number).astype(np.float64)
 
 
-def _within(times: Floats, repeats: Ints, lot: np.random.Generator) -> Floats:
-    """Draw rounds within repeats that were drawn so many times: how often each round counts, shape (draws, rounds)."""
+def _within(times: Floats, repeats: Ints, rng: np.random.Generator) -> Floats:
+    """Resample rounds within repeats that were chosen so often: how often each counts, shape (resamples, rounds)."""
     found = np.zeros((len(times), len(repeats)))
     for number, repeat in enumerate(np.unique(repeats).tolist()):
         members = np.flatnonzero(repeats == repeat)
         trials = (times[:, number] * len(members)).astype(np.int64)
-        found[:, members] = lot.multinomial(trials, np.full(len(members), 1 / len(members)))
+        found[:, members] = rng.multinomial(trials, np.full(len(members), 1 / len(members)))
     return found
 
 
@@ -151,11 +154,11 @@ def birge_ratio(rounds: Rounds) -> float:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure of one series: its 95 % interval, or why there is none; and what was drawn."""
+    """A figure of one series: its 95 % interval, or why there is none; and its replicates."""
 
     interval: Interval | None
     reason: str | None
-    drawn: Drawn | None
+    replicates: Replicates | None
 
 
 def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
@@ -166,16 +169,16 @@ def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
     Args:
         units: with one side each.
         name: `mean` or a key of SHARES.
-        seed: fixes the draws.
+        seed: fixes the resamples.
     """
     samples = sum(unit.sides[0].total for unit in units)
     needed = 2 if name == "mean" else max(samples_for_interval(SHARES[name]), samples_for_point(SHARES[name]))
     if samples < needed:
         return Estimate(None, f"{samples} samples; a 95 % interval of {name} needs {needed}", None)
-    drawn = draw(units, name, seed)
-    if drawn is not None:
-        interval = drawn.interval(drawn.draws[0], float(drawn.figures[0]))
-        return Estimate(interval, None if interval else "the draws say nothing", drawn)
+    replicates = resample(units, name, seed)
+    if replicates is not None:
+        interval = replicates.interval(replicates.values[0], float(replicates.estimates[0]))
+        return Estimate(interval, None if interval else "too few resamples hold samples", replicates)
     if name not in SHARES:
         return Estimate(None, f"fewer than {LEAST_ROUNDS} rounds of blocks", None)
     whole = Histogram()
@@ -184,15 +187,10 @@ def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
     return Estimate(order_interval_ms(whole, SHARES[name]), None, None)
 
 
-def at_most(count: int, trials: int, share: float) -> float:
-    """The probability that a binomial variable is at most `count`."""
-    return float(stats.binom.cdf(count, trials, share))
-
-
 def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
     """The distribution-free 95 % interval of a quantile, from the order of the samples alone.
 
-    It takes them as independent, which requests are not quite: it serves where there are too few blocks to draw from.
+    It takes them as independent, which requests are not quite: it serves where there are too few blocks to resample.
     """
     samples = histogram.total
     if samples < samples_for_interval(quantile):
@@ -210,16 +208,18 @@ class Compared:
     ratio: float
     ci95: Interval | None
     ci95_difference_ms: Interval | None
-    drawn: Drawn | None
+    replicates: Replicates | None
 
 
-def compare(units: Sequence[Unit], name: str, seed: int) -> Compared | None:
+def compare(units: Sequence[Unit], name: str, seed: int, *, stream: int = 0, deviation: float = 0.0) -> Compared | None:
     """Compare two sides by units that hold both; None where a side is empty.
 
     Args:
         units: with the first and the second side's histogram each.
         name: `mean` or a key of SHARES.
-        seed: fixes the draws.
+        seed: fixes the resamples.
+        stream: keeps apart the resamples of comparisons that are pooled.
+        deviation: relative standard deviation of the ratio between runs, to be in the interval (see `between_runs`).
     """
     filled = [unit for unit in units if all(side.total for side in unit.sides)]
     if not filled:
@@ -228,27 +228,30 @@ def compare(units: Sequence[Unit], name: str, seed: int) -> Compared | None:
     first, second = (float(value) for value in sample.statistic_ms(np.ones((1, sample.size)), name)[:, 0])
     if first <= 0:
         return None
-    drawn = draw(filled, name, seed)
-    if drawn is None:
+    replicates = resample(filled, name, seed, stream)
+    if replicates is None:
         return Compared(second - first, second / first, None, None, None)
-    ratio = drawn.interval(drawn.draws[1] / drawn.draws[0], second / first)
-    return Compared(second - first, second / first, ratio, drawn.difference_interval(), drawn)
+    ratio, within = second / first, replicates.interval(replicates.values[1] / replicates.values[0], second / first)
+    difference, within_ms = second - first, replicates.difference_interval()
+    return Compared(
+        difference,
+        ratio,
+        None if within is None else widened_ratio(ratio, within, deviation),
+        None if within_ms is None else widened_difference(difference, within_ms, deviation * second),
+        replicates,
+    )
 
 
-def together(parts: Sequence[Compared]) -> Compared | None:
-    """The mean of several independent comparisons on the logarithmic scale; None where one has no interval."""
-    drawn = [part.drawn for part in parts if part.drawn is not None]
-    if not drawn or len(drawn) < len(parts):
+def pooled_interval(parts: Sequence[Compared]) -> Interval | None:
+    """The 95 % interval of the geometric mean of the ratios of comparisons, which have streams of their own.
+
+    None where one of them has no interval.
+    """
+    known = [part.replicates for part in parts if part.replicates is not None]
+    if not known or len(known) < len(parts):
         return None
     ratio = math.exp(float(np.mean([math.log(part.ratio) for part in parts])))
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratios = np.exp(np.mean([np.log(one.draws[1] / one.draws[0]) for one in drawn], axis=0))
-    whole = Drawn(
-        drawn[0].figures,
-        drawn[0].draws,
-        drawn[0].rounds,
-        sum(one.degrees for one in drawn),
-        max(one.widening for one in drawn),
-    )
-    difference = float(np.mean([part.difference_ms for part in parts]))
-    return Compared(difference, ratio, whole.interval(ratios, ratio), None, whole)
+        ratios = np.exp(np.mean([np.log(one.values[1] / one.values[0]) for one in known], axis=0))
+    degrees, widening = sum(one.degrees for one in known), max(one.widening for one in known)
+    return replace(known[0], degrees=degrees, widening=widening).interval(ratios, ratio)

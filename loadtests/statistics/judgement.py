@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from loadtests.statistics.intervals import Interval
+    from loadtests.statistics.between_runs import Interval
 
 Verdict = Literal["differs", "bounded", "noise", "none"]
 #: An interval that leaves open whether a side takes twice as long, or half, carries no statement.

@@ -1,4 +1,4 @@
-"""What was recorded, by series: cells added up, and the units that are drawn from.
+"""What was recorded, by series: cells added up, and the units that are resampled.
 
 A request that was not answered as it should be, or that never started, counts in every figure: as at least the time
 until it was given up, and as no less than the slowest answer of its series. Else a robot that hangs on what it is
@@ -85,7 +85,7 @@ class Measured:
         return {place: counted(cell, time, floor) for place, cell in cells.items()}
 
     def units(self, name: SeriesName, time: str, phase: str = "duel") -> list[Unit]:
-        """What a series' intervals are drawn from."""
+        """What is resampled for a series' intervals."""
         return [Unit(place[0], (side,)) for place, side in sorted(self.pairs(phase, name, time).items())]
 
     def whole(self, name: SeriesName, time: str, phase: str = "duel") -> Histogram:

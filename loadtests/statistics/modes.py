@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from loadtests.statistics.measured import Measured
 
 _FEWEST, _POINTS = 100, 2000
-_CHANCE = 0.01
+_SIGNIFICANCE = 0.01
 _BINS = 60
 _VALLEY = 0.6  # of the lower peak, at most
 _LEAST_SHARE = 0.02
@@ -35,14 +35,14 @@ def modes(histogram: Histogram) -> dict[str, Any] | None:
     if histogram.total < _FEWEST:
         return None
     times = _quantiles_ms(histogram, min(_POINTS, histogram.total))
-    dip, chance = (float(value) for value in diptest.diptest(np.log(times)))
+    dip, p_value = (float(value) for value in diptest.diptest(np.log(times)))
     median = float(np.median(times))
-    split = _valley_ms(times) if chance < _CHANCE else None
+    split = _valley_ms(times) if p_value < _SIGNIFICANCE else None
     above = None if split is None else float((times > split).mean())
     return {
-        "far": rounded(_share_above(histogram, _FAR * median)),
+        "beyond_five_medians": rounded(_share_above(histogram, _FAR * median)),
         "dip": rounded(dip),
-        "chance": rounded(chance),
+        "p_value": rounded(p_value),
         "split_ms": rounded(split),
         "share_above": rounded(above),
         "medians_ms": None

@@ -1,4 +1,4 @@
-"""What is drawn again: rounds of neighbouring pairs of blocks, long enough that one says nothing about the next.
+"""What is resampled: rounds of neighbouring pairs of blocks, long enough that one says nothing about the next.
 
 Requests that follow one another are not independent, and blocks are not either: a stall or a drift meets several.
 Resampling what depends on its neighbour makes intervals too narrow (Carlstein 1986). The smallest unit is the pair of
@@ -76,11 +76,11 @@ class Sample:
         """The mean or a quantile of weighted sums of units.
 
         Args:
-            weights: how often each unit counts, shape (draws, units).
+            weights: how often each unit counts, shape (resamples, units).
             name: `mean` or a key of SHARES.
 
         Returns:
-            Shape (sides, draws), milliseconds; NaN for a draw without samples.
+            Shape (sides, resamples), milliseconds; NaN for a resample without samples.
         """
         return np.array([_statistic_ms(self.bins, weights @ side, name) for side in self.counts])
 
@@ -101,17 +101,17 @@ class Sample:
         return result
 
 
-def _statistic_ms(bins: Ints, drawn: Floats, name: str) -> Floats:
-    totals = drawn.sum(axis=1)
+def _statistic_ms(bins: Ints, counts: Floats, name: str) -> Floats:
+    totals = counts.sum(axis=1)
     if name == "mean":
         lower, width = edges_us(bins)
         with np.errstate(invalid="ignore", divide="ignore"):
-            means: Floats = drawn @ (lower + width / 2) / totals / 1e3
+            means: Floats = counts @ (lower + width / 2) / totals / 1e3
             return means
-    found = np.full(len(drawn), np.nan)
+    found = np.full(len(counts), np.nan)
     filled = totals > 0
     if filled.any():
-        found[filled] = quantiles_us(bins, drawn[filled], SHARES[name]) / 1e3
+        found[filled] = quantiles_us(bins, counts[filled], SHARES[name]) / 1e3
     return found
 
 

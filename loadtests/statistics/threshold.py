@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from scipy import stats
+
 from loadtests.statistics.figures import quantiles
 from loadtests.statistics.histogram import Histogram, edges_us
-from loadtests.statistics.intervals import at_most, figure_interval_ms
+from loadtests.statistics.intervals import figure_interval_ms
 from loadtests.statistics.rounds import SHARES
 
 if TYPE_CHECKING:
@@ -25,7 +27,8 @@ def _surely_above(histogram: Histogram, threshold: Threshold) -> bool:
     """
     bins, counts = histogram.arrays()
     below = int(counts[edges_us(bins)[0] < threshold.below_ms * 1e3].sum())
-    return histogram.total > 0 and at_most(below, histogram.total, SHARES[threshold.quantile]) < _SMALL_CHANCE
+    chance = float(stats.binom.cdf(below, histogram.total, SHARES[threshold.quantile]))
+    return histogram.total > 0 and chance < _SMALL_CHANCE
 
 
 def judge(measured: Measured, thresholds: Iterable[Threshold]) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ from reports.latency.figures.spans import means
 from reports.latency.figures.timeline import Stall, stalls
 from reports.latency.numbers import interval, ms, rate, share
 from reports.latency.of_series import cold, repeated, work
+from reports.pages.page import opened
 
 _MANY_FAR = 0.01
 PAPER = {"rest_ms": 1.5, "soap_ms": 2.5, "ratio": 1.67}
@@ -50,7 +51,7 @@ def _tone(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Serie
 
 
 def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """Further findings, a sentence each: stalls, knee, failures."""
+    """Further findings, a sentence each: stalls, knee, failures, and the run's own notes."""
     return [
         *_server_share(series),
         *work(series),
@@ -63,6 +64,7 @@ def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         *_knees(result),
         *_searched(result),
         *_failed(result, series),
+        *_noted(result),
     ]
 
 
@@ -143,8 +145,8 @@ def _two_modes(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
                 f"{name} has two modes: {share(found['share_above'])} of the requests take more than "
                 f"{ms(found['split_ms'])} ms, about {ms(other)} ms, and the others about {ms(usual)} ms."
             )
-        elif found["far"] >= _MANY_FAR:
-            far.append(f"{share(found['far'])} of {name}")
+        elif found["beyond_five_medians"] >= _MANY_FAR:
+            far.append(f"{share(found['beyond_five_medians'])} of {name}")
     return [*told, f"Over five times the median take: {', '.join(far)}."] if far else told
 
 
@@ -201,6 +203,11 @@ def _failed(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         else "they are in no figure of time"
     )
     return [f"{_count(errors, 'request')} of {errors + answered:,} failed; {counted}."]
+
+
+def _noted(result: Mapping[str, Any]) -> list[str]:
+    """The result's notes, which are clauses, as sentences."""
+    return [f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note]
 
 
 def _count(number: int, noun: str) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from reports.latency.distributions import Series
-from reports.latency.numbers import interval, ms
+from reports.latency.numbers import interval, ms, rate
 
 #: Where the robot's own parts differ by this factor, the interfaces make it do different work.
 _OTHER_WORK = 1.5
@@ -41,9 +41,11 @@ def cold(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
 
 
 def _behind(spacing_s: float) -> str:
-    return (
-        f"{ms(spacing_s * 1e3)} ms behind another request, which is the limit" if spacing_s else "right behind another"
-    )
+    """How closely requests followed one another where there was no pause."""
+    if not spacing_s:
+        return "right behind another request"
+    limit = f"the limit of {rate(1 / spacing_s)} requests/s allows no less"
+    return f"{spacing_s * 1e3:g} ms after the start of the one before ({limit})"
 
 
 def repeated(series: Mapping[tuple[str, str, str], Series]) -> list[str]:

@@ -76,7 +76,9 @@ class Loaded:
     @property
     def result(self):
         """The result file; whatever became of the run it keeps to its schema, and all reports say its headline."""
-        result = json.loads((self.folder / "latency.json").read_text())
+        file = self.folder / "latency.json"
+        assert file.is_file(), f"exit code {self.code} without a result: {self.out + self.err}"
+        result = json.loads(file.read_text())
         jsonschema.Draft202012Validator(SCHEMA).validate(result)
         short, sentence = latency_markdown(result), result["headline"]["sentence"]
         assert plain(sentence, 1500) in short
@@ -114,7 +116,7 @@ def load(tmp_path):
         )
 
         def finish():
-            out, err = process.communicate(timeout=90)
+            out, err = process.communicate(timeout=240)
             return Loaded(process.returncode, out, err, folder)
 
         return process, finish

@@ -12,11 +12,11 @@ DELAY_S, JITTER_S = 0.005, 0.002
 
 async def forward(reader, writer):
     """One direction of one connection."""
-    loop, lot = asyncio.get_running_loop(), random.Random(1)  # noqa: S311 -- no secrets, but delays
+    loop, rng = asyncio.get_running_loop(), random.Random(1)  # noqa: S311 -- no secrets, but delays
     due = 0.0
     try:
         while octets := await reader.read(1 << 16):
-            due = max(due, loop.time() + DELAY_S + lot.uniform(0, JITTER_S))
+            due = max(due, loop.time() + DELAY_S + rng.uniform(0, JITTER_S))
             loop.call_at(due, writer.write, octets)
     finally:
         loop.call_at(max(due, loop.time()), writer.close)

@@ -43,6 +43,7 @@ def test_a_good_robot_is_measured(toy, load, tmp_path):
     assert result["thresholds"][0]["outcome"] == "met"
     assert result["environment"]["robot"]["servers"] == {"rest": "toy/1", "soap": "toy/1"}
     assert "toy_robot.py" in result["environment"]["robot_command"]
+    assert 0 < result["environment"]["robot_cpu_share"] < 1.1
     assert str(tmp_path) not in json.dumps(result), "no path of the generator's machine"
     assert (run.folder / "pose-soap-wire-response.hgrm").read_text().count("\n") > 5
     assert "SOAP takes" in run.out

@@ -27,7 +27,7 @@ locust.runners.WorkerRunner.connect_to_master = lambda runner: (connect(runner),
 
 
 def ended(*command, **options):
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, **options)
+    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, **options)
 
 
 def locust_until(reached, *options, folder):
@@ -45,7 +45,7 @@ def locust_until(reached, *options, folder):
         if reached(told):
             break
     process.send_signal(signal.SIGTERM)
-    told += process.communicate(timeout=60)[1]
+    told += process.communicate(timeout=240)[1]
     return told, {entry["name"]: entry for entry in json.loads((folder / "found.json").read_text())}
 
 
@@ -86,7 +86,7 @@ def test_a_worker_from_elsewhere_joins_the_master(toy, load, wait_for, free_port
     options = f"--worker --master-host 127.0.0.1 --master-port={port} --token-file {token} --rate 60"
     with subprocess.Popen([sys.executable, "-c", f"import sys\n{habit}\n{NODE}", *options.split()]) as worker:
         run = finish()
-        assert worker.wait(20) == 0
+        assert worker.wait(60) == 0
     result = run.result
     assert [entry["state"] for entry in result["workers"]] == ["finished"]
     plan = result["plan"]

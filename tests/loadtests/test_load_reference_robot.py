@@ -24,7 +24,7 @@ def robot(domain_id):
     assert found, "the robot did not come up"
     yield found[1], found[2], found[2].replace("publisher_ws", "subscriber_ws"), domain_id
     process.send_signal(signal.SIGINT)
-    process.wait(20)
+    process.wait(60)
     process.stdout.close()
 
 

@@ -112,7 +112,7 @@ def browse() -> Callable[[Path, dict[str, str], str], dict[str, Any]]:
             [browser, *_BROWSER_OPTIONS.split(), profile, wrapper.as_uri()],
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=240,
             check=True,
         )
         out = re.search(r'<pre id="out">(\{.*?\})</pre>', done.stdout, re.DOTALL)

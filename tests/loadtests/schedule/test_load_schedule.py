@@ -210,3 +210,16 @@ def test_users_of_the_closed_model_go_on_as_soon_as_they_are_done():
     for arrival, _ in taken:
         segment = plan.segments[arrival.segment]
         assert segment.start_ns <= arrival.due_ns - origin <= segment.end_ns + 1_000_000
+
+
+def test_a_generator_that_was_held_up_starts_nothing_in_segments_that_are_over():
+    plan = varied(rate=None, users=3, duration_s=0.5, warmup_s=0.0, clients=("wire",))
+    pacer = Pacer(10**10, lambda _: None, lambda _: None)
+    crowd = Users(pacer, 3)
+    pacer.start(Schedule(plan, 0, 1), now_ns() - 10**9, open_model=False)
+    with gevent.Timeout(30):
+        pacer.done.wait()
+    assert crowd.taken == []
+    assert pacer.waiting == 3
+    gevent.killall(crowd.greenlets)
+    pacer.close()

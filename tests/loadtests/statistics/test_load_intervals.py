@@ -12,6 +12,7 @@ from loadtests.statistics.intervals import (
     compare,
     figure_interval_ms,
     order_interval_ms,
+    pooled_interval,
     samples_for_interval,
     samples_for_point,
 )
@@ -42,13 +43,13 @@ def test_too_few_samples_say_so_instead_of_a_number():
 
 
 def test_intervals_cover_the_truth_as_often_as_they_promise():
-    lot = np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     medians = ratios = 0
     trials = 40
     for trial in range(trials):
-        drift = lot.normal(0, 0.05, size=(30, 1))
-        rest = np.exp(lot.normal(0, 0.2, size=(30, 20)) + drift)
-        soap = 1.5 * np.exp(lot.normal(0, 0.2, size=(30, 20)) + drift)
+        drift = rng.normal(0, 0.05, size=(30, 1))
+        rest = np.exp(rng.normal(0, 0.2, size=(30, 20)) + drift)
+        soap = 1.5 * np.exp(rng.normal(0, 0.2, size=(30, 20)) + drift)
         low, high = figure_interval_ms([Unit(0, (block(row),)) for row in rest], "p50", trial).interval
         medians += low <= 1.0 <= high
         found = compare([Unit(0, (block(a), block(b))) for a, b in zip(rest, soap, strict=True)], "p50", trial)
@@ -59,12 +60,24 @@ def test_intervals_cover_the_truth_as_often_as_they_promise():
 
 
 def test_a_drift_that_meets_both_sides_does_not_widen_the_ratio():
-    lot = np.random.default_rng(4)
+    rng = np.random.default_rng(4)
     drift = np.linspace(1, 3, 40)[:, None]
-    rest = drift * np.exp(lot.normal(0, 0.02, size=(40, 20)))
-    soap = 2 * drift * np.exp(lot.normal(0, 0.02, size=(40, 20)))
+    rest = drift * np.exp(rng.normal(0, 0.02, size=(40, 20)))
+    soap = 2 * drift * np.exp(rng.normal(0, 0.02, size=(40, 20)))
     low, high = compare([Unit(0, (block(a), block(b))) for a, b in zip(rest, soap, strict=True)], "mean", 1).ci95
     assert 1.97 < low < 2.0 < high < 2.03
+
+
+def test_comparisons_that_are_pooled_are_resampled_independently_of_one_another():
+    rng = np.random.default_rng(6)
+    units = [Unit(0, tuple(block(np.exp(rng.normal(0, 0.2, 20))) for _ in range(2))) for _ in range(60)]
+    alone, same, other = (compare(units, "p50", 1, stream=stream) for stream in (0, 0, 1))
+    widths = [
+        np.log(high / low)
+        for low, high in (alone.ci95, pooled_interval([alone, same]), pooled_interval([alone, other]))
+    ]
+    assert widths[1] == pytest.approx(widths[0], rel=0.06)  # the same resamples twice say nothing new
+    assert widths[2] == pytest.approx(widths[0] / np.sqrt(2), rel=0.08)
 
 
 def test_few_blocks_give_a_ratio_without_an_interval():
@@ -75,10 +88,10 @@ def test_few_blocks_give_a_ratio_without_an_interval():
 
 
 def test_the_order_of_independent_samples_gives_an_interval_too():
-    lot = np.random.default_rng(5)
+    rng = np.random.default_rng(5)
     covered = sum(
         low <= 1.0 <= high
-        for low, high in (order_interval_ms(block(np.exp(lot.normal(0, 0.3, 40))), 0.5) for _ in range(200))
+        for low, high in (order_interval_ms(block(np.exp(rng.normal(0, 0.3, 40))), 0.5) for _ in range(200))
     )
     assert 184 <= covered <= 200
     assert order_interval_ms(block([1.0] * 367), 0.99) is None

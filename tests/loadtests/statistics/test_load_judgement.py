@@ -53,10 +53,10 @@ def test_what_failed_or_never_started_counts_as_no_less_than_the_slowest_answer(
 
 
 def test_the_correlation_of_neighbours_is_that_of_the_series():
-    lot = np.random.default_rng(1)
+    rng = np.random.default_rng(1)
     values = np.zeros(4000)
     for index in range(1, len(values)):
-        values[index] = 0.6 * values[index - 1] + lot.normal()
+        values[index] = 0.6 * values[index - 1] + rng.normal()
     assert lag_correlation(values, np.zeros(4000, dtype=int)) == pytest.approx(0.6, abs=0.05)
     assert lag_correlation(values, np.arange(4000)) is None, "no neighbours within a repeat"
 

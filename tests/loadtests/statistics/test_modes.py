@@ -15,9 +15,9 @@ def histogram(*parts):
 
 @pytest.mark.parametrize("share", [0.1, 0.25, 0.6])
 def test_a_second_mode_is_seen_with_its_share_and_its_place(share):
-    lot, many = np.random.default_rng(1), 4000
-    quick = lot.lognormal(np.log(0.07), 0.2, round(many * (1 - share)))
-    slow = lot.lognormal(np.log(0.5), 0.3, round(many * share))
+    rng, many = np.random.default_rng(1), 4000
+    quick = rng.lognormal(np.log(0.07), 0.2, round(many * (1 - share)))
+    slow = rng.lognormal(np.log(0.5), 0.3, round(many * share))
     found = modes(histogram(quick, slow))
     assert found["share_above"] == pytest.approx(share, abs=0.01)
     assert 0.1 < found["split_ms"] < 0.4
@@ -25,13 +25,13 @@ def test_a_second_mode_is_seen_with_its_share_and_its_place(share):
 
 
 def test_one_mode_is_no_two_whatever_its_tail():
-    lot = np.random.default_rng(2)
+    rng = np.random.default_rng(2)
     shapes = (
-        lambda: lot.lognormal(np.log(0.07), 0.4, 1000),
-        lambda: 0.05 + lot.exponential(0.03, 500),
-        lambda: 0.05 + lot.pareto(2.5, 2000) * 0.02,
-        lambda: lot.uniform(0.06, 0.09, 300),
+        lambda: rng.lognormal(np.log(0.07), 0.4, 1000),
+        lambda: 0.05 + rng.exponential(0.03, 500),
+        lambda: 0.05 + rng.pareto(2.5, 2000) * 0.02,
+        lambda: rng.uniform(0.06, 0.09, 300),
     )
     assert [modes(histogram(shape()))["split_ms"] for shape in shapes for _ in range(10)] == [None] * 40
-    assert modes(histogram(shapes[2]()))["far"] > 0
+    assert modes(histogram(shapes[2]()))["beyond_five_medians"] > 0
     assert modes(histogram(shapes[0]()[:50])) is None, "too few to say"

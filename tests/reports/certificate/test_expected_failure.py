@@ -32,7 +32,11 @@ def certified(robot, folder, expires):
     baseline.write_text(BASELINE.format(EXPECTED, expires), encoding="utf-8")
     command = [sys.executable, "-m", "roaas", "certify", f"--rest={robot}", "--class=soap-delivery", "--effort=quick"]
     done = subprocess.run(
-        [*command, f"--baseline={baseline}", f"--out={folder}"], capture_output=True, text=True, timeout=60, check=False
+        [*command, f"--baseline={baseline}", f"--out={folder}"],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
     )
     assert "Traceback" not in done.stderr
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))

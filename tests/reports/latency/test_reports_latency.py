@@ -176,6 +176,33 @@ def test_a_robot_that_works_longer_over_one_interface_is_told_of(latency):
     assert not any("not the same work" in remark for remark in remarks(latency, all_series(latency, "x")))
 
 
+def test_the_runs_own_notes_are_sentences_as_the_other_remarks_are(latency):
+    latency["notes"] = ["the machine was busy before the run: load average 8.0 on 2 CPUs"]
+    said = "The machine was busy before the run: load average 8.0 on 2 CPUs."
+    assert said in remarks(latency, all_series(latency, "x"))
+    assert page(latency).text_content().count(said) == 1
+    assert latency_markdown(latency).count(said) == 1
+
+
+@pytest.mark.parametrize(
+    ("spacing_s", "said"),
+    [
+        (0.0, "Medians after a pause of 0.1 s, and right behind another request: "),
+        (
+            0.002,
+            "Medians after a pause of 0.1 s, and 2 ms after the start of the one before (the limit of 500 requests",
+        ),
+    ],
+)
+def test_what_a_pause_costs_is_said_beside_requests_without_one(latency, spacing_s, said):
+    quantiles, bounds = latency["series"][0]["service_ms"], [0.1, 0.2]
+    latency["series"][0]["after_pause"] = {
+        "pause_s": 0.1, "spacing_s": spacing_s, "failed": 0, "cold_count": 30, "warm_count": 300,
+        "cold_ms": quantiles, "warm_ms": quantiles, "cold_ci95_ms": bounds, "warm_ci95_ms": bounds,
+    }  # fmt: skip
+    assert sum(remark.startswith(said) for remark in remarks(latency, all_series(latency, "x"))) == 1
+
+
 def test_robot_without_server_timing(latency):
     for series in latency["series"]:
         series["spans_ms"]["server"] = None

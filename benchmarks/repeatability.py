@@ -1,0 +1,95 @@
+"""Do runs of `roaas load` agree with one another? `python benchmarks/repeatability.py` measures one robot ten times.
+
+Ten runs of 20 s, one after the other, of deliveries by the wire client at 200 requests/s: whether the ten intervals of
+SOAP's median over REST's overlap, whether the ratios lie within 5 %, and by how much the ratios scatter beyond what
+the intervals allow for: Birge's ratio, 1 where they allow for all of it (Physical Review 40, 1932), and the
+probability of as much scatter where they do (Cochran's Q).
+
+Intervals that are right at 95 % overlap less often than one thinks: of ten, all do in about 85 % of such experiments.
+"""
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from robot import running_robot
+from scipy import stats
+
+_WITHIN = 0.05
+_NORMAL_95 = 1.96
+_STATEMENT = Path(__file__).parents[1] / "reference_robot" / "statement.toml"
+
+
+class Run(NamedTuple):
+    """What one run said of the median's ratio, and its 95 % interval."""
+
+    ratio: float
+    low: float
+    high: float
+
+
+def measured(rest: str, soap: str, seconds: float, seed: int) -> Run:
+    """One run of `roaas load`."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-c", "from loadtests.cli import load; load()", _STATEMENT, "--rest", rest]
+        services = ["--publishers-wsdl", soap, "--subscribers-wsdl", soap.replace("publisher", "subscriber")]
+        what = ["--allow-motion", "--operation", "delivery", "--client", "wire", "--rate", "200", "--warmup", "1"]
+        times = ["--duration", f"{seconds:g}", "--seed", str(seed), "--out", folder]
+        done = subprocess.run([*command, *services, *what, *times], check=False, capture_output=True, text=True)
+        file = Path(folder) / "latency.json"
+        if not file.exists():
+            raise RuntimeError(done.stderr)
+        found: dict[str, Any] = json.loads(file.read_text())
+    median = next(entry for entry in found["comparisons"] if entry["quantile"] == "p50")
+    low, high = median["ci95"] or (math.nan, math.nan)
+    load = os.getloadavg()[0]
+    print(
+        f"run {seed}: {median['ratio']:.3f} ({low:.3f} to {high:.3f}), {median['judgement']}, "
+        f"{'valid' if found['valid'] else '; '.join(found['invalid_because'])}, load average {load:.1f}",
+        flush=True,
+    )
+    return Run(median["ratio"], low, high)
+
+
+def agreement(runs: Sequence[Run]) -> bool:
+    """Say how far the runs agree."""
+    lows, highs, ratios = (np.array(column) for column in zip(*[(r.low, r.high, r.ratio) for r in runs], strict=True))
+    overlap = bool(lows.max() <= highs.min())
+    spread = float(ratios.max() / ratios.min() - 1)
+    errors = np.log(highs / lows) / (2 * _NORMAL_95)
+    logs, weights = np.log(ratios), 1 / errors**2
+    centre = float((logs * weights).sum() / weights.sum())
+    q = float((((logs - centre) / errors) ** 2).sum())
+    print(
+        f"{len(runs)} runs: ratios {ratios.min():.3f} to {ratios.max():.3f}, within {spread:.1%} (5 %): "
+        f"{'met' if spread <= _WITHIN else 'MISSED'}; all intervals overlap: {'met' if overlap else 'MISSED'} "
+        f"(highest lower bound {lows.max():.3f}, lowest upper bound {highs.min():.3f}); Birge's ratio "
+        f"{math.sqrt(q / (len(runs) - 1)):.2f}, p = {stats.chi2.sf(q, len(runs) - 1):.2f}"
+    )
+    return overlap and spread <= _WITHIN
+
+
+def main() -> int:
+    """Measure again and again; the exit code is 1 where the runs do not agree."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=10, help="[10]")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of each [20]")
+    parser.add_argument("--domain-id", default="50", help="ROS domain of the robot [50]")
+    options = parser.parse_args()
+    with running_robot(options.domain_id) as robot:
+        rest = f"http://{robot.rest.host}:{robot.rest.port}"
+        soap = f"http://{robot.soap.host}:{robot.soap.port}{robot.soap.target}?wsdl"
+        runs = [measured(rest, soap, options.seconds, seed) for seed in range(1, options.runs + 1)]
+    return 0 if agreement(runs) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

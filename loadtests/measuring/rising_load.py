@@ -1,0 +1,142 @@
+"""Offers rates until it is known where a robot gives way, and connections to see how latency grows with them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from loadtests.measuring.executor import busiest
+from loadtests.schedule.arrivals import arrivals_due
+from loadtests.schedule.plan import BOTH, step_operation
+from loadtests.statistics import steps
+from loadtests.statistics.knee import knee_search, search_again
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from loadtests.measuring.distributed_executor import Executor
+    from loadtests.schedule.plan import Plan
+    from loadtests.settings.settings import Settings
+
+_LOWEST_RATE, _HIGHEST_RATE = 50.0, 50_000.0
+_MOST_S = 600.0  # for all searches together
+
+
+@dataclass
+class RisingLoad:
+    """Carries out short plans of one operation after the duel.
+
+    Args:
+        first: the duel's plan.
+        stopped: whether somebody wants an end.
+        announce: hears of each plan before it begins.
+        tell: how things stand, for the terminal.
+    """
+
+    first: Plan
+    executor: Executor
+    settings: Settings
+    stopped: Callable[[], bool]
+    announce: Callable[[Plan], None]
+    tell: Callable[[str], None]
+    _next_segment: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._next_segment = self.first.first_segment + len(self.first.segments)
+        self._operation = step_operation(self.first.operations)
+        self._criterion = steps.Criterion.of(self.settings.thresholds, self.first.operations[self._operation])
+        self._interfaces = [n for n in self.first.interfaces if self._operation in self.first.offered(n, "wire")]
+
+    def _run(
+        self, interfaces: Sequence[str], *, rate: float | None = None, users: int | None = None
+    ) -> list[dict[str, Any]]:
+        """One plan, interface after interface, at a rate or with so many users; empty when there is to be an end."""
+        if self.stopped():
+            return []
+        load = replace(self.first.load, rate=rate, users=users, duration_s=self.settings.steps.step_s, warmup_s=0.0)
+        plan = replace(
+            self.first,
+            interfaces=tuple(interfaces),
+            clients=("wire",),
+            load=load,
+            offers={f"{name}/wire": [self._operation] for name in interfaces},
+            step_rate=rate or 0.0,
+            robots=1,
+            first_segment=self._next_segment,
+        )
+        self._next_segment += len(plan.segments)
+        self.announce(plan)
+        self.executor.run(plan, self.settings.steps.most_rate if users else None, lambda _: self.stopped())
+        if self.stopped():
+            return []
+        cpu_share = busiest(self.executor.members)
+        asked = {name: arrivals_due(plan, plan.length_s, phase="step", interface=name) for name in interfaces}
+        return [
+            steps.step_result(plan, self.executor.recorder, name, asked[name], self._criterion)
+            | {"cpu_share": cpu_share}
+            for name in interfaces
+        ]
+
+    def steps(self) -> list[dict[str, Any]]:
+        """The `steps` of latency.json: up until no interface is left that keeps to the criterion."""
+        standing, found = self._interfaces, []
+        for rate in self.settings.steps.rates:
+            results = self._run(standing, rate=rate) if standing else []
+            if not results:
+                break
+            for result in results:
+                self._tell_rate("step", result)
+            found += results
+            standing = [result["interface"] for result in results if result["meets"]]
+        return found
+
+    def _tell_rate(self, what: str, result: dict[str, Any]) -> None:
+        kept = "kept" if result["meets"] else result["reason"]
+        self.tell(
+            f"{what} over {result['interface']}: {result['offered_rate']:.0f}/s, p50 {result['p50_ms'] or 0:.3f} ms, "
+            f"p99 {result['p99_ms'] or 0:.3f} ms: {kept}"
+        )
+
+    def knees(self) -> list[dict[str, Any]]:
+        """Search each interface's knee, and that of both at once; empty where that was not asked for."""
+        wanted = self.settings.steps
+        if not wanted.knee_searches:
+            return []
+        until = time.monotonic() + _MOST_S
+        limits = (min(_LOWEST_RATE, wanted.most_rate or _LOWEST_RATE), wanted.most_rate or _HIGHEST_RATE)
+        found: list[dict[str, Any]] = []
+        for interface in [*self._interfaces, *([BOTH] if {"rest", "soap"} <= set(self._interfaces) else [])]:
+
+            def attempt(rate: float, interface: str = interface) -> dict[str, Any] | None:
+                if time.monotonic() > until:
+                    self.tell(f"knee: {_MOST_S:.0f} s are over: what has been found stands")
+                    return None
+                results = self._run([interface], rate=rate)
+                if not results:
+                    return None
+                self._tell_rate("knee", results[0])
+                return results[0]
+
+            words = self._criterion.words(interface)
+            found.append(knee_search(interface, words, search_again(wanted.knee_searches, limits, attempt)))
+        return found
+
+    def over_connections(self) -> list[dict[str, Any]]:
+        """How latency and throughput grow with the number of connections that are always busy."""
+        found: list[dict[str, Any]] = []
+        kept = ("interface", "client", "count", "errors", "p50_ms", "p99_ms", "max_ms", "cpu_share")
+        for users in self.settings.steps.connections:
+            for interface in self._interfaces:
+                results = self._run([interface], users=users)
+                if not results:
+                    return found
+                (result,) = results
+                found.append(
+                    {"connections": users, "rate": result["achieved_rate"]} | {name: result[name] for name in kept}
+                )
+                self.tell(
+                    f"{users} connections over {interface}: {result['achieved_rate']:.0f}/s, "
+                    f"p50 {result['p50_ms'] or 0:.3f} ms, p99 {result['p99_ms'] or 0:.3f} ms"
+                )
+        return found

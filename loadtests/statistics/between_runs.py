@@ -1,0 +1,44 @@
+"""What runs differ by and one run cannot see: a component of the interval that comes from other measurements.
+
+Within a run the ratio of the interfaces hardly wanders, and resampling says how well that run knows it. Another run of
+the same robot finds another ratio all the same, for what else the machine does adds to both interfaces' times, and
+that changes over minutes. This is an uncertainty of type B (JCGM 100:2008, GUM, 4.3): its size was found by measuring
+one robot again and again (`benchmarks/repeatability.py`; the figures stand in docs/load.md). Where a run is repeated
+often enough, its own repeats say it, and nothing is added.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+Interval = tuple[float, float]
+
+#: With fewer repeats the rounds of all are resampled, and the interval is widened by what the repeats differ.
+LEAST_REPEATS = 4
+#: Relative standard deviation of the ratio between runs: of a machine that had processors to spare, and of one that
+#: had none when the run began.
+IDLE_MACHINE, BUSY_MACHINE = 0.01, 0.02
+_REACH = 1.959964  # standard deviations to either side hold 95 %
+
+
+def between_runs(machine: dict[str, Any], cpus: int, repeats: int) -> float:
+    """The standard deviation to reckon with, by the `machine` of the environment; 0 where repeats show it."""
+    if repeats >= LEAST_REPEATS:
+        return 0.0
+    load = machine["load_average_before"]
+    return BUSY_MACHINE if load is not None and load > cpus else IDLE_MACHINE
+
+
+def widened_ratio(ratio: float, interval: Interval, deviation: float) -> Interval:
+    """A ratio's interval with the deviation between runs in it: variances add, on the logarithmic scale."""
+    low, high = (math.log(bound / ratio) for bound in interval)
+    reach = _REACH * deviation
+    return ratio * math.exp(-math.hypot(min(low, 0.0), reach)), ratio * math.exp(math.hypot(max(high, 0.0), reach))
+
+
+def widened_difference(difference: float, interval: Interval, deviation_ms: float) -> Interval:
+    """Likewise a difference's, by a deviation in milliseconds."""
+    low, high = (bound - difference for bound in interval)
+    reach = _REACH * deviation_ms
+    return difference - math.hypot(min(low, 0.0), reach), difference + math.hypot(max(high, 0.0), reach)
