@@ -11,6 +11,7 @@ from conformance.robot.interfaces import Interfaces
 from conformance.robot.observer import Observer as RobotObserver
 from conformance.robot.probe.client import RosProbe
 from conformance.robot.robot import Robot
+from conformance.robot.standstill import Standstill
 from conformance.robot.stopping import bring_to_rest
 from conformance.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.transport.client import Connection
@@ -44,10 +45,27 @@ def probe(run: Run) -> Iterator[RosProbe]:
     started.close()
 
 
+@pytest.fixture(scope="session")
+def _standstills() -> list[Standstill]:
+    """The one of the run, once it is known that the robot has a REST interface."""
+    return []
+
+
 @pytest.fixture
-def robot(request: pytest.FixtureRequest, api: RestInterface) -> Robot:
+def standstill(api: RestInterface, _standstills: list[Standstill]) -> Standstill:
+    """What was tried and has to leave the robot at rest."""
+    if not _standstills:
+        _standstills.append(Standstill(api))
+    return _standstills[0]
+
+
+@pytest.fixture
+def robot(request: pytest.FixtureRequest, api: RestInterface, standstill: Standstill) -> Robot:
     """The robot; at rest for a check that moves it."""
-    reason = bring_to_rest(api) if request.node.get_closest_marker("motion") else ""
+    if not request.node.get_closest_marker("motion") or standstill.lasts:
+        return Robot(api)
+    standstill.judge()
+    reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)
     return Robot(api)

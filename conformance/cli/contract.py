@@ -5,13 +5,14 @@ import shutil
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 
 from conformance.contract.classes import CLASSES, Level
 from conformance.contract.exit_codes import ExitCode
 from conformance.contract.files import CONTRACT_DIR, CONTRACT_FILES, CONTRACT_VERSION
-from conformance.contract.ledger import load_ledger
+from conformance.contract.ledger import Requirement, load_ledger
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -33,11 +34,17 @@ def list_(class_: str | None, level: str | None, *, as_json: bool) -> None:
         if class_ in {None, item.class_} and level in {None, item.level}
     ]
     if as_json:
-        click.echo(json.dumps([{**asdict(item), "class": item.class_} for item in found], indent=2))
+        click.echo(json.dumps([_as_json(item) for item in found], indent=2))
         return
     for item in found:
         click.echo(f"{item.id}\n    {item.level}: {item.text} [{item.origin}: {item.source}]")
     click.echo(f"{len(found)} requirements of contract {CONTRACT_VERSION}", err=True)
+
+
+def _as_json(requirement: Requirement) -> dict[str, Any]:
+    """A requirement by its public names."""
+    members = asdict(requirement)
+    return {"id": members.pop("id"), "class": members.pop("class_"), **members}
 
 
 @contract.command()

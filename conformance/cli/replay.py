@@ -14,6 +14,7 @@ from conformance.contract.files import CONTRACT_VERSION
 from conformance.contract.terminal import inert
 
 _FORMAT = "roaas-result/1"
+_TIMEOUT_S = 10.0
 _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
 
 
@@ -27,20 +28,21 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="The robot's statement: let the requirements' own checks judge again, in place of sending what was recorded.",
 )
+@click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="Holds the bearer token to send.")
 @click.option(
-    "--token-file",
-    type=click.Path(exists=True, dir_okay=False),
-    help="Holds the bearer token to send, to the addresses that RESULT has.",
+    "--token-for",
+    "trusted",
+    multiple=True,
+    metavar="URL",
+    help="An address that may have the token: RESULT says where requests go, and may be anybody's; repeatable.",
 )
 @click.option("--ca-file", type=click.Path(exists=True, dir_okay=False), help="Authorities to trust for HTTPS.")
 @click.option(
     "--timeout",
     "timeout_s",
     type=click.FloatRange(min=0, min_open=True),
-    default=10.0,
-    show_default=True,
     metavar="S",
-    help="Deadline of one request.",
+    help="Deadline of one request.  [default: 10]",
 )
 def replay(
     result: Path,
@@ -49,34 +51,39 @@ def replay(
     allow_motion: bool,
     statement_file: Path | None,
     token_file: str | None,
+    trusted: tuple[str, ...],
     ca_file: str | None,
-    timeout_s: float,
+    timeout_s: float | None,
 ) -> CommandResult:
     """Send a finding's requests again, in order, and say whether it is still there.
 
     RESULT is a result.json, or the folder that holds one; REQUIREMENT is an id such as http/head, by default all that
     were not met. What was wrong with an answer by itself is judged as in the run; of all else, a finding counts as
     still there when the last answer has the status, the media type and content as then. With --statement the checks of
-    the requirements run again, with the seed and effort of the result, and judge.
+    the requirements run again, with the seed and effort of the result, and judge; options win over the statement.
 
     Exit code: 0 all gone, 1 one is still there, 2 usage, 3 robot not reached, 4 the checks could not judge.
     """
     # Imported here, so that --help stays quick.
-    from conformance.engine.replay import Outcome, findings, moves  # noqa: PLC0415
+    from conformance.engine.permission import moves  # noqa: PLC0415
+    from conformance.engine.replay import Outcome, findings  # noqa: PLC0415
     from conformance.engine.replay import replay as send_again  # noqa: PLC0415
     from conformance.transport.client import Connection  # noqa: PLC0415
 
     document = _read(result / "result.json" if result.is_dir() else result)
     token = Path(token_file).read_text(encoding="utf-8").strip() if token_file else None
-    connection = Connection(timeout_s=timeout_s, ca_file=Path(ca_file) if ca_file else None, token=token)
+    connection = Connection(timeout_s=timeout_s or _TIMEOUT_S, ca_file=Path(ca_file) if ca_file else None, token=token)
     try:
         chosen = list(findings(document, requirement))
         if not chosen:
             raise click.UsageError(f"{result} has no finding" + (f" of {requirement}" if requirement else ""))
         if statement_file:
-            return _judge_again(document, statement_file, {id_ for id_, _ in chosen}, allow_motion=allow_motion)
-        if not allow_motion and any(moves(document, failure) for _, failure in chosen):
+            given = {"token_file": token_file, "ca_file": ca_file, "timeout_s": timeout_s}
+            return _judge_again(document, statement_file, given, {id_ for id_, _ in chosen}, allow_motion=allow_motion)
+        if not allow_motion and any(moves(failure) for _, failure in chosen):
             raise click.UsageError("these requests may move the robot: add --allow-motion, or name one that only reads")
+        if token:
+            _check_addresses([failure for _, failure in chosen], trusted)
         # The contract at hand judges what was judged by it.
         rest = document["target"].get("rest") if _by_contract(document) else None
         replayed = [send_again(id_, failure, connection, rest) for id_, failure in chosen]
@@ -102,8 +109,10 @@ def replay(
 
 
 def _judge_again(
-    document: dict[str, Any], statement_file: Path, requirements: set[str], *, allow_motion: bool
+    document: dict[str, Any], statement_file: Path, given: dict[str, Any], requirements: set[str], *, allow_motion: bool
 ) -> CommandResult:
+    import msgspec  # noqa: PLC0415 - as above
+
     from conformance.contract.files import ContractError  # noqa: PLC0415 - as above
     from conformance.contract.statement import StatementError, load_statement  # noqa: PLC0415
     from conformance.engine.judged_again import judged_by_checks  # noqa: PLC0415
@@ -114,6 +123,10 @@ def _judge_again(
         )
     try:
         statement = load_statement(statement_file)
+        options = {name: value for name, value in given.items() if value is not None}
+        statement = msgspec.structs.replace(
+            statement, endpoints=msgspec.structs.replace(statement.endpoints, **options)
+        )
         judged = judged_by_checks(
             statement, requirements, allow_motion=allow_motion, seed=document["seed"], effort=document["effort"]
         )
@@ -126,6 +139,23 @@ def _judge_again(
     if verdicts & {"fail", "warn"}:
         return CommandResult(ExitCode.FAILED)
     return CommandResult(ExitCode.PASSED if verdicts == {"pass"} else ExitCode.INCONCLUSIVE)
+
+
+def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -> None:
+    """See that the token goes nowhere but where the user said that it may.
+
+    Raises:
+        click.UsageError: it would.
+        ValueError: an address is none.
+    """
+    from conformance.engine.permission import strangers  # noqa: PLC0415 - as above
+
+    others = sorted({address for failure in failures for address in strangers(failure, trusted)})
+    if others:
+        raise click.UsageError(
+            f"the result has requests for {', '.join(map(inert, others))}: where the token may go there, add "
+            + " ".join(f"--token-for {inert(address)}" for address in others)
+        )
 
 
 def _by_contract(document: dict[str, Any]) -> bool:

@@ -96,7 +96,9 @@ def selftest(context: click.Context, /, **options: Any) -> None:
     Each faulty robot is a good one behind a proxy with one named change. Exit code: 0 all caught and nobody blamed;
     1 otherwise; 2 usage; 3 a robot does not start; 130 interrupted.
     """
-    from conformance.selftest.mutants import MUTANTS  # noqa: PLC0415 - lxml and the like cost what --help need not pay
+    # lxml and the like cost what --help need not pay.
+    from conformance.selftest.mutants import MUTANTS  # noqa: PLC0415
+    from conformance.selftest.report import Report  # noqa: PLC0415
 
     if options["generated"]:
         _generated(context, options)
@@ -116,12 +118,14 @@ def selftest(context: click.Context, /, **options: Any) -> None:
         for mutant in chosen:
             click.echo(f"{mutant.name:34} {mutant.says} [{', '.join(mutant.catches)}]")
         return
-    _finish(lambda: _run(chosen, options), options)
+    report = Report(options["target"])
+    _finish(report, lambda: _run(report, chosen, options), options)
 
 
 def _generated(context: click.Context, options: dict[str, Any]) -> None:
     """Faults by rule: a robot that starts in a moment, and Schemathesis only where it is asked for."""
     from conformance.cli.selftest_generated import chosen_mutants, run_generated  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.report import Report  # noqa: PLC0415 - see selftest()
 
     chosen = chosen_mutants(options)
     if options["listed"]:
@@ -132,33 +136,34 @@ def _generated(context: click.Context, options: dict[str, Any]) -> None:
     if "target" not in given:
         options["target"] = "baroque"
     compared = options["compare"] and "compare" in given
-    _finish(lambda: run_generated(chosen, options, compared=compared), options)
+    report = Report(options["target"], seed=options["seed"])
+    _finish(report, lambda: run_generated(report, chosen, options, compared=compared), options)
 
 
-def _finish(run: Callable[[], Report], options: dict[str, Any]) -> None:
-    """Run, write the results, and end with the exit code."""
+def _finish(report: Report, run: Callable[[], None], options: dict[str, Any]) -> None:
+    """Run, write the results, also those of a run that was interrupted, and end with the exit code."""
     from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see selftest()
 
+    started, interrupted = time.monotonic(), False
     try:
-        report = run()
+        run()
     except RobotError as error:
         click.echo(str(error), err=True)
         sys.exit(ExitCode.UNREACHABLE)
     except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)
+        interrupted = True
+        report.notes.append("The self-test was interrupted; this is what was judged until then.")
+    report.seconds = time.monotonic() - started
     path = report.write(options["out"])
     click.echo(report.summary())
     click.echo(f"result: {path}")
-    sys.exit(ExitCode.PASSED if report.holds else ExitCode.FAILED)
+    sys.exit(ExitCode.INTERRUPTED if interrupted else ExitCode.PASSED if report.holds else ExitCode.FAILED)
 
 
-def _run(chosen: list[Mutant], options: dict[str, Any]) -> Report:
+def _run(report: Report, chosen: list[Mutant], options: dict[str, Any]) -> None:
     from conformance.selftest.mutant_run import RobotPool, run_mutants, run_unchanged  # noqa: PLC0415 - see selftest()
-    from conformance.selftest.report import Report  # noqa: PLC0415 - see selftest()
 
-    started = time.monotonic()
-    report = Report(options["target"])
-    progress = _Progress(len(chosen))
+    progress = _Progress(report, len(chosen))
     if chosen:
         with RobotPool(options["target"], options["parallel"], options["domain_id"]) as pool:
             already: frozenset[str] = frozenset()
@@ -171,8 +176,6 @@ def _run(chosen: list[Mutant], options: dict[str, Any]) -> Report:
                 _compare(report, pool, chosen, progress)
     if options["seeds"]:
         _run_controls(report, options, progress)
-    report.seconds = time.monotonic() - started
-    return report
 
 
 def _compare(report: Report, pool: Any, chosen: list[Mutant], progress: _Progress) -> None:
@@ -219,16 +222,18 @@ def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) 
 
 
 class _Progress:
-    """Tells of progress on stderr."""
+    """Tells of progress on stderr, and keeps each result in case that no more come."""
 
-    def __init__(self, total: int) -> None:
+    def __init__(self, report: Report, total: int) -> None:
         self.total = total
+        self._report = report
         self._done = 0
         self._compared = 0
         self._controls = 0
 
     def mutant(self, result: MutantResult) -> None:
         """A mutant has been tried."""
+        self._report.mutant_results.append(result)
         self._done += 1
         said = result.not_tried or (
             f"MISSED by {', '.join(result.missed)}" if result.missed else f"caught by {_few(result)}"
@@ -237,12 +242,14 @@ class _Progress:
 
     def compared(self, result: SchemathesisResult) -> None:
         """Schemathesis has tried a mutant."""
+        self._report.compared.append(result)
         self._compared += 1
         said = f"caught: {result.findings[0]}" if result.caught else "not caught"
         click.echo(f"[{self._compared}] Schemathesis, {result.mutant}: {said}", err=True)
 
     def control(self, result: ControlResult) -> None:
         """A good robot has been judged."""
+        self._report.control_results.append(result)
         self._controls += 1
         name = f"{result.robot} {result.variant}".strip()
         said = result.not_tried or (

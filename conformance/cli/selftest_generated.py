@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import fnmatch
-import time
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    from conformance.selftest.comparison import SchemathesisResult
     from conformance.selftest.generated.judging import GeneratedResult
     from conformance.selftest.generated.mutant import GeneratedMutant
     from conformance.selftest.report import Report
@@ -30,8 +30,8 @@ def chosen_mutants(options: dict[str, Any]) -> list[GeneratedMutant]:
     return sample(fitting, options["generated"], options["seed"])
 
 
-def run_generated(mutants: list[GeneratedMutant], options: dict[str, Any], *, compared: bool) -> Report:
-    """Judge them, and with ``compared`` let plain Schemathesis try those of REST.
+def run_generated(report: Report, mutants: list[GeneratedMutant], options: dict[str, Any], *, compared: bool) -> None:
+    """Judge them, and with ``compared`` let plain Schemathesis try those of REST; the report has each as it is done.
 
     Raises:
         RobotError: the robot does not start.
@@ -39,15 +39,13 @@ def run_generated(mutants: list[GeneratedMutant], options: dict[str, Any], *, co
     from conformance.selftest import comparison  # noqa: PLC0415 - see selftest()
     from conformance.selftest.generated.judging import judge  # noqa: PLC0415 - see selftest()
     from conformance.selftest.mutant_run import RobotPool  # noqa: PLC0415 - see selftest()
-    from conformance.selftest.report import Report  # noqa: PLC0415 - see selftest()
 
-    started = time.monotonic()
-    report = Report(options["target"], seed=options["seed"])
     done = 0
 
     def tell(result: GeneratedResult) -> None:
         nonlocal done
         done += 1
+        report.generated_results.append(result)
         by = f" by {result.by[0]}" if result.by else ""
         name = result.mutant.name
         click.echo(f"[{done}/{len(mutants)}] {name}: {result.outcome}{by} ({result.seconds:.1f} s)", err=True)
@@ -57,7 +55,14 @@ def run_generated(mutants: list[GeneratedMutant], options: dict[str, Any], *, co
         report.generated_results = judge(pool, mutants, efforts=efforts, tell=tell)
         if compared and comparison.command() is not None:
             rest = [mutant.as_mutant() for mutant in mutants if mutant.interface == "rest"]
-            good, report.compared = comparison.compare(pool, rest, tell=lambda _: None)
+            tried = 0
+
+            def tell_theirs(seen: SchemathesisResult) -> None:
+                nonlocal tried
+                tried += 1
+                report.compared.append(seen)
+                said = f"caught: {seen.findings[0]}" if seen.caught else "not caught"
+                click.echo(f"[{tried}/{len(rest)}] Schemathesis, {seen.mutant}: {said}", err=True)
+
+            good, report.compared = comparison.compare(pool, rest, tell=tell_theirs)
             report.good = tuple(sorted(f"{operation} {code}" for operation, code in good))
-    report.seconds = time.monotonic() - started
-    return report

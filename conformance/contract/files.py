@@ -28,6 +28,8 @@ CONTRACT_FILES = (
 )
 # The classes that take their targets from the contract's files, whatever the domain is.
 GENERIC_CLASSES = ("rest-formats", "http", "soap-basic-profile", "strict-input", "xml-security", "describe")
+# libyaml, where PyYAML was built with it, is ten times as fast: a third of a second of each run.
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _OPENAPI_NAMES = ("openapi.yaml", "openapi.yml", "openapi.json")
 
 
@@ -107,7 +109,7 @@ class Contract:
         if self.openapi_path is None:
             return {}
         try:
-            document = yaml.safe_load(self.openapi_path.read_text(encoding="utf-8"))
+            document = yaml.load(self.openapi_path.read_text(encoding="utf-8"), _LOADER)  # noqa: S506 - a safe one
         except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
             raise ContractError(f"{self.openapi_path} cannot be read: {error}") from error
         if not isinstance(document, dict) or "paths" not in document:

@@ -72,6 +72,9 @@ def certify(
             robot.connect()
             reached = robot.reached
             if reached:
+                # Of a robot that is not there, they would only hide that.
+                if progress is not None:
+                    progress.writelines(f"{note}\n" for note in notes)
                 run.interrupted |= _run_checks(robot, progress, remarks)
                 if not (run.interrupted or run.aborted):
                     look_again(run, robot.connection)

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 # A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
 _LONGEST_PAUSE_S = 10.0
-_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 _BY_JUDGEMENT = "judged as in the run"
 _BY_KIND = "by status, media type and whether there is content"
 
@@ -60,15 +59,6 @@ def findings(result: Mapping[str, Any], requirement: str | None) -> Iterator[tup
     for item in result["requirements"]:
         if requirement in {None, item["id"]}:
             yield from ((item["id"], failure) for failure in item["failures"])
-
-
-def moves(result: Mapping[str, Any], failure: Mapping[str, Any]) -> bool:
-    """Whether sending it again may move the robot: it writes, or calls the service that acts."""
-    reading = result["target"].get("subscribers_endpoint")
-    return any(
-        item["method"] not in _SAFE and not (item["method"] == "POST" and item["url"] == reading)
-        for item in failure.get("sequence", ())
-    )
 
 
 def replay(id_: str, failure: Mapping[str, Any], connection: Connection, rest: str | None = None) -> Replayed:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 import zlib
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,14 @@ if TYPE_CHECKING:
     from conformance.transport.exchange import Exchange, Unanswered
     from conformance.verdict.evidence import Judge, Sent
 
-# Octets of one request in a result, compressed: a body of 10 MiB of blanks is not one of them.
+# Octets of one request in a result, compressed; and as they are sent: twice the contract's limit and a half.
 _MOST = 64 * 1024
+_MOST_SENT = 25 * 1024 * 1024
+
+# What a request is made of on the wire (RFC 9110 5.6.2, 5.5; RFC 9112 3.2): no place for another request in it.
+_TOKEN = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")
+_TARGET = re.compile(r"https?://[\x21-\x7e]+")
+_VALUE = re.compile(r"[^\x00\r\n]*")
 
 
 class Recorder(Listener):
@@ -58,17 +65,36 @@ def read_request(item: dict[str, Any]) -> Request | None:
     if body is None or (item["raw"] is not None and raw is None):
         return None
     headers = tuple((str(name), str(value)) for name, value in item["headers"])
-    return Request(str(item["method"]), str(item["url"]), headers, body, raw)
+    method, url = str(item["method"]), str(item["url"])
+    parts = [(_TARGET, url)]
+    if raw is None:
+        parts += [
+            (_TOKEN, method),
+            *((_TOKEN, name) for name, _ in headers),
+            *((_VALUE, value) for _, value in headers),
+        ]
+    for pattern, text in parts:
+        if not pattern.fullmatch(text):
+            raise ValueError(f"{text[:80]!r} is no part of a request")
+    return Request(method, url, headers, body, raw)
 
 
 def _packed(octets: bytes) -> str | None:
     """Octets in base64, compressed (RFC 1950); None where that is still too much."""
     packed = zlib.compress(octets) if octets else b""
-    return base64.b64encode(packed).decode() if len(packed) <= _MOST else None
+    return base64.b64encode(packed).decode() if len(packed) <= _MOST and len(octets) <= _MOST_SENT else None
 
 
 def _unpacked(text: str | None) -> bytes | None:
+    """Octets as they were; a result may be anybody's, and no more than a run writes is ever unpacked."""
+    if not text:
+        return None if text is None else b""
+    packed = base64.b64decode(text)
+    opened = zlib.decompressobj()
     try:
-        return zlib.decompress(base64.b64decode(text)) if text else None if text is None else b""
+        octets = opened.decompress(packed, _MOST_SENT + 1) if len(packed) <= _MOST else b""
     except zlib.error as error:
         raise ValueError(str(error)) from error
+    if not opened.eof:
+        raise ValueError(f"a request that is cut short, or has more than {_MOST_SENT:,} octets")
+    return octets

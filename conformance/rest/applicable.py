@@ -7,6 +7,7 @@ from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import Operation, operations_of
 from conformance.rest.calls import Call, example_call
 from conformance.rest.interface import RestInterface
+from conformance.rest.validity import require_valid
 
 NO_MOTION = "it moves the robot, and --allow-motion was not given"
 
@@ -21,6 +22,9 @@ def readable(api: RestInterface, operation: Operation) -> Call:
     """A request for an operation that reads, which is answered 200 if any is.
 
     Where the contract's example makes no sense to this robot (a place outside its map), small numbers are tried.
+
+    Raises:
+        HarnessError: what was made is not valid by the contract.
     """
     call = example_call(api, operation)
     numbers = [item.name for item in operation.parameter("query") if kind_of(item.schema) in {"number", "integer"}]
@@ -34,7 +38,9 @@ def readable(api: RestInterface, operation: Operation) -> Call:
             if answer.ok:
                 api.small_numbers[operation.id] = text
                 break
-    return _with(call, required, api.small_numbers[operation.id])
+    found = _with(call, required, api.small_numbers[operation.id])
+    require_valid(api.run.contract, operation.method, found.path)
+    return found
 
 
 def _with(call: Call, names: list[str], text: str) -> Call:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
+from http import HTTPStatus
 from typing import Any
 from urllib.parse import quote
 
 from conformance.documents.json_schema import Schema, kind_of
-from conformance.documents.openapi import Operation
+from conformance.documents.openapi import SAFE, Operation
 from conformance.documents.representation import flat
 from conformance.documents.writing import json_text, text_of, xml_bytes
 from conformance.rest.interface import RestInterface
@@ -17,6 +19,8 @@ from conformance.transport.exchange import Exchange
 JSON = "application/json"
 XML = "application/xml"
 _DEPTH = 12
+# What is there again in so many seconds is worth waiting for.
+_MOMENT_S = 2
 
 
 @dataclass(frozen=True)
@@ -56,13 +60,22 @@ class Call:
         return replace(self, values=values if text is None else {**values, name: text})
 
     def carrying(self, body: bytes) -> Call:
-        """The same with another body."""
+        """The same with another body, of whatever kind."""
+        return replace(self, body=body)
+
+    def rewritten(self, api: RestInterface, body: bytes) -> Call:
+        """The same with another valid body.
+
+        Raises:
+            HarnessError: it is not valid by the contract.
+        """
+        require_valid(api.run.contract, self.operation.method, self.path, self.media_type, body)
         return replace(self, body=body)
 
     def send(
         self, api: RestInterface, *headers: tuple[str, str], method: str | None = None, fresh: bool = False
     ) -> Exchange:
-        """Send it.
+        """Send it; a read that the robot puts off for a moment (no odometry just now), a few times in a run once more.
 
         Raises:
             NoAnswerError: no HTTP response came.
@@ -71,13 +84,22 @@ class Call:
         names = {name.lower() for name, _ in fields}
         if self.media_type and "content-type" not in names:
             fields.append(("Content-Type", self.media_type))
-        return api.client.send(
-            method or self.operation.method,
-            self.path,
-            headers=[pair for pair in fields if pair != ("Content-Type", "")],
-            body=self.body,
-            fresh=fresh,
-        )
+        asked = method or self.operation.method
+        sent = [pair for pair in fields if pair != ("Content-Type", "")]
+        exchange = api.client.send(asked, self.path, headers=sent, body=self.body, fresh=fresh)
+        after = _put_off(exchange)
+        if asked not in SAFE or after is None or api.waits <= 0:
+            return exchange
+        api.waits -= 1
+        time.sleep(after)
+        return api.client.send(asked, self.path, headers=sent, body=self.body, fresh=fresh)
+
+
+def _put_off(exchange: Exchange) -> int | None:
+    """After how many seconds a robot wants to be asked again (RFC 9110 10.2.3), where it is not long; else None."""
+    after = exchange.response.header("retry-after") or ""
+    put_off = exchange.response.status == HTTPStatus.SERVICE_UNAVAILABLE and after.isdecimal() and after.isascii()
+    return int(after) if put_off and len(after) == 1 and int(after) <= _MOMENT_S else None
 
 
 def example_call(api: RestInterface, operation: Operation, media_type: str = JSON) -> Call:

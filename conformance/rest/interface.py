@@ -27,6 +27,7 @@ class RestInterface:
         domain: of the robot; None where the contract is not RoAAS's own.
         small_numbers: by operation, the text for its numbers with which it was found to be answered; empty: the
             example's own.
+        waits: how often a read is still sent again that the robot puts off for a moment.
     """
 
     run: Run
@@ -34,6 +35,7 @@ class RestInterface:
     alive: Callable[[], bool] = lambda: True
     domain: Domain | None = None
     small_numbers: dict[str, str] = field(default_factory=dict)
+    waits: int = 5
 
     @property
     def path(self) -> str:

@@ -17,6 +17,11 @@ STANDARD_METHODS = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS",
 _NAMESPACE = "urn:ietf:rfc:7807"
 # What servers, proxies and gateways answer before any resource is asked; and 401, which tells by its own field.
 _TRANSPORT = frozenset({401, 407, 408, 411, 413, 414, 417, 421, 426, 429, 431})
+# What servers do not let into a path, as they and what stands behind them may take it for another one: an encoded slash
+# (Apache), backslash, percent, control character, a parameter (Tomcat, Jetty, Spring's firewall).
+_AMBIGUOUS = re.compile(r"%(?:2f|5c|25|7f|[01][0-9a-f])|[;\\]", re.IGNORECASE)
+# Of what a target is made (RFC 3986 3.3, 3.4); one of anything else is malformed (RFC 9112 3.2).
+_TARGET = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/?-]|%[0-9A-Fa-f]{2})*")
 _NOT_ACCEPTABLE = 406
 _SERVER_ERROR = 500
 _UNAVAILABLE = 503
@@ -71,6 +76,8 @@ def _by_server(api: RestInterface, context: RequestContext, answer: Response) ->
     return (
         context.request.method not in STANDARD_METHODS
         or not is_normal(path)
+        or bool(_AMBIGUOUS.search(path))
+        or not _TARGET.fullmatch(context.target)
         or not inside_prefix(api.run.contract, path)
         or (answer.status == _NOT_ACCEPTABLE and not answer.body)
     )

@@ -37,16 +37,30 @@ def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str
 
 
 def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slack: Slack, where: str) -> str:
-    for name, first in before.items():
+    for name, value in before.items():
+        first = value
         if name not in after or (name == "stamp" and first != after[name]):
             continue
         path = f"{where}.{name}" if where else name
+        last = after[name]
+        if name == "orientation" and isinstance(between, dict):
+            # A quaternion and its negative are one orientation: whichever is nearer to the one before is compared.
+            first, last = _turned(first, between.get(name)), _turned(last, between.get(name))
         if not isinstance(between, dict) or name not in between:
             return f"{path} is missing"
-        problem = disagreement(first, between[name], after[name], slack, path)
+        problem = disagreement(first, between[name], last, slack, path)
         if problem:
             return problem
     return ""
+
+
+def _turned(quaternion: Any, like: Any) -> Any:
+    """A quaternion, or its negative where that is the one on the side of another; what is none stays as it is."""
+    try:
+        aside = sum(float(quaternion[axis]) * float(like[axis]) for axis in "xyzw") < 0
+        return {**quaternion, **{axis: -quaternion[axis] for axis in "xyzw"}} if aside else quaternion
+    except (TypeError, KeyError, ValueError):
+        return quaternion
 
 
 def _in_lists(before: list[Any], between: Any, after: list[Any], slack: Slack, where: str) -> str:

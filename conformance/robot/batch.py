@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, cycle
 from typing import Final
 
 from conformance.contract.delivery import COFFEE
@@ -16,6 +16,7 @@ from conformance.robot.deliveries_seen import DeliveryObserver, Seen
 from conformance.robot.delivery import Delivery, path_of
 from conformance.robot.soap_services import delivery_outgoing, send_delivery
 from conformance.soap.service import SoapService
+from conformance.soap.xml_style import value_styles
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import Outgoing, send_together
@@ -79,6 +80,8 @@ class Batch:
         self._strange = 0
         # Of what was sent without an answer, by its key: it may arrive, whenever.
         self._maybe: set[bytes] = set()
+        # However its XML is written, a message has the same values; one that is refused for it is for others to judge.
+        self._styles = cycle(value_styles())
         # When the last batch had been collected, s of the monotonic clock.
         self._collected = time.monotonic()
         observer.mark()
@@ -129,11 +132,14 @@ class Batch:
             exchange = self._rest.send("PUT", path_of(*order.written), fresh=True)
             sent.append(_Sent(order.how, "rest", delivery, exchange))
         if order.how in {"soap", "same"}:
-            sent.append(_Sent(order.how, "soap", delivery, send_delivery(self._publishers, delivery)))
+            sent.append(_Sent(order.how, "soap", delivery, self._send_soap(delivery)))
         if order.how == "coffee":
             delivery = delivery._replace(message_code=COFFEE)
-            sent.append(_Sent("coffee", "soap", delivery, send_delivery(self._publishers, delivery, coffee=True)))
+            sent.append(_Sent("coffee", "soap", delivery, self._send_soap(delivery, coffee=True)))
         return sent
+
+    def _send_soap(self, delivery: Delivery, *, coffee: bool = False) -> Exchange:
+        return send_delivery(self._publishers, delivery, coffee=coffee, style=next(self._styles))
 
     def _outgoing(self, how: str, delivery: Delivery) -> Outgoing:
         if how == "rest":

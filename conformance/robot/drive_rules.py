@@ -17,8 +17,8 @@ from conformance.transport.exchange import Exchange
 _STEADY_S: Final = 0.3
 # More turns than are in any window.
 _LOOKED_AT: Final = 200
-# Two writings of one double.
-_ECHO: Final = 1e-9
+#: Two writings of one double are no farther apart than this, whatever is accepted.
+ECHO: Final = 1e-9
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def _other_number(command: Command, value: Any) -> str:
     for part, asked in command.velocity.twist.items():
         for axis, number in asked.items() if part in given else ():
             accepted = given[part][axis]
-            if abs(float(accepted) - number) > _ECHO:
+            if abs(float(accepted) - number) > ECHO:
                 return f"{part} {axis} {accepted} for {number}"
     return ""
 

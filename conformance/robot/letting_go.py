@@ -31,17 +31,28 @@ class LetGo:
         full: when the last command of all components was sent, s of the monotonic clock.
         answered: when the last command was answered.
         turns: what was seen since.
+        resumed: the first turn after a while in which nobody asked, where there was such a while.
     """
 
     velocity: Velocity
     full: float
     answered: float
     turns: tuple[Turn, ...]
+    resumed: int | None = None
 
     def holds_by(self, limits: Limits, count: int) -> bool | None:
         """Whether the first turns, so many, end with the velocity; None where they are too few to say."""
         begin = max(0, count - _LOOKED_AT)
+        if self.resumed is not None and count > self.resumed:
+            # Samples from before the silence say nothing of what is behind it.
+            begin = max(begin, self.resumed)
         return windows.verdict(limits, self.turns[begin:count], self.velocity, _OFF)
+
+    def was_held(self, limits: Limits) -> bool:
+        """Whether the velocity was seen in its time: who answers too late to be looked at has not shown it."""
+        certain = self.full + 0.95 * (limits.hold_s or 0.0) - 0.02
+        in_time = sum(turn.at <= certain for turn in self.turns)
+        return any(self.holds_by(limits, count) for count in range(1, in_time + 1))
 
     def rests(self, limits: Limits) -> bool:
         """Whether the newest samples say that the robot is at rest."""
@@ -76,7 +87,7 @@ class LetGo:
         A command and an odometry are on their way for a part of the settle time; half as long again is no such delay.
         """
         hold = limits.hold_s or 0.0
-        samples = windows.newest(self.turns, len(self.turns))
+        samples = windows.newest(self.turns[: self.resumed], len(self.turns))
         lasted = samples[-1].at - samples[0].at if samples else 0.0
         period = min(lasted / max(1, len(samples) - 1), windows.LONGEST_SAMPLE_S)
         return hold + max(0.4 * hold, 0.5 * limits.settle_s, windows.LONGEST_SAMPLE_S) + 2 * period
@@ -84,5 +95,7 @@ class LetGo:
     def is_void(self, limits: Limits) -> bool:
         """Whether an answer came so late that the turns say nothing of the hold time."""
         gap = _GAP * (limits.hold_s or 0.0)
-        times = [self.full, self.answered, *(turn.at for turn in self.turns)]
-        return any(two - one > gap for one, two in itertools.pairwise(times))
+        before, behind = self.turns[: self.resumed], self.turns[len(self.turns[: self.resumed]) :]
+        times = [self.full, self.answered, *(turn.at for turn in before)]
+        seen = (times, [turn.at for turn in behind])
+        return any(two - one > gap for part in seen for one, two in itertools.pairwise(part))

@@ -1,23 +1,29 @@
 """Whether a pose moves by what its velocity says: the velocity is summed up and compared with the way that was made.
 
-Not only from the first reading to the last, each of which may be out: windows of a quarter of the way begin at each
-reading, and the median window counts, as far as it would lead on the whole way. A jump of the localisation is in fewer
-than half of them, and readings that are far apart, over a slow link, make windows coarse; what is wrong with the
-robot, as another unit, is in most windows and in the whole.
+Not only from the first reading to the last, each of which may be out: windows of a quarter of the way begin all along
+it, and the median window counts, as far as it would lead on the whole way. A jump of the localisation is in fewer than
+half of them, and readings that are far apart, over a slow link, make windows coarse; what is wrong with the robot, as
+another unit, is in most windows and in the whole. Where the odometry itself was held up, nobody knows what the robot
+did in between: such a step counts on neither side.
 """
+
+from __future__ import annotations
 
 import itertools
 import math
 import operator
 from bisect import bisect_left
-from collections.abc import Sequence
 from statistics import median
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from conformance.contract.limits import Noise
 from conformance.robot.geometry import wrapped
-from conformance.robot.robot import Odometry, Velocity
-from conformance.verdict.evidence import Judge
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from conformance.contract.limits import Noise
+    from conformance.robot.robot import Odometry, Velocity
+    from conformance.verdict.evidence import Judge
 
 # Less than this is no drive to judge: m and rad.
 _SHORTEST: Final = 0.08
@@ -35,6 +41,8 @@ _NOISES: Final = 8.0
 # answer was held up, and a velocity may have ended in the meantime and begun again.
 _HELD_UP_S: Final = 0.5
 _HELD_UP_TIMES: Final = 3.0
+# The same of the robot's own samples, by their stamps, s: a robot's odometry comes at least five times a second.
+_SKIPPED_S: Final = 0.15
 
 
 class _Sum(NamedTuple):
@@ -44,7 +52,8 @@ class _Sum(NamedTuple):
         x, y: way in the odometry frame, m; turn: change of heading, rad.
         length, turned: the same without signs.
         off, off_turn: by how much the sum may be wrong because the velocity changed between two samples.
-        turn_error: turn that was made less turn that was summed up, step by step, so that whole turns do not matter.
+        x_error, y_error, turn_error: what was made less what was summed up, step by step, so that whole turns do not
+            matter.
     """
 
     x: float = 0.0
@@ -54,7 +63,23 @@ class _Sum(NamedTuple):
     turned: float = 0.0
     off: float = 0.0
     off_turn: float = 0.0
+    x_error: float = 0.0
+    y_error: float = 0.0
     turn_error: float = 0.0
+
+    def miss(self, earlier: _Sum) -> _Miss:
+        """By how much pose and heading miss what was summed up since an earlier reading."""
+        way = math.hypot(self.x_error - earlier.x_error, self.y_error - earlier.y_error)
+        turn = abs(self.turn_error - earlier.turn_error)
+        # A heading that is no number is nowhere.
+        return _Miss(way, math.inf if math.isnan(turn) else turn)
+
+
+class _Miss(NamedTuple):
+    """By how far a pose, m, and a heading, rad, are elsewhere than the velocity says."""
+
+    way: float
+    turn: float
 
 
 class _Sums(NamedTuple):
@@ -63,53 +88,70 @@ class _Sums(NamedTuple):
     trace: Sequence[Odometry]
     each: Sequence[_Sum]
 
-    def misses(self, course: Sequence[float]) -> list[tuple[float, float]]:
-        """By how far each window misses the pose and the heading, as far as that would lead on the whole course.
+    def middle_miss(self, course: Sequence[float], part: Callable[[_Miss], float]) -> float:
+        """The median window's miss, as far as it would lead on the whole course.
+
+        A window counts for as much of the course as lies between its first reading and the next one, so that a robot
+        which rests, and is read meanwhile, has no more say than one that drives.
 
         Args:
             course: the length, or the turn, that was summed up to each reading.
+            part: of a miss that counts.
         """
         wanted = _WINDOW * course[-1]
-        found = []
-        for first, begun in enumerate(course):
+        found: list[tuple[float, float]] = []
+        for first, (begun, then) in enumerate(itertools.pairwise(course)):
             last = bisect_left(course, begun + wanted)
             if last == len(course):
                 break
             times = course[-1] / (course[last] - begun)
-            one, two, here, there = self.each[first], self.each[last], self.trace[first].pose, self.trace[last].pose
-            way = math.hypot(there.x - here.x - (two.x - one.x), there.y - here.y - (two.y - one.y))
-            found.append((times * way, times * abs(two.turn_error - one.turn_error)))
-        return found
+            found.append((times * part(self.each[last].miss(self.each[first])), then - begun))
+        found.sort()
+        half = sum(weight for _, weight in found) / 2
+        passed = itertools.accumulate(weight for _, weight in found)
+        return next((miss for (miss, _), weight in zip(found, passed, strict=True) if weight >= half), 0.0)
 
     @property
-    def whole_miss(self) -> tuple[float, float]:
+    def whole_miss(self) -> _Miss:
         """By how far the way from the first reading to the last misses the pose and the heading."""
-        (first, *_, last), whole = self.trace, self.each[-1]
-        way = math.hypot(last.pose.x - first.pose.x - whole.x, last.pose.y - first.pose.y - whole.y)
-        return way, abs(whole.turn_error)
+        return self.each[-1].miss(self.each[0])
 
 
 def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sums:
     steps = [_Sum()]
+    skipped = _longest_lapse(trace)
     for (one, first), (two, last) in itertools.pairwise(zip(trace, velocities, strict=True)):
+        if two.stamp - one.stamp > skipped:
+            steps.append(_Sum())
+            continue
         lapse = two.stamp - one.stamp if by_stamp else (two.sent + two.received - one.sent - one.received) / 2
         turn = (first.angular_z + last.angular_z) / 2 * lapse
         heading = one.pose.yaw + turn / 2
         ahead, aside = (first.linear_x + last.linear_x) / 2 * lapse, (first.linear_y + last.linear_y) / 2 * lapse
         made = two.pose.yaw - one.pose.yaw - turn
+        x = ahead * math.cos(heading) - aside * math.sin(heading)
+        y = ahead * math.sin(heading) + aside * math.cos(heading)
         steps.append(
             _Sum(
-                x=ahead * math.cos(heading) - aside * math.sin(heading),
-                y=ahead * math.sin(heading) + aside * math.cos(heading),
+                x=x,
+                y=y,
                 turn=turn,
                 length=math.hypot(ahead, aside),
                 turned=abs(turn),
                 off=math.hypot(last.linear_x - first.linear_x, last.linear_y - first.linear_y) * abs(lapse) / 2,
                 off_turn=abs(last.angular_z - first.angular_z) * abs(lapse) / 2,
+                x_error=two.pose.x - one.pose.x - x,
+                y_error=two.pose.y - one.pose.y - y,
                 turn_error=wrapped(made) if math.isfinite(made) else math.inf,
             )
         )
     return _Sums(trace, list(itertools.accumulate(steps, lambda total, step: _Sum(*map(operator.add, total, step)))))
+
+
+def _longest_lapse(trace: Sequence[Odometry]) -> float:
+    """How far the stamps of two samples may be apart that nothing has held up, s."""
+    lapses = [two.stamp - one.stamp for one, two in itertools.pairwise(trace) if two.stamp != one.stamp]
+    return max(_SKIPPED_S, _HELD_UP_TIMES * median(lapses)) if lapses else _SKIPPED_S
 
 
 def judge_path(judge: Judge, trace: Sequence[Odometry], measured: Sequence[Velocity], noise: Noise) -> None:
@@ -151,9 +193,9 @@ def _judge_way(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
     misses = []
     for one in sums:
         whole = one.each[-1]
-        windows = one.misses([each.length for each in one.each])
+        window = one.middle_miss([each.length for each in one.each], lambda miss: miss.way)
         room = _SHARE * whole.length + _OFF + whole.off + _NOISES * noise.position_m
-        misses.append(min(median(way for way, _ in windows), one.whole_miss[0]) - room if windows else 0.0)
+        misses.append(min(window, one.whole_miss.way) - room)
     (first, *_, last), whole = sums[0].trace, sums[0].each[-1]
     judge.check(
         "rest-resources/pose-motion",
@@ -171,9 +213,9 @@ def _judge_turn(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
     misses = []
     for one in sums:
         whole = one.each[-1]
-        windows = one.misses([each.turned for each in one.each])
+        window = one.middle_miss([each.turned for each in one.each], lambda miss: miss.turn)
         room = _SHARE * whole.turned + _OFF_TURN + whole.off_turn + _NOISES * noise.heading_rad
-        misses.append(min(median(turn for _, turn in windows), one.whole_miss[1]) - room if windows else 0.0)
+        misses.append(min(window, one.whole_miss.turn) - room)
     whole = sums[0].each[-1]
     judge.check(
         "rest-resources/pose-rotation",

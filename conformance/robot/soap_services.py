@@ -15,11 +15,12 @@ from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.robot.delivery import Delivery
 from conformance.robot.delivery_messages import NAMESPACE, delivery, request
-from conformance.soap.calls import call, read_exchange
+from conformance.soap.calls import call, read_exchange, send
 from conformance.soap.content import number_at
 from conformance.soap.envelope import envelope
 from conformance.soap.service import MEDIA_TYPE, SoapService
 from conformance.soap.valid_messages import call_valid, require_valid_message
+from conformance.soap.xml_style import XmlStyle, serialize
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import Outgoing
 
@@ -30,17 +31,21 @@ if TYPE_CHECKING:
 _NEAR = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5))
 
 
-def send_delivery(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Exchange:
+def send_delivery(
+    publishers: SoapService, values: Delivery, *, coffee: bool = False, style: XmlStyle | None = None
+) -> Exchange:
     """Send a delivery once, on a connection of its own so that nothing is sent again.
 
     Args:
         publishers: the service.
         values: of the delivery.
         coffee: by ExecuteCoffeeRequest, which knows the code by itself.
+        style: how its XML is written.
     """
     operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
     given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
-    return call(publishers, require_valid_message(publishers, request(operation, **given)), fresh=True).exchange
+    message = envelope((require_valid_message(publishers, request(operation, **given)),))
+    return send(publishers, message if style is None else serialize(message, style), fresh=True).exchange
 
 
 def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Outgoing:

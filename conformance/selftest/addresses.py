@@ -1,8 +1,12 @@
 """Where a robot is behind a proxy: what it says of its own addresses leads to the proxy, never past it."""
 
+import re
 from dataclasses import dataclass
+from typing import Final
 
 from conformance.selftest.messages import Request, Response
+
+_ORIGIN: Final = re.compile(r"^https?://[^/?]*(?=[/?])", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -27,9 +31,11 @@ class Addresses:
         """A request as the robot knows it, or None when it is for nothing that is the robot's."""
         if request.side != "rest" or not self.prefix or request.raw is not None:
             return request
-        if not request.target.startswith(self.prefix):
+        # In absolute form too (RFC 9112 3.2.2), of which the robot then gets the origin form.
+        target = _ORIGIN.sub("", request.target)
+        if not target.startswith(self.prefix):
             return None
-        return request.copy(target=request.target.removeprefix(self.prefix) or "/")
+        return request.copy(target=target.removeprefix(self.prefix) or "/")
 
     def outward(self, response: Response) -> Response:
         """The robot's response as clients are to see it; the response itself is altered."""

@@ -23,17 +23,18 @@ def each_at_once(
         judge: runs certifications in processes of their own (certifying.run_job).
         items: what to judge.
         at_once: how many at a time.
-        tell: called with each result when it is there, one call at a time.
+        tell: called with each result when it is there, one call at a time; not with what an interrupt ended.
 
     Raises:
         KeyboardInterrupt: after what was under way has been killed, and its robots are stopped.
     """
-    lock = threading.Lock()
+    lock, interrupted = threading.Lock(), threading.Event()
 
     def told(item: _Item) -> _Result:
         result = judge(item)
         with lock:
-            tell(result)
+            if not interrupted.is_set():
+                tell(result)
         return result
 
     with ThreadPoolExecutor(at_once) as executor:
@@ -41,6 +42,7 @@ def each_at_once(
         try:
             return [one.result() for one in judged]
         except BaseException:
+            interrupted.set()
             executor.shutdown(wait=False, cancel_futures=True)
             running = [one for one in judged if not one.cancelled()]
             while wait(running, _AGAIN_S).not_done:

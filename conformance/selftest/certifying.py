@@ -4,6 +4,7 @@ import contextlib
 import io
 import multiprocessing
 import os
+import signal
 import tempfile
 import time
 from dataclasses import dataclass, field
@@ -19,7 +20,9 @@ from conformance.contract.statement import load_statement
 from conformance.engine.certification import certify
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.transport.exchange import Attempt
 from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
 
 # What every run imports: loaded once, and inherited by the processes that are forked from there.
@@ -41,6 +44,7 @@ class Job:
         token: bearer token to send, or empty.
         endpoints: further endpoint options (ca_file, request_rate).
         timeout_s: after which the run is given up.
+        enough: requirements of which one failure is enough to know: the check that sees it is the last.
         out: folder in which result.json is kept, or None.
     """
 
@@ -56,6 +60,7 @@ class Job:
     token: str = ""
     endpoints: dict[str, Any] = field(default_factory=dict)
     timeout_s: float = 120.0
+    enough: frozenset[str] = frozenset()
     out: Path | None = None
 
 
@@ -77,6 +82,11 @@ class Outcome:
     requests: int
     seconds: float
 
+    @property
+    def fails(self) -> frozenset[str]:
+        """Requirements that say fail."""
+        return frozenset(id_ for id_, verdict in self.verdicts.items() if verdict == "fail")
+
     def caught(self) -> tuple[str, ...]:
         """Requirements that say fail or warn."""
         return tuple(id_ for id_, verdict in self.verdicts.items() if verdict in {"fail", "warn"})
@@ -89,7 +99,12 @@ def run_job(job: Job) -> Outcome:
     ours, theirs = context.Pipe(duplex=False)
     started = time.monotonic()
     process = context.Process(target=_run, args=(job, theirs), daemon=True)
-    process.start()
+    # Ctrl-C is for whoever waits here: the server that this may start, and what it forks, hear nothing of it.
+    heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
     theirs.close()
     given_up = Outcome(-1, {}, {}, 0, job.timeout_s)
     try:
@@ -145,4 +160,30 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
         seed=job.seed,
         effort=Effort(job.effort),
     )
+    if job.enough:
+        run.judge = _EnoughKnown(run, job.enough)
     return RobotUnderTest(run, connection_of(where))
+
+
+class _EnoughKnown(Judge):
+    """A judge who lets no further check begin once one of some requirements has failed."""
+
+    def __init__(self, run: Run, enough: frozenset[str]) -> None:
+        super().__init__(set(run.contract.ledger))
+        self._run = run
+        self._enough = enough
+
+    def check(
+        self,
+        requirement: str,
+        holds: bool,  # noqa: FBT001 - as Judge.check()
+        exchange: Attempt | None,
+        expected: str,
+        *,
+        found: str = "",
+        cause: str = "",
+    ) -> bool:
+        """Judge one case."""
+        if not holds and requirement in self._enough and not self._run.aborted:
+            self._run.aborted = f"{requirement} has failed, which is enough to know"
+        return super().check(requirement, holds, exchange, expected, found=found, cause=cause)

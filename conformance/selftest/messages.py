@@ -59,6 +59,7 @@ class Request(_Message):
     Attributes:
         side: "rest" or "soap", by the port that it came to.
         raw: its octets, where they are no HTTP; then all the rest is empty.
+        came: its octets as they came, in pieces.
     """
 
     side: str
@@ -68,6 +69,7 @@ class Request(_Message):
     fields: list[tuple[str, str]] = field(default_factory=list)
     body: bytes = b""
     raw: bytes | None = None
+    came: tuple[bytes, ...] = ()
 
     @property
     def path(self) -> str:

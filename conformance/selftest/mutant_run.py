@@ -81,7 +81,7 @@ class RobotPool:
     def give(self, robot: Robot, proxy: Proxy) -> None:
         """Give them back, as they were."""
         proxy.change, proxy.incomplete_request = unchanged, None
-        proxy.serial = proxy.backwards = False
+        proxy.serial = proxy.backwards = proxy.forgetful = False
         proxy.broken = []
         self._free.put((robot, proxy))
 
@@ -159,7 +159,7 @@ def _try(mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, alr
     for chosen, requirements in attempts:
         proxy.change = mutant.make()
         proxy.incomplete_request = mutant.incomplete_request() if mutant.incomplete_request else None
-        proxy.serial, proxy.backwards = mutant.serial, mutant.backwards
+        proxy.serial, proxy.backwards, proxy.forgetful = mutant.serial, mutant.backwards, mutant.forgetful
         outcome = run_job(
             job_for(
                 robot,

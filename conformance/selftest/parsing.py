@@ -50,6 +50,7 @@ class RequestParser:
             while (event := self._http.next_event()) is not h11.NEED_DATA:
                 if isinstance(event, h11.EndOfMessage) and self._request is not None:
                     self._request.body = b"".join(self._body)
+                    self._request.came = tuple(self._pieces)
                     self.rest = self._http.trailing_data[0]
                     return self._request
                 self._take(event)

@@ -30,6 +30,7 @@ class Proxy:
         incomplete_request: what is done with requests that are never completed.
         serial: whether a request is read only when the one before it has come to its end.
         backwards: whether of two requests that were sent at once the second is answered first.
+        forgetful: whether of requests that were sent at once the first alone is answered.
         requests: how many have come.
         broken: what a change raised that it should not have: then the mutant is wrong, not the robot.
     """
@@ -41,6 +42,7 @@ class Proxy:
         self.incomplete_request: IncompleteRequest | None = None
         self.serial = False
         self.backwards = False
+        self.forgetful = False
         self.requests = 0
         self.broken: list[str] = []
         self._tls = tls
@@ -116,6 +118,8 @@ class Proxy:
                 together = [request]
                 if self.backwards and client.has_more and (second := self._next(side, client, forward)) is not None:
                     together.insert(0, second)
+                while self.forgetful and client.has_more and self._next(side, client, forward) is not None:
+                    pass
                 last = False
                 for item in together:
                     self.requests += 1

@@ -119,7 +119,10 @@ class Report:
         return path
 
     def matrix(self) -> str:
-        """The matrix, as a table: each mutant, and the requirements that caught it."""
+        """The matrix, as a table: each mutant, and the requirements that caught it; of those by rule, the rates."""
+        if self.generated_results:
+            theirs = {seen.mutant: seen.caught for seen in self.compared}
+            return by_rule.rates_page(self.generated_results, self.target, self.seed, theirs, self.notes)
         compared = {seen.mutant: "caught" if seen.caught else "not caught" for seen in self.compared}
         lines = [
             "# Faulty robots, and what caught them",

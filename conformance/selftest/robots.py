@@ -19,7 +19,7 @@ from conformance.selftest.servers.programs import built, check_installed, progra
 
 _HERE = Path(__file__).parent
 _READY = re.compile(r"ready rest=(\S+) soap=(\S*)")
-_START_S, _STOP_S = 40.0, 10.0
+_START_S, _STOP_S = 90.0, 10.0
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
 _DOMAINS = 102
 INDEPENDENT_ROBOTS = ("plain", "baroque", "legacy")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
 from conformance.documents.xml_names import ENVELOPE, clark, local
@@ -12,6 +12,9 @@ from conformance.documents.xml_node import Node
 
 if TYPE_CHECKING:
     from lxml import etree
+
+# A message that asks for nothing: whatever answers it handles SOAP, and does nothing.
+EMPTY: Final = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'
 
 
 class NotSoapError(ValueError):

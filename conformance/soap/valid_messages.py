@@ -8,12 +8,13 @@ from dataclasses import replace
 from typing import Final
 
 from conformance.documents.wsdl import Operation
-from conformance.documents.xml import parse
+from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import XSD, XSI, clark, namespace
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS, bounds
 from conformance.documents.xsd_shapes import Element
 from conformance.soap.calls import SoapResponse, call
+from conformance.soap.envelope import NotSoapError, read_root
 from conformance.soap.messages import ordinary, simple_leaves, with_text
 from conformance.soap.service import SoapService
 from conformance.verdict.evidence import HarnessError
@@ -33,6 +34,26 @@ def require_valid_message(service: SoapService, message: Node) -> Node:
     if fault:
         raise HarnessError(f"{message.name} was made as a valid message, and is none: {fault}")
     return message
+
+
+def require_valid_document(service: SoapService, document: bytes | str) -> bytes:
+    """See that octets which are to be sent as a valid message are one by the contract, and give them back.
+
+    Raises:
+        HarnessError: they are not; the message says why.
+        DescriptionError: the contract cannot be used.
+    """
+    octets = document.encode() if isinstance(document, str) else document
+    try:
+        # Without comments, by which a value would be in two pieces.
+        message = read_root(parse(octets, comments=False))
+    except (NotXmlError, NotSoapError) as error:
+        raise HarnessError(f"a document was made as a valid message, and is none: {error}") from error
+    faults = [f"{len(message.payload)} children of Body"] if len(message.payload) != 1 else []
+    faults += filter(None, map(service.contract.types.invalid, message.payload))
+    if faults:
+        raise HarnessError(f"a document was made as a valid message, and is none: {faults[0]}")
+    return octets
 
 
 def call_valid(service: SoapService, payload: Node, *, headers: tuple[Node, ...] | None = None) -> SoapResponse:

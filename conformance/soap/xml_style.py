@@ -20,7 +20,9 @@ DECLARATIONS: Final = (
     '<?xml version="1.0" encoding="UTF-8"?>\n',
     "<?xml version='1.0' encoding='utf-8' standalone='yes'?>",
 )
-TEXTS: Final = ("plain", "cdata", "reference", "hexadecimal", "comment", "split")
+TEXTS: Final = ("plain", "cdata", "reference", "hexadecimal", "comment", "split", "comment inside")
+# As signed messages carry them (WS-Security 4.2): SOAP 1.1 4.1.1 lets the Envelope have any qualified attribute.
+_SECURITY: Final = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-wssecurity-utility-1.0.xsd"
 _PREFIXES: Final = ("soapenv", "S", "SOAP-ENV", "_", "x.1-y")
 
 
@@ -40,6 +42,7 @@ class XmlStyle:
         empty_tags: whether an empty element is written as one tag.
         location: whether the payload carries xsi:schemaLocation.
         header: whether there is an empty Header where the message has none.
+        identified: whether the Envelope has an attribute of another namespace, wsu:Id.
     """
 
     envelope_prefix: str = "soapenv"
@@ -53,6 +56,7 @@ class XmlStyle:
     empty_tags: bool = True
     location: bool = False
     header: bool = False
+    identified: bool = False
 
 
 def single_changes() -> tuple[tuple[str, XmlStyle], ...]:
@@ -72,7 +76,14 @@ def single_changes() -> tuple[tuple[str, XmlStyle], ...]:
         ("start and end tags for empty elements", XmlStyle(empty_tags=False)),
         ("xsi:schemaLocation", XmlStyle(location=True)),
         ("an empty Header", XmlStyle(header=True)),
+        ("an attribute of another namespace on the Envelope", XmlStyle(identified=True)),
     )
+
+
+def value_styles() -> tuple[XmlStyle, ...]:
+    """Styles by which a reader may mistake a value, and then all others."""
+    styles = [style for _, style in single_changes()]
+    return tuple(sorted(styles, key=lambda style: style.text == "plain"))
 
 
 def xml_styles() -> SearchStrategy[XmlStyle]:
@@ -90,6 +101,7 @@ def xml_styles() -> SearchStrategy[XmlStyle]:
         empty_tags=st.booleans(),
         location=st.booleans(),
         header=st.booleans(),
+        identified=st.booleans(),
     )
 
 
@@ -176,6 +188,8 @@ class _Writer:
             "hexadecimal": "".join(f"&#x{ord(char):X};" for char in text),
             "comment": f"{escape(text)}<!-- 1 -->",
             "split": f"{escape(text[:half])}<![CDATA[{text[half:]}]]>",
+            # A reader that takes the first of several text nodes for all of them sees a part of the value.
+            "comment inside": f"{escape(text[:half])}<!-- 2 -->{escape(text[half:])}",
         }
         return forms.get(self.style.text, escape(text))
 
@@ -192,6 +206,8 @@ def serialize(message: Node, style: XmlStyle) -> str:
     if style.header and not any(child.name == "Header" for child in message.children):
         header = Node(clark(namespace(message.tag), "Header"))
         message = replace(message, children=(header, *message.children))
+    if style.identified:
+        message = replace(message, attributes=(*message.attributes, (clark(_SECURITY, "Id"), "request-1")))
     before = "<!-- before -->" if style.comments else ""
     after = "<!-- after -->" if style.comments else ""
     return style.declaration + before + _Writer(style).element(message, {}, 0, root=True) + after

@@ -11,7 +11,8 @@ from urllib.parse import urlsplit
 
 import httpcore
 
-from conformance.transport.deadlines import MAX_ANSWER, DeadlineBackend, has_connected, set_deadline, tls_context
+from conformance.transport.connections import Connections
+from conformance.transport.deadlines import MAX_ANSWER, has_connected, set_deadline, tls_context
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, NoAnswerError, Request, Response, Unanswered
 from conformance.transport.pace import Pace, time_to_arrive
 
@@ -85,19 +86,12 @@ class HttpClient:
         self._hangs: defaultdict[str, list[float]] = defaultdict(list)
         self._kept = 0
         self._dropped = 0
-        self._pool = self._new_pool()
-
-    def _new_pool(self) -> httpcore.ConnectionPool:
-        return httpcore.ConnectionPool(
-            ssl_context=self.connection.tls() if self.scheme == "https" else None,
-            max_keepalive_connections=2,
-            keepalive_expiry=3.0,
-            network_backend=DeadlineBackend(),
-        )
+        tls = connection.tls() if parts.scheme == "https" else None
+        self._connections = Connections(*self._origin, self.port, tls)
 
     def close(self) -> None:
         """Close the connections that are open."""
-        self._pool.close()
+        self._connections.close()
 
     def send(
         self,
@@ -175,14 +169,15 @@ class HttpClient:
         url = httpcore.URL(scheme=scheme, host=host, port=self.port, target=target)
         request_headers = [(name.encode("latin-1"), value.encode("utf-8")) for name, value in fields]
         # A read ends at the deadline of the exchange.
-        extensions = {"timeout": dict.fromkeys(("connect", "write", "pool"), deadline)}
+        extensions = {"timeout": dict.fromkeys(("connect", "write"), deadline)}
         for attempt in (1, 2):
             self.connection.take_slot()
             set_deadline(deadline, len(body))
             started = time.perf_counter()
-            pool = self._new_pool() if fresh or attempt > 1 else self._pool
+            kept = not fresh and attempt == 1
+            connection = self._connections.take() if kept else self._connections.new()
             try:
-                answer = pool.handle_request(
+                answer = connection.handle_request(
                     httpcore.Request(method, url, headers=request_headers, content=body, extensions=extensions)
                 )
                 content = _read(answer)
@@ -201,8 +196,7 @@ class HttpClient:
                     continue
                 raise none from error
             finally:
-                if pool is not self._pool:
-                    pool.close()
+                self._connections.give_back(connection, keep=kept)
         raise AssertionError("unreachable: the second attempt returns or raises")
 
     def _drops_requests(self) -> bool:

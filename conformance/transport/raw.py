@@ -3,9 +3,12 @@
 Every wait ends at one deadline. What is wrong with an answer's framing is told with the clause of RFC 9112.
 """
 
+import itertools
 import re
+import select
 import socket
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from conformance.transport.client import HttpClient
@@ -32,12 +35,14 @@ class RawAnswer:
         closed: whether the robot closed the connection (else the deadline passed).
         sent_all: whether the whole request went out.
         elapsed_ms: from the first octet sent to the end.
+        early: whether something came in a pause of sending.
     """
 
     octets: bytes
     closed: bool
     sent_all: bool
     elapsed_ms: float
+    early: bool = False
 
 
 def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = True) -> bytes:
@@ -58,13 +63,22 @@ def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = 
     return ("\r\n".join([*lines, *fields]) + "\r\n\r\n").encode("latin-1")
 
 
-def chunked(body: bytes, size: int) -> bytes:
-    """A body in chunks of so many octets (RFC 9112 7.1)."""
+def chunked(body: bytes, size: int, extension: bytes = b"", trailers: bytes = b"") -> bytes:
+    """A body in chunks of so many octets, each with an extension, and whole trailer lines behind (RFC 9112 7.1)."""
     pieces = (body[start : start + size] for start in range(0, len(body), size))
-    return b"".join(b"%x\r\n%b\r\n" % (len(piece), piece) for piece in pieces) + b"0\r\n\r\n"
+    chunks = b"".join(b"%x%b\r\n%b\r\n" % (len(piece), extension, piece) for piece in pieces)
+    return chunks + b"0%b\r\n%b\r\n" % (extension, trailers)
 
 
-def talk(client: HttpClient, octets: bytes, *, timeout_s: float | None = None, answers: int = 0) -> RawAnswer:
+def talk(
+    client: HttpClient,
+    octets: bytes,
+    *,
+    timeout_s: float | None = None,
+    answers: int = 0,
+    cuts: Sequence[int] = (),
+    pause_s: float = 0.0,
+) -> RawAnswer:
     """Send octets over a connection of their own, and read until the robot closes it or the deadline passes.
 
     Args:
@@ -72,6 +86,8 @@ def talk(client: HttpClient, octets: bytes, *, timeout_s: float | None = None, a
         octets: what to send.
         timeout_s: deadline for all of it, and more for each octet; by default the run's.
         answers: stop when so many whole answers to GET have come; 0: only at the end.
+        cuts: places before which sending pauses.
+        pause_s: for so long, or until something comes.
 
     Raises:
         NoAnswerError: there is no connection.
@@ -85,15 +101,9 @@ def talk(client: HttpClient, octets: bytes, *, timeout_s: float | None = None, a
     except OSError as error:
         raise NoAnswerError(Unanswered(request, f"no connection: {error}", NoAnswer.REFUSED)) from error
     received = bytearray()
-    closed, sent_all = False, True
+    closed = False
     with link:
-        try:
-            _set_timeout(link, deadline)
-            link.sendall(octets)
-        except TimeoutError:
-            sent_all = False
-        except OSError:
-            sent_all = False  # the robot has closed it; what it said before can still be read
+        sent_all, early = _sent(link, octets, deadline, cuts, pause_s)
         while len(received) < _MOST:
             try:
                 _set_timeout(link, deadline)
@@ -108,9 +118,9 @@ def talk(client: HttpClient, octets: bytes, *, timeout_s: float | None = None, a
                 break
             received += piece
             deadline += time_for(len(piece))
-            if answers and _whole(bytes(received), answers):
+            if answers and answers_in(bytes(received), answers) == answers:
                 break
-    return RawAnswer(bytes(received), closed, sent_all, (time.perf_counter() - started) * 1000)
+    return RawAnswer(bytes(received), closed, sent_all, (time.perf_counter() - started) * 1000, early)
 
 
 def _connect(client: HttpClient, deadline: float) -> socket.socket:
@@ -122,6 +132,23 @@ def _connect(client: HttpClient, deadline: float) -> socket.socket:
     return client.connection.tls().wrap_socket(link, server_hostname=client.host)
 
 
+def _sent(
+    link: socket.socket, octets: bytes, deadline: float, cuts: Sequence[int], pause_s: float
+) -> tuple[bool, bool]:
+    """Send octets, with pauses before the cuts: whether all of them went out, and whether something came in a pause."""
+    early = False
+    try:
+        for begin, end in itertools.pairwise((0, *cuts, len(octets))):
+            if begin:
+                early |= bool(select.select([link], [], [], pause_s)[0])
+            _set_timeout(link, deadline)
+            link.sendall(octets[begin:end])
+    except OSError:
+        # Too slow, or the robot has closed it; what it said before can still be read.
+        return False, early
+    return True, early
+
+
 def _set_timeout(link: socket.socket, deadline: float) -> None:
     left = deadline - time.monotonic()
     if left <= 0:
@@ -129,13 +156,14 @@ def _set_timeout(link: socket.socket, deadline: float) -> None:
     link.settimeout(left)
 
 
-def _whole(octets: bytes, answers: int) -> bool:
-    try:
-        for _ in range(answers):
+def answers_in(octets: bytes, most: int) -> int:
+    """How many whole answers to GET, up to so many, a connection that is still open has brought."""
+    for count in range(most):
+        try:
             _, octets = parse(octets, "GET", closed=False)
-    except FramingError:
-        return False
-    return True
+        except FramingError:
+            return count
+    return most
 
 
 def shown(client: HttpClient, octets: bytes) -> Request:

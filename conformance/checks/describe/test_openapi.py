@@ -8,16 +8,17 @@ import pytest
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
 from conformance.documents.openapi_validity import openapi_fault
-from conformance.rest.applicable import allowed
-from conformance.rest.calls import Call, example_call
+from conformance.rest.calls import example_call
 from conformance.rest.description import Described, described_by_openapi, differences
 from conformance.rest.interface import RestInterface
+from conformance.rest.presence import judge_there
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("describe"), pytest.mark.needs("rest")]
 _PATH = "/openapi.json"
+_BEHAVIOUR = "describe/openapi-behaviour"
 
 
 def _document(rest: HttpClient) -> tuple[Any, Exchange, str]:
@@ -61,41 +62,16 @@ def test_openapi_has_the_operations(api: RestInterface, rest: HttpClient, judge:
     )
 
 
-@pytest.mark.requirement("describe/openapi-behaviour")
-def test_what_is_described_is_there(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+@pytest.mark.requirement(_BEHAVIOUR)
+def test_what_is_described_is_there(api: RestInterface, rest: HttpClient) -> None:
     """A request made from each operation of the description, and of the contract, is not answered 404 or 405."""
     for operation in operations_of(api.run.contract):
         if not operation.optional:
-            _judge_there(api, judge, example_call(api, operation))
+            judge_there(api, _BEHAVIOUR, example_call(api, operation))
     document, _, _ = _document(rest)
     found = [] if document is None else described_by_openapi(document, rest.base_url)
     # A robot may serve the contract's own description, with an extension in it that it does not have.
     known = {Described(item, item.template).address for item in operations_of(api.run.contract)}
     for item in found:
         if item.address not in known and item.path == item.operation.template:
-            _judge_there(api, judge, example_call(api, item.operation))
-
-
-def _judge_there(api: RestInterface, judge: Judge, call: Call) -> None:
-    """Judge by the request itself where it may be sent and needs nothing, else by what OPTIONS says of its path."""
-    operation = call.operation
-    asked = operation.safe and allowed(api, operation)
-    exchange = call.send(api) if asked else Call(operation, call.values).send(api, method="OPTIONS")
-    status = exchange.response.status
-    if asked and status == 404 and operation.declared(404) is not None:
-        # The resource may well be there with nothing in it: its methods tell.
-        exchange = call.send(api, method="OPTIONS")
-        status = exchange.response.status
-        asked = False
-    there = status not in {404, 405, 501}
-    if there and not asked:
-        allow = exchange.response.header("allow") or ""
-        there = not allow or operation.method in {name.strip() for name in allow.split(",")}
-    judge.check(
-        "describe/openapi-behaviour",
-        there,
-        exchange,
-        f"{operation.label} to be there",
-        found=f"status {status}" if status not in {200, 204} else "Allow does not name it",
-        cause=operation.label,
-    )
+            judge_there(api, _BEHAVIOUR, example_call(api, item.operation), known=False)

@@ -4,12 +4,12 @@ import pytest
 
 from conformance.contract.interfaces import NEEDS, Interface
 from conformance.robot.interfaces import Interfaces
+from conformance.soap.envelope import EMPTY
 from conformance.transport.exchange import Attempt, NoAnswerError
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
 
 pytestmark = pytest.mark.phase("reach")
-_ENVELOPE = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'
 
 
 # rest-formats and describe have no such requirement of their own: theirs say what has to answer.
@@ -55,7 +55,7 @@ def _look(interfaces: Interfaces, name: Interface) -> tuple[str, Attempt | None]
         service = interfaces.soap.there.get(name)
         if service is None:
             return f"the {name} interface has no address", None
-        exchange = service.post(_ENVELOPE)
+        exchange = service.post(EMPTY)
     except NoAnswerError as none:
         return f"{name}: {none}", none.unanswered
     # Anything that handles POST will do here: a fault, a 4xx for the empty Body, even a server error.

@@ -4,15 +4,20 @@ import pytest
 
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import UnreadableError
+from conformance.rest.calls import example_call
 from conformance.rest.description import Described, described_by_wadl, differences
 from conformance.rest.interface import RestInterface
+from conformance.rest.presence import judge_there
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("describe"), pytest.mark.needs("rest")]
 _PATH = "/application.wadl"
-_IDS = ("describe/wadl", "describe/wadl-resources")
+_BEHAVIOUR = "describe/wadl-behaviour"
+_IDS = ("describe/wadl", "describe/wadl-resources", _BEHAVIOUR)
+# What a WADL lists beside what a resource is for (Jersey does).
+_BESIDE = frozenset({"HEAD", "OPTIONS", ""})
 _MEDIA_TYPES = {"application/vnd.sun.wadl+xml", "application/wadl+xml", "application/xml", "text/xml"}
 
 
@@ -62,3 +67,17 @@ def test_wadl_has_the_resources(api: RestInterface, rest: HttpClient, judge: Jud
         "the resources, methods and parameters of the contract",
         found="; ".join(missing[:3]),
     )
+
+
+@pytest.mark.requirement(_BEHAVIOUR)
+def test_what_is_described_is_there(api: RestInterface, rest: HttpClient) -> None:
+    """A request made from each operation of it is not answered 404 or 405."""
+    if _without(api):
+        return
+    known = {Described(item, item.template).address: item for item in operations_of(api.run.contract)}
+    for item in _read(rest)[0]:
+        ours = known.get(item.address)
+        if ours is not None and not ours.optional:
+            judge_there(api, _BEHAVIOUR, example_call(api, ours))
+        elif ours is None and item.path == item.operation.template and item.operation.method not in _BESIDE:
+            judge_there(api, _BEHAVIOUR, example_call(api, item.operation), known=False)

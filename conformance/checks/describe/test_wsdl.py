@@ -12,6 +12,7 @@ from conformance.documents.xml_names import WSDL_SOAP, clark
 from conformance.soap import comparison
 from conformance.soap.address import is_http, split
 from conformance.soap.callable_services import SoapServices, repetitions
+from conformance.soap.envelope import EMPTY
 from conformance.soap.published_wsdl import get
 from conformance.soap.service import SoapService
 from conformance.soap.wsdl_rules import RULES
@@ -21,7 +22,6 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("describe")
-_EMPTY = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'
 _COMPARED: dict[str, tuple[Callable[[Description, Description], Iterator[str]], str]] = {
     "wsdl-names": (comparison.names, "the names of the contract"),
     "wsdl-operations": (comparison.operations, "the operations of the contract"),
@@ -141,7 +141,7 @@ def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
                 "POST",
                 path,
                 headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
-                body=_EMPTY,
+                body=EMPTY,
                 # The token is for the robot that the statement names.
                 authorized=client.host == service.client.host,
             )

@@ -13,6 +13,7 @@ from conformance.robot.deliveries_seen import NoObserverError, observer_of
 from conformance.robot.delivery import Delivery, lexical_deliveries, path_of
 from conformance.robot.probe.client import ProbeError, RosProbe
 from conformance.soap.service import SoapService
+from conformance.soap.xml_style import TEXTS
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
@@ -41,6 +42,8 @@ _CORNERS = (
 _CLIENTS = 8
 # So many rounds of clients at once make no more messages than a robot's list holds for certain.
 _ROUNDS = 3
+# The ways of writing a number in XML come first among the styles of a batch.
+_STYLES = len(TEXTS)
 # How long what comes too late is waited for, s: at any effort, and at quick.
 _LATER_S = (2.0, 0.6)
 
@@ -69,6 +72,11 @@ def test_deliveries_arrive(
             if len(failed) < _ENOUGH and not batch.run(orders):
                 failed.append(orders)
 
+        # Whatever is read of these digits is a number, so that who reads a part of them takes another delivery.
+        digits = [
+            Delivery(COURIER, *(1234.5678 + 100 * style + place for place in range(6))) for style in range(_STYLES)
+        ]
+        try_batch([_order("soap", delivery) for delivery in digits])
         try_batch([_order(how, Delivery(*values)) for how, values in _CORNERS])
         explore(_batches(), try_batch, cases=12)
         for turn in range(api.run.effort.cases(8)):

@@ -15,7 +15,7 @@ from conformance.robot.probe.client import ProbeError, RosProbe
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest"), pytest.mark.motion]
+pytestmark = [pytest.mark.phase("effect"), pytest.mark.needs("rest"), pytest.mark.motion]
 _TWICE = Delivery(COURIER, 70.5, 71.5, 72.5, 73.5, 74.5, 75.5)
 _APART = Delivery(COURIER, 80.5, 81.5, 82.5, 83.5, 84.5, 85.5)
 
@@ -37,6 +37,9 @@ def test_keys(api: RestInterface, probe: RosProbe, judge: Judge) -> None:
         twice, apart = _put(api, _TWICE, (first, first)), _put(api, _APART, (second, third))
         accepted = sum(exchange.response.ok for exchange in apart)
         arrived = Counter(one.delivery for one in observer.collect(1 + accepted))
+        # Where keys are not taken, another message has come in the place of the last one.
+        lacking = accepted - arrived[_APART]
+        arrived += Counter(one.delivery for one in (observer.collect(lacking) if lacking > 0 else ()))
     except (NoObserverError, ProbeError) as nobody:
         pytest.skip(str(nobody))
     if not accepted or not twice[0].response.ok:

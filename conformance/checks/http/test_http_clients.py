@@ -4,6 +4,7 @@ import itertools
 
 import pytest
 
+from conformance.rest import by_hand
 from conformance.rest.interface import RestInterface
 from conformance.rest.questions import Question, questions, rounds
 from conformance.robot.plan_questions import plan_questions
@@ -56,11 +57,14 @@ def test_answers_come_in_order(api: RestInterface, rest: HttpClient, judge: Judg
     for turn in rounds(_questions(api, asked), _IN_A_ROW, api.run.effort.cases(_IN_A_ROW)):
         heads = [raw.head(rest, "GET", one.path, f"Accept: {one.accept}") for one in turn]
         octets = b"".join(heads)
-        came = raw.talk(rest, octets, answers=len(turn))
+        came = by_hand.talk(api, octets, answers=len(turn), refused=True)
         for question in turn:
             attempt, behind = raw.read_one(rest, octets, came, "GET")
             if isinstance(attempt, Unanswered):
                 # A robot may close after any answer; of what is no HTTP, others speak.
+                if not came.octets and not came.closed:
+                    _judge_forgotten(api, judge, octets, attempt)
+                    return
                 break
             stranger = question.stranger(attempt.response)
             judge.check(
@@ -72,3 +76,17 @@ def test_answers_come_in_order(api: RestInterface, rest: HttpClient, judge: Judg
                 cause="another order",
             )
             came = raw.rest_of(came, behind)
+
+
+def _judge_forgotten(api: RestInterface, judge: Judge, octets: bytes, attempt: Unanswered) -> None:
+    """Judge a connection that stays open without the answers to come: not by one, which may have been held up."""
+    again = by_hand.talk(api, octets, answers=_IN_A_ROW, refused=True)
+    count = raw.answers_in(again.octets, _IN_A_ROW)
+    judge.check(
+        "http/pipelining",
+        again.closed or count == _IN_A_ROW,
+        attempt,
+        f"{_IN_A_ROW} answers to as many requests, or a connection that is closed",
+        found=f"{count} answers, and the connection stays open",
+        cause="forgotten",
+    )

@@ -2,6 +2,7 @@
 
 import pytest
 
+from conformance.rest import by_hand
 from conformance.rest.applicable import reads
 from conformance.rest.calls import Call
 from conformance.rest.interface import RestInterface
@@ -39,10 +40,14 @@ def test_every_octet_of_an_answer(api: RestInterface, rest: HttpClient, judge: J
     """
     calls = reads(api)
     turns = -(-_IN_ALL // max(1, len(calls))) if not api.run.effort.slow else 1
+    enough = 0
     for turn, call in enumerate(calls * turns):
         for method in ("GET", "OPTIONS") if turn < len(calls) else ("GET",):
             octets = raw.head(rest, method, call.path, "Accept: application/json", "Connection: close")
-            attempt, surplus = raw.read_one(rest, octets, raw.talk(rest, octets), method)
+            came = by_hand.talk(api, octets, answers=enough)
+            # A robot that does not close is blamed for that elsewhere; its end is waited for once.
+            enough = enough if came.closed else 1
+            attempt, surplus = raw.read_one(rest, octets, came, method)
             fault = attempt.problem if isinstance(attempt, Unanswered) else ""
             if surplus:
                 fault = f"{len(surplus)} octets behind the answer: {surplus[:40]!r}"
@@ -56,7 +61,7 @@ def test_answers_stay_aligned(api: RestInterface, rest: HttpClient, judge: Judge
     path = _first(api).path
     for method in ("GET", "HEAD", "OPTIONS"):
         octets = raw.head(rest, method, path) + raw.head(rest, "GET", path, "Connection: close")
-        came = raw.talk(rest, octets)
+        came = by_hand.talk(api, octets)
         attempt, behind = raw.read_one(rest, octets, came, method)
         if behind:
             # Nothing behind is fine: a robot may close after one answer.
@@ -82,6 +87,9 @@ def test_fields_that_have_to_be_refused(api: RestInterface, rest: HttpClient, ju
     ):
         judge.at_risk = (id_,)
         attempt, status, came = _ask_by_hand(api, octets)
+        if not came.octets and not came.closed:
+            # An answer that a network holds up comes later than one that a robot thinks about.
+            attempt, status, came = _ask_by_hand(api, octets, api.client.connection.timeout_s)
         judge.check(
             id_,
             status == 400 or (closing and came.closed and not came.octets),
@@ -110,9 +118,9 @@ def test_octets_that_are_no_request(api: RestInterface, judge: Judge) -> None:
     _first(api).send(api)
 
 
-def _ask_by_hand(api: RestInterface, octets: bytes) -> tuple[Attempt, int, raw.RawAnswer]:
-    """What came, its status (0 for none), and the octets as they came."""
-    patience_s = min(api.client.connection.timeout_s, _THINK_S + 4 * api.run.effort.usual_ms / 1000)
+def _ask_by_hand(api: RestInterface, octets: bytes, most_s: float = _THINK_S) -> tuple[Attempt, int, raw.RawAnswer]:
+    """What came within so many seconds, its status (0 for none), and the octets as they came."""
+    patience_s = min(api.client.connection.timeout_s, most_s + 4 * api.run.effort.usual_ms / 1000)
     came = raw.talk(api.client, octets, timeout_s=patience_s, answers=1)
     attempt, _ = raw.read_one(api.client, octets, came, "GET")
     status = 0 if isinstance(attempt, Unanswered) else attempt.response.status

@@ -5,6 +5,7 @@ from urllib.parse import urljoin, urlsplit
 import pytest
 
 from conformance.documents.openapi import inside_prefix, known_path, resources_of
+from conformance.rest import by_hand
 from conformance.rest.applicable import reads
 from conformance.rest.calls import JSON, example_call
 from conformance.rest.interface import RestInterface
@@ -116,12 +117,16 @@ def test_long_targets(api: RestInterface, rest: HttpClient, judge: Judge) -> Non
         mark = "&" if "?" in call.path else "?"
         for length in _LONG_TARGETS:
             path = f"{call.path}{mark}roaas={'a' * length}"
-            try:
-                exchange = rest.send("GET", path, fresh=True)
-            except NoAnswerError as none:
-                # Who refuses in the middle of a long head may lose the answer with the connection (RFC 9112 9.6).
-                if none.kind is not NoAnswer.CLOSED or length == min(_LONG_TARGETS):
-                    raise
+            exchange: Exchange | None = None
+            for second in (False, True):
+                try:
+                    exchange = rest.send("GET", path, fresh=True)
+                    break
+                except NoAnswerError as none:
+                    # Who refuses in the middle of a long head may lose the answer with the connection (RFC 9112 9.6).
+                    if none.kind is not NoAnswer.CLOSED or (second and length == min(_LONG_TARGETS)):
+                        raise
+            if exchange is None:
                 continue
             status = exchange.response.status
             judge.check(
@@ -142,6 +147,7 @@ def test_large_field(api: RestInterface, judge: Judge) -> None:
     """A field of 128 KiB is refused, or the connection closed, or the field ignored; never 5xx."""
     judge.at_risk = ("http/header-too-large",)
     for call in [call for call in reads(api) if not call.operation.optional][:3]:
+        usual = call.send(api).response.status
         try:
             exchange = call.send(api, ("X-Roaas", "a" * _LONG_FIELD), fresh=True)
         except NoAnswerError as none:
@@ -154,7 +160,7 @@ def test_large_field(api: RestInterface, judge: Judge) -> None:
         status = exchange.response.status
         judge.check(
             "http/header-too-large",
-            status in {431, 400, 413} or status < 300,
+            status in {431, 400, 413, usual},
             exchange,
             "431, 400, 413, a closed connection, or no matter",
             found=f"status {status} for a field of {_LONG_FIELD:,} octets",
@@ -184,7 +190,7 @@ def test_absolute_form(api: RestInterface, rest: HttpClient, judge: Judge) -> No
         usual = call.send(api, ("Accept", JSON)).response.status
         head = raw.head(rest, "GET", call.path, f"Accept: {JSON}", "Connection: close")
         absolute = head.replace(b" ", f" {rest.scheme}://{rest.authority}".encode(), 1)
-        attempt, _ = raw.read_one(rest, absolute, raw.talk(rest, absolute, answers=1), "GET")
+        attempt, _ = raw.read_one(rest, absolute, by_hand.talk(api, absolute, answers=1), "GET")
         judge.check(
             "http/absolute-form",
             isinstance(attempt, Exchange) and attempt.response.status == usual,

@@ -30,6 +30,9 @@ _MATRIX = (
     (_Q, "{b};q=1.000, {a};q=0.999"),
     (_Q, "image/png, {b};q=0.5, {a};q=0.1"),
     (_Q, "{a};version=1;q=0.4, {b};q=0.8"),
+    # RFC 9110 5.6.1.2: empty members count for nothing; 5.6.3: white space is a tab as well.
+    (_Q, ", {a};q=0.3, ,{b};q=0.8,"),
+    (_Q, "{a};q=0.3\t,\t{c};q=0.8"),
     (_SPECIFIC, "{b};q=0.9, */*;q=0.1"),
     (_SPECIFIC, "*/*, {a};q=0.1"),
     (_SPECIFIC, "*/*;q=0.9, {a};q=0.5, {b};q=0.2"),

@@ -21,11 +21,13 @@ from conformance.robot.goal import (
 )
 from conformance.robot.goals import choose_goals
 from conformance.robot.robot import STILL, Robot, Velocity
+from conformance.robot.standstill import Standstill
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+pytestmark = [pytest.mark.phase("standstill"), pytest.mark.needs("rest"), pytest.mark.motion]
 _ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
+_CANCELING: Final = 3
 # For so long after a cancelled goal the robot has to stay where it is: longer than second thoughts take, s.
 _STAYS_S: Final = 1.3
 
@@ -53,8 +55,12 @@ def _cancel(robot: Robot, judge: Judge) -> Exchange:
     exchange = robot.delete_goal()
     answered = time.monotonic()
     status = exchange.response.status
-    none = await_none(robot)
-    gone = none.response.status == 404
+    goal, none = robot.goal()
+    # 202 says that it will be done; and status.code has a word for a goal that is being cancelled.
+    gone = goal is None or status == 202 or goal.get("status", {}).get("code") == _CANCELING
+    if gone:
+        none = await_none(robot)
+        gone = none.response.status == 404
     judge.check(
         "rest-resources/goal-delete",
         status in CANCELLED and gone,
@@ -83,8 +89,8 @@ def _cancel(robot: Robot, judge: Judge) -> Exchange:
     "safety/cancel",
     "safety/cancel-stays",
 )
-def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge) -> None:
-    """One goal through all that clients do with it, then another in its place, then none."""
+def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge, standstill: Standstill) -> None:
+    """One goal through all that clients do with it, then another in its place, then none, which lasts."""
     _judge_none(robot, judge)
     there, back = choose_goals(robot, 1.5, 2)
     frame = robot.statement.motion.frame
@@ -92,6 +98,8 @@ def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge) -> None:
     first = goal_body(there, frame, _ID)
     first["header"] = {"stamp": {"sec": 12, "nanosec": 34}, "frame_id": frame}
     first["goal_id"]["stamp"] = {"sec": 56, "nanosec": 78}
+    # What was commanded before a goal is not taken up again when the goal is cancelled.
+    robot.put_velocity(_slow_turn(robot))
     if not _judge_new(robot, judge, put_goal(robot, first), first, "rest-resources/goal-id"):
         return
     _repeat(robot, judge, first, goal_body(back, frame, _ID), there)
@@ -101,6 +109,20 @@ def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge) -> None:
     second = goal_body(back, frame)
     second["goal"]["target_pose"]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
     _displace(robot, judge, second)
+    _await_motion(robot)
+    _cancel(robot, judge)
+    standstill.tried(
+        "safety/cancel-stays",
+        "rest, and no goal, after the goal was cancelled",
+        lambda: _cancel_again(robot, judge, second),
+        seconds=_STAYS_S * robot.watchfulness,
+        goal=True,
+    )
+
+
+def _cancel_again(robot: Robot, judge: Judge, body: dict[str, Any]) -> None:
+    """A goal that is cancelled, and a watch of what follows."""
+    put_goal(robot, body)
     _await_motion(robot)
     _cancel(robot, judge)
     _stays(robot, judge)
@@ -173,11 +195,15 @@ def _repeat(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, A
 
 def _velocity_meanwhile(robot: Robot, judge: Judge) -> None:
     """A velocity while a goal is active is taken, or refused with 409."""
-    exchange = robot.put_velocity(Velocity(angular_z=0.1 * robot.limits.angular_rad_s))
+    exchange = robot.put_velocity(_slow_turn(robot))
     status = exchange.response.status
     judge.check(
         "rest-resources/velocity-goal", status in {200, 204, 409}, exchange, "200, 204 or 409 while a goal is active"
     )
+
+
+def _slow_turn(robot: Robot) -> Velocity:
+    return Velocity(angular_z=0.1 * robot.limits.angular_rad_s if robot.actuated(5) else 0.0)
 
 
 def _await_motion(robot: Robot) -> None:

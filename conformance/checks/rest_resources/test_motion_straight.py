@@ -42,13 +42,17 @@ def test_straight_drive(robot: Robot) -> None:
 
 @pytest.mark.requirement("rest-resources/velocity-range", "rest-resources/pose-rotation", "safety/limits-hold")
 def test_fast_turns(robot: Robot) -> None:
-    """To the left and to the right, on the spot."""
+    """To the left, as fast ahead at the same time as it goes where the limits say so, and to the right on the spot."""
     if not robot.actuated(5):
         pytest.skip("the statement says that the robot cannot turn on the spot")
     drive = Drive(robot)
     drive.look()
-    for sign in (1, -1):
-        if not _reach(drive, Velocity(angular_z=sign * _fastest(robot, 5))):
+    ahead = 0.0
+    if robot.actuated(0) and robot.limit_declared(0) and robot.limit_declared(5):
+        make_room(robot)
+        ahead = _direction(robot) * _fastest(robot, 0)
+    for linear, sign in ((ahead, 1), (0.0, -1)):
+        if not _reach(drive, Velocity(linear_x=linear, angular_z=sign * _fastest(robot, 5))):
             break
     drive.judge_motion()
 

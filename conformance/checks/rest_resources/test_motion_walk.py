@@ -2,8 +2,9 @@
 
 import pytest
 
+from conformance.robot.drive import Drive
 from conformance.robot.goals import make_room
-from conformance.robot.robot import Robot
+from conformance.robot.robot import Robot, Velocity
 from conformance.robot.velocity_walk import VelocityMachine, room_for
 from conformance.robot.walk import Walk
 from conformance.verdict.effort import Effort
@@ -25,6 +26,8 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
 def test_velocity_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
     """Whatever is asked for, in whatever order, is what the robot does, and its pose follows."""
     make_room(robot, room_for(robot.limits))
+    # Zero is not a value that can be refused, however it is signed.
+    Drive(robot).command(Velocity(-0.0, -0.0, -0.0, -0.0, -0.0, -0.0))
     walk = Walk(robot, 0.8 * effort.budget_s)
     explore.machine(lambda: VelocityMachine(walk), cases=10, steps=effort.cases(12))
     explore.left_out(walk.left_out)

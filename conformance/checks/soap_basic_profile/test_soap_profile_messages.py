@@ -12,7 +12,7 @@ from conformance.soap.calls import call, judge_answer, send
 from conformance.soap.envelope import envelope
 from conformance.soap.mutations import invalid_ones, mutations
 from conformance.soap.service import SoapService
-from conformance.soap.valid_messages import candidates, example, typed
+from conformance.soap.valid_messages import candidates, example, require_valid_document, typed
 from conformance.soap.xml_style import XmlStyle, serialize
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -127,7 +127,8 @@ def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                 ("utf-16", "UTF-16, little end first", codecs.BOM_UTF16_LE + declared.encode("utf-16-le"), "utf-16"),
                 ("utf-16", "UTF-16, big end first", codecs.BOM_UTF16_BE + declared.encode("utf-16-be"), "utf-16"),
             ):
-                answer = send(service, body, content_type=f"text/xml; charset={charset}")
+                valid = require_valid_document(service, body)
+                answer = send(service, valid, content_type=f"text/xml; charset={charset}")
                 right = answer.accepted and answer.payload == operation.response
                 judge_answer(judge, f"soap-basic-profile/{id_}", right, answer, f"2xx for a message in {what}")
 

@@ -1,5 +1,6 @@
 """Interoperability: zeep, the common SOAP client for Python, is made from the description and calls everything."""
 
+import time
 from typing import Any
 
 import pytest
@@ -18,6 +19,9 @@ _VALUES = {
     "GetPose": ("pose.position.x", "pose.orientation.w", "twist.linear.x"),
     "GetVelocity": ("linear.x", "angular.z"),
 }
+# How long odometry may be late before the robot is held to have none, s, and how often to ask meanwhile.
+_MOST_STALE_S = 2.0
+_AGAIN_S = 0.2
 
 
 def _has(result: Any, path: str) -> bool:
@@ -106,6 +110,11 @@ def test_subscribers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             ("GetPlan", plan or {"x": 0.0, "y": 0.0}),
         ):
             result, problem, exchange = client.call(operation, **arguments)
+            until = time.monotonic() + _MOST_STALE_S
+            while operation in _VALUES and problem.startswith("fault") and time.monotonic() < until:
+                # Odometry that is late for a moment is none, and is told by a fault, as REST tells it by 503.
+                time.sleep(_AGAIN_S)
+                result, problem, exchange = client.call(operation, **arguments)
             if problem.startswith("fault") and (operation == "GetGoal" or (operation == "GetPlan" and not plan)):
                 problem = ""
             elif not problem:

@@ -1,5 +1,6 @@
 """What the contract does not allow changes nothing: neither the velocity, nor the goal, nor what the robot delivers."""
 
+from functools import partial
 from typing import Any, Final
 
 import pytest
@@ -18,6 +19,7 @@ from conformance.robot.message_shapes import body_of
 from conformance.robot.probe.client import ProbeError, RosProbe
 from conformance.robot.robot import GOAL_PATH, LINEAR, STILL, VELOCITY, Robot
 from conformance.robot.soap_services import send_delivery
+from conformance.robot.standstill import Standstill
 from conformance.robot.stopping import bring_to_rest
 from conformance.soap.callable_services import SoapServices
 from conformance.soap.calls import call
@@ -27,6 +29,7 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.needs("rest"), pytest.mark.motion]
+_VELOCITY: Final = "strict-input/velocity-refused"
 _CORRECT: Final = ("3", "1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
 _BAD_PARTS: Final = (
     *((0, text) for text in ("0", "5", "abc", "", "3.5", "2147483648")),
@@ -45,10 +48,18 @@ def _put(robot: Robot, path: str, media_type: str, body: bytes) -> Exchange:
     return robot.rest.send("PUT", path, headers=(("Content-Type", media_type),), body=body)
 
 
-@pytest.mark.phase("motion")
-@pytest.mark.requirement("strict-input/velocity-refused")
-def test_an_invalid_velocity_moves_nothing(api: RestInterface, robot: Robot, judge: Judge) -> None:
+@pytest.mark.phase("standstill")
+@pytest.mark.requirement(_VELOCITY)
+def test_an_invalid_velocity_moves_nothing(api: RestInterface, robot: Robot, standstill: Standstill) -> None:
     """A robot at rest stays there, whatever is wrong with what it is sent."""
+    _try_velocities(api, robot, 0.0)
+    again = partial(_try_velocities, api, robot, robot.limits.settle_s)
+    standstill.tried(_VELOCITY, "rest after invalid velocities", again, seconds=robot.limits.settle_s)
+
+
+def _try_velocities(api: RestInterface, robot: Robot, watched_s: float) -> None:
+    """Send what is no velocity, and watch what follows for so long."""
+    judge = robot.judge
     fast = robot.share_of_limits(0.4, 0.4)
     drive = Drive(robot)
     sent: list[tuple[str, Exchange]] = []
@@ -59,7 +70,7 @@ def test_an_invalid_velocity_moves_nothing(api: RestInterface, robot: Robot, jud
                 bring_to_rest(api)
                 sent.clear()
     # In the settle time a robot that took the last of them after all would move.
-    drive.keep(robot.limits.settle_s)
+    drive.keep(watched_s)
     _judge_still(drive, judge, sent)
 
 
@@ -75,12 +86,7 @@ def _judge_still(drive: Drive, judge: Judge, sent: list[tuple[str, Exchange]]) -
     taken = [one for one in sent if one[1].response.status < 400]
     what, exchange = (taken or sent)[-1]
     return judge.check(
-        "strict-input/velocity-refused",
-        still is not False,
-        exchange,
-        f"rest after PUT {what}",
-        found=f"velocity {found}",
-        cause=what,
+        _VELOCITY, still is not False, exchange, f"rest after PUT {what}", found=f"velocity {found}", cause=what
     )
 
 
@@ -142,7 +148,7 @@ def _invalid_goals(near: Any, frame: str) -> list[tuple[str, dict[str, Any]]]:
     ]
 
 
-@pytest.mark.phase("delivery")
+@pytest.mark.phase("effect")
 @pytest.mark.requirement("strict-input/delivery-refused")
 def test_an_invalid_delivery_reaches_nobody(
     api: RestInterface, soap: SoapServices, probe: RosProbe, judge: Judge
@@ -174,18 +180,25 @@ def test_an_invalid_delivery_reaches_nobody(
         seen = [one.delivery for one in observer.collect(1)]
     except (NoObserverError, ProbeError) as nobody:
         pytest.skip(str(nobody))
-    if seen != [last]:
-        odd = next((one for one in seen if one != last), None)
-        guilty = next((one for one in exchanges if one.response.ok), exchanges[-1])
-        judge.check(
-            "strict-input/delivery-refused",
-            odd is None,
-            guilty,
-            "no message for an invalid delivery",
-            found=f"{len(seen) - 1} messages, among them {odd}",
-        )
+    if last not in seen:
+        judge.note("strict-input/delivery-refused", "judged by the answers alone: no valid delivery was seen to arrive")
         return
-    judge.check("strict-input/delivery-refused", True, exchanges[-1], "no message for an invalid delivery")
+    others = [one for one in seen if one != last]
+    # A robot may have other clients: one order that looks like none of ours may be theirs.
+    odd = [one for one in others if _is_of_ours(one)] or (others if len(others) > 1 else [])
+    judge.check(
+        "strict-input/delivery-refused",
+        not odd,
+        next((one for one in exchanges if one.response.ok), exchanges[-1]),
+        "no message for an invalid delivery",
+        found=f"{len(odd)} messages, among them {odd[0]}" if odd else "",
+    )
+
+
+def _is_of_ours(delivery: Delivery) -> bool:
+    """Whether a delivery was made of an invalid one, of which one value was wrong."""
+    same = sum(value == float(sent) for value, sent in zip(delivery[1:], _CORRECT[1:], strict=True))
+    return same >= len(_CORRECT) // 2
 
 
 def _invalid_soap(publishers: SoapService) -> list[Exchange]:

@@ -38,6 +38,7 @@ _NAMES = (
     "xinclude",
     "responsive",
 )
+_SPOOFING = "xml-security/addressing-spoofing"
 _IDS = tuple(f"xml-security/{name}" for name in _NAMES)
 _DEADLINE_S = 10.0
 # More than there are for any requirement.
@@ -80,52 +81,42 @@ def _runner(judge: Judge, service: SoapService, message: Node) -> AttackRunner:
     return AttackRunner(judge, send, ask, statistics.median(times))
 
 
-@pytest.mark.requirement(*_IDS)
+@pytest.mark.requirement(_SPOOFING, *_IDS)
 def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Each attack in a message that the robot would take without it, in the Body and in a Header block."""
+    """Each attack in a message that the robot would take without it, in the Body and in Header blocks."""
     if not soap.there:
-        return  # then the class is judged over REST alone
-    services = callable_services(soap, *_IDS)
+        # Then the class is judged over REST alone.
+        for id_ in (_SPOOFING, "xml-security/soapaction-spoofing"):
+            judge.unclaimed(id_, "the robot has no SOAP service")
+        return
+    services = callable_services(soap, _SPOOFING, *_IDS)
     with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
-        runners = []
+        runners: list[AttackRunner] = []
         for service in services:
             harmless = _harmless(service)
             if harmless is None:
                 for id_ in _IDS:
                     judge.skip(id_, f"the {service.name} service took none of the messages tried")
                 continue
-            message, marked, value = harmless
-            aside = Node(clark("urn:example:strange", "Note"), IGNORED_SLOT)
-            document = envelope([marked], (aside,)).written().decode()
-            template = Template(document, document[1:].split(" ", 1)[0], value)
-            runner = _runner(judge, service, message)
-            runners.append(runner)
-            for attack in attacks(template, callbacks.url, 1 if effort.factor < _HALF else _EACH, service.name):
-                runner.attack(attack)
-        judge_calls(judge, callbacks, runners)
-
-
-@pytest.mark.requirement("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
-def test_addressing(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Addresses in WS-Addressing headers are not called, whichever header names them."""
-    ids = ("xml-security/addressing-spoofing", "xml-security/no-callback", "xml-security/responsive")
-    if not soap.there:
-        for id_ in (ids[0], "xml-security/soapaction-spoofing"):
-            judge.unclaimed(id_, "the robot has no SOAP service")
-        return
-    services = callable_services(soap, *ids)
-    with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
-        runners = []
-        for service in services:
-            harmless = _harmless(service)
-            if harmless is None:
-                continue
-            runner = _runner(judge, service, harmless[0])
-            runners.append(runner)
+            # Addresses first: whoever calls them has time until the other attacks are over.
             spoofed = list(_spoofed(service, harmless[0], callbacks))
-            for attack in spoofed[: effort.cases(len(spoofed))]:
-                runner.attack(attack)
+            others = _attacks(service, harmless, callbacks, 1 if effort.factor < _HALF else _EACH)
+            for chosen in (spoofed[: effort.cases(len(spoofed))], others):
+                runners.append(_runner(judge, service, harmless[0]))
+                for attack in chosen:
+                    runners[-1].attack(attack)
         judge_calls(judge, callbacks, runners)
+
+
+def _attacks(
+    service: SoapService, harmless: tuple[Node, Node, str], callbacks: CallbackServer, each: int
+) -> Iterator[Attack]:
+    """By the XML of a harmless message: its parts and what is to be ignored beside them."""
+    _, marked, value = harmless
+    aside = Node(clark("urn:example:strange", "Note"), IGNORED_SLOT)
+    document = envelope([marked], (aside,)).written().decode()
+    template = Template(document, document[1:].split(" ", 1)[0], value)
+    yield from attacks(template, callbacks.url, each, service.name)
 
 
 def _spoofed(service: SoapService, message: Node, callbacks: CallbackServer) -> Iterator[Attack]:

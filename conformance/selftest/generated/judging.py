@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from conformance.contract.classes import Level
 from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import load_ledger
 from conformance.contract.statement import load_statement
@@ -75,12 +76,12 @@ def judge(
         tell: called as each is done.
     """
     claimed = tuple(load_statement(statement_of(pool.kind)).claimed())
-    blamed = _Blamed(claimed, seed)
+    blamed = _Blamed(seed)
 
     def one(mutant: GeneratedMutant) -> GeneratedResult:
         robot, proxy = pool.take()
         try:
-            return _judge(mutant, robot, proxy, efforts, seed, blamed)
+            return _judge(mutant, robot, proxy, efforts, seed, claimed, blamed)
         finally:
             pool.give(robot, proxy)
 
@@ -88,60 +89,74 @@ def judge(
 
 
 class _Blamed:
-    """What is said of the good robot itself by the same checks: nothing can be shown by that."""
+    """What is said of the good robot itself: nothing can be shown by that."""
 
-    def __init__(self, claimed: tuple[str, ...], seed: int) -> None:
-        self.claimed = claimed
+    def __init__(self, seed: int) -> None:
         self._seed = seed
-        self._known: dict[tuple[Attempt, str], frozenset[str]] = {}
+        self._known: dict[str, dict[str, bool]] = {}
         self._lock = threading.Lock()
 
-    def by(self, attempt: Attempt, robot: Robot, proxy: Proxy, effort: str) -> frozenset[str]:
-        """Requirements that blame the good robot; it is tried when an attempt first blames a mutant."""
+    def known(self, effort: str) -> frozenset[str]:
+        """Requirements that are known to blame the good robot."""
+        return frozenset(id_ for id_, blames in self._known.get(effort, {}).items() if blames)
+
+    def without(self, caught: tuple[str, ...], robot: Robot, proxy: Proxy, effort: str) -> tuple[str, ...]:
+        """Those of some requirements that blame a mutant and do not blame the good robot, which is tried for each."""
         with self._lock:
-            if (attempt, effort) not in self._known:
+            known = self._known.setdefault(effort, {})
+            if new := tuple(id_ for id_ in caught if id_ not in known):
                 proxy.change = unchanged
-                classes, requirements = attempt
-                job = job_for(robot, proxy, effort, self._seed, classes=classes, requirements=requirements)
-                outcome = run_job(job)
+                classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in new))
+                outcome = run_job(job_for(robot, proxy, effort, self._seed, classes=classes, requirements=new))
                 if outcome.exit_code < 0:
                     # Nothing is known of the good robot, so nothing is shown of the mutant.
-                    return frozenset(load_ledger(CONTRACT_DIR / "requirements.toml"))
-                self._known[attempt, effort] = frozenset(outcome.caught())
-            return self._known[attempt, effort]
+                    return ()
+                known |= {id_: id_ in outcome.caught() for id_ in new}
+        return tuple(id_ for id_ in caught if not known[id_])
 
 
 def _judge(
-    mutant: GeneratedMutant, robot: Robot, proxy: Proxy, efforts: tuple[str, ...], seed: int, blamed: _Blamed
+    mutant: GeneratedMutant,
+    robot: Robot,
+    proxy: Proxy,
+    efforts: tuple[str, ...],
+    seed: int,
+    claimed: tuple[str, ...],
+    blamed: _Blamed,
 ) -> GeneratedResult:
     result = GeneratedResult(mutant)
     tally = Tally()
+    ledger = load_ledger(CONTRACT_DIR / "requirements.toml")
+    musts = frozenset(id_ for id_, requirement in ledger.items() if requirement.level is Level.MUST)
     given_up = False
-    for effort in efforts:
-        for attempt in _attempts(mutant, blamed.claimed):
-            classes, requirements = attempt
-            proxy.change = mutant.make(tally)
-            outcome = run_job(job_for(robot, proxy, effort, seed, classes=classes, requirements=requirements))
-            result.runs += 1
-            result.seconds += outcome.seconds
-            result.effort, result.altered = effort, tally.altered
-            given_up = given_up or outcome.exit_code < 0
-            if proxy.broken:
-                result.outcome, result.reason = BROKEN, proxy.broken[0]
-                return result
-            if caught := outcome.caught():
-                _note(result, outcome, [id_ for id_ in caught if id_ not in blamed.by(attempt, robot, proxy, effort)])
-            if result.outcome == CAUGHT:
-                return result
+    waiting = [(effort, attempt) for effort in efforts for attempt in _attempts(mutant, claimed)]
+    while waiting:
+        effort, (classes, requirements) = waiting[0]
+        known = blamed.known(effort)
+        proxy.change = mutant.make(tally)
+        more = {"classes": classes, "requirements": requirements, "enough": musts - known}
+        outcome = run_job(job_for(robot, proxy, effort, seed, **more))
+        result.runs += 1
+        result.seconds += outcome.seconds
+        result.effort, result.altered = effort, tally.altered
+        given_up = given_up or outcome.exit_code < 0
+        if proxy.broken:
+            result.outcome, result.reason = BROKEN, proxy.broken[0]
+            return result
+        if shown := blamed.without(outcome.caught(), robot, proxy, effort):
+            _note(result, outcome, shown)
+            return result
+        # What ended the run blames the good robot as well, which is known by now: once more, to its end.
+        if not (outcome.fails & musts) - known:
+            waiting.pop(0)
     result.outcome = GIVEN_UP if given_up else SURVIVED if tally.altered else NOT_REACHED
     return result
 
 
-def _note(result: GeneratedResult, outcome: Outcome, by: list[str]) -> None:
-    if by:
-        result.outcome, result.by = CAUGHT, tuple(by)
-        result.fails = any(outcome.verdicts[id_] == "fail" for id_ in by)
-        result.reason = outcome.reasons.get(by[0], "")
+def _note(result: GeneratedResult, outcome: Outcome, by: tuple[str, ...]) -> None:
+    result.outcome, result.by = CAUGHT, by
+    result.fails = not outcome.fails.isdisjoint(by)
+    result.reason = outcome.reasons.get(by[0], "")
 
 
 def _attempts(mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Attempt]:

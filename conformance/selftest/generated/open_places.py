@@ -44,6 +44,10 @@ RULES = (
         "An error is JSON, whose media type has no charset parameter: one that is added has no effect (RFC 8259 11).",
     ),
     Rule(
+        r"reorder:[gG]et(Sensors|NavigationServices):answer(\.return)?:\w+",
+        "What is on the robot's graph has no order (contract.md#sensors-and-services).",
+    ),
+    Rule(
         r"status:\w+:(400|422)-4\d\d",
         "Input that is no JSON is 400 and of the wrong shape 422, and other 4xx conform too (contract.md#input-json).",
     ),

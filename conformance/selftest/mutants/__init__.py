@@ -8,6 +8,7 @@ from conformance.selftest.mutants import (
     equivalence,
     formats,
     goal,
+    holding,
     http_forms,
     http_messages,
     http_methods,
@@ -51,6 +52,7 @@ _SUBJECTS = (
     attacks,
     equivalence,
     safety,
+    holding,
     wsdl,
     describe,
 )

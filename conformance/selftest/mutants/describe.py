@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from copy import deepcopy
 from typing import Any
 
 from conformance.selftest.mutants.changes import SENSORS, Make, altered, instead, plain, problem, rest, text, values
@@ -48,6 +49,13 @@ def _lost(name: str, attribute: str, pattern: str) -> Make:
     return altered(_WADL, tree(each(name, edit)))
 
 
+def _promised_twice(resource: Any) -> None:
+    """Beside a resource the WADL has another one, which is not there."""
+    other = deepcopy(resource)
+    other.set("path", "/robot/arm/")
+    resource.getparent().append(other)
+
+
 _mutant = of_class("describe", "rest")
 
 MUTANTS = (
@@ -73,6 +81,12 @@ MUTANTS = (
     ),
     _mutant("wadl-gone", "There is no /application.wadl.", "wadl", instead(_WADL, problem(404, "no description"))),
     _mutant("wadl-broken", "/application.wadl is not closed.", "wadl", altered(_WADL, text(r"</[\w:]+>\s*$", ""))),
+    _mutant(
+        "wadl-promises",
+        "/application.wadl has a resource that is not there.",
+        "wadl-behaviour",
+        altered(_WADL, tree(each("resource", _promised_twice, slice(0, 1)))),
+    ),
     _mutant(
         "wadl-without-resource",
         "/application.wadl lacks a resource.",

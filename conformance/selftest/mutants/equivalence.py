@@ -130,7 +130,18 @@ _soap_state = of_class("equivalence", "soap")
 _NO_GOAL = enveloped(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
 
 
+def _cut(request: Request) -> None:
+    """A number ends where a comment stands in it, as for who reads the first text node alone."""
+    request.body = re.sub(rb"(>[^<>]+)<!--[^>]*-->[^<>]+<", rb"\1<", request.body)
+
+
 MUTANTS = (
+    _soap_delivery(
+        "same-soap-cut-by-comments",
+        "Of a number with a comment in it, SOAP delivers what stands before the comment.",
+        "delivery-soap",
+        rewritten(_DELIVERY, _cut),
+    ),
     _rest_delivery("same-rest-doubled", "A REST delivery is published twice.", "delivery-rest", doubled(deliveries)),
     _rest_delivery(
         "same-rest-again-later",

@@ -1,11 +1,21 @@
-"""Robots that take a request in one form and not in another that says the same."""
+"""Robots that take a request in one form and not in another that says the same, or one that nobody has."""
 
 import re
 import threading
 from collections.abc import Callable
 
-from conformance.selftest.messages import Forward, Request, Response
-from conformance.selftest.mutants.changes import altered, anything, header, instead, problem, rest, rewritten
+from conformance.selftest.messages import Change, Forward, Request, Response, unchanged
+from conformance.selftest.mutants.changes import (
+    altered,
+    anything,
+    deliveries,
+    header,
+    instead,
+    plain,
+    problem,
+    rest,
+    rewritten,
+)
 from conformance.selftest.mutants.mutant import of_class
 
 _HEAD = rest("HEAD")
@@ -28,6 +38,27 @@ def _written(pattern: bytes) -> Callable[[Request], bool]:
 def _upper(name: str) -> Callable[[Request], bool]:
     """Requests with a field that has capital letters."""
     return _having(lambda request: (request.field(name) or "").lower() != (request.field(name) or ""))
+
+
+def _came(pattern: bytes) -> Callable[[Request], bool]:
+    """Requests in whose octets, as they came, something stands."""
+    compiled = re.compile(pattern)
+    return _having(lambda request: bool(compiled.search(b"".join(request.came))))
+
+
+def _forgetting(where: Callable[[Request], bool], *names: str) -> Callable[[], Change]:
+    """Requests without some of their fields."""
+
+    def forget(request: Request) -> None:
+        for name in names:
+            request.drop(name)
+
+    return rewritten(where, forget)
+
+
+def _first_line(request: Request) -> None:
+    if first := request.field("Accept"):
+        request.put("Accept", first)
 
 
 _chunked = _having(lambda request: request.field("Transfer-Encoding") is not None)
@@ -53,8 +84,83 @@ class _Hundred:
         return forward(request)
 
 
+def _kept(request: Request, forward: Forward) -> Response:
+    """Nobody, the proxy neither, sees that the client asks for the end of the connection."""
+    if request.side == "rest":
+        request.drop("Connection")
+    return forward(request)
+
+
+def _in_chunks(response: Response) -> None:
+    """An answer in one chunk, whoever asked."""
+    head = f"HTTP/1.1 {response.status} OK\r\nContent-Type: {response.media_type}\r\nTransfer-Encoding: chunked\r\n\r\n"
+    response.raw = head.encode() + b"%x\r\n%b\r\n0\r\n\r\n" % (len(response.body), response.body)
+
+
 MUTANTS = (
+    _mutant(
+        "http-no-chunk-extensions",
+        "A chunk with an extension is 400.",
+        "chunk-forms",
+        instead(_came(rb"\r\n[0-9a-f]+;[^\r]*\r\n"), problem(400, "no chunk size")),
+    ),
+    _mutant(
+        "http-no-trailers",
+        "Trailer fields are 400.",
+        "chunk-forms",
+        instead(_came(rb"\r\n0\r\n[^\r]"), problem(400, "no end of the chunks")),
+    ),
+    _mutant(
+        "http-expectation-failed",
+        "Expect: 100-continue is 417.",
+        "expect-continue",
+        instead(_came(rb"(?i)\r\nexpect: *100"), problem(417, "no")),
+    ),
+    _mutant(
+        "http-one-segment",
+        "A head that does not come in one piece is 400.",
+        "octet-stream",
+        instead(_having(lambda request: b"\r\n\r\n" not in request.came[0]), problem(400, "no end of the head")),
+    ),
+    _mutant(
+        "http-names-in-lower-case",
+        "A field whose name is not written as usual is not seen.",
+        "field-forms",
+        _forgetting(_came(rb"\r\n(?:accept|ACCEPT|aCCept):"), "Accept"),
+    ),
+    _mutant(
+        "http-one-blank",
+        "A field without one blank behind its colon is not seen.",
+        "field-forms",
+        _forgetting(_came(rb"\r\n[aA][cC]+ept:(?! [^ ])"), "Accept"),
+    ),
+    _mutant(
+        "http-first-line",
+        "Of several Accept lines the first one counts.",
+        "field-lines",
+        rewritten(_having(lambda request: request.field("Accept") is not None), _first_line),
+    ),
+    _mutant("http-stays-open", "Connection: close is not heeded.", "close", lambda: _kept),
+    _mutant(
+        "http-old-client-chunks",
+        "A client of HTTP/1.0 is answered in chunks.",
+        "old-client",
+        altered(_having(lambda request: request.version == "HTTP/1.0"), _in_chunks),
+    ),
     _mutant("http-hundred-requests", "On one connection a hundred requests are answered.", "many-requests", _Hundred),
+    _mutant(
+        "http-pipelining-forgotten",
+        "Of requests that were sent at once, the first alone is answered, and the connection stays open.",
+        "pipelining",
+        lambda: unchanged,
+        forgetful=True,
+    ),
+    _mutant(
+        "http-head-of-what-cannot-be-read",
+        "HEAD of a delivery is answered 200, though GET is 405.",
+        "method-not-allowed",
+        instead(_having(lambda request: _HEAD(request) and deliveries(request.copy(method="PUT"))), plain(200)),
+    ),
     _mutant(
         "http-no-chunks", "Chunked content is 411.", "chunked", instead(_chunked, problem(411, "a length, please"))
     ),

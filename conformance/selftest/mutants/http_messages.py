@@ -286,7 +286,7 @@ MUTANTS = (
     _mutant(
         "http-token-forbidden",
         "Without the token, the answer is 403.",
-        "authentication",
+        "authentication-asked",
         _token(problem(403, "no token")),
         token=_SESAME,
     ),

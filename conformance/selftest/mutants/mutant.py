@@ -23,6 +23,7 @@ class Mutant:
         token: bearer token that the robot wants, or empty.
         serial: whether the robot takes the next request only when the one before is complete.
         backwards: whether of two requests that were sent at once on one connection the second is answered first.
+        forgetful: whether of requests that were sent at once on one connection the first alone is answered.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Mutant:
     token: str = ""
     serial: bool = False
     backwards: bool = False
+    forgetful: bool = False
 
 
 def of_class(class_: str, interface: str, **common: Any) -> Callable[..., Mutant]:

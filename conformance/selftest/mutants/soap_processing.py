@@ -120,6 +120,15 @@ _NOTHING = f'<t:NothingResponse xmlns:t="{TNS}"/>'
 _mutant = of_class("soap-basic-profile", "soap")
 
 MUTANTS = (
+    _mutant(
+        "bp-bare-envelope",
+        "An Envelope with an attribute of another namespace is a fault.",
+        "soap-delivery/syntax",
+        instead(
+            lambda request: posted(request) and bool(re.search(rb"Envelope [^>]*:Id=", request.body)),
+            fault("Client", "an attribute that is not known"),
+        ),
+    ),
     _mutant("bp-any-envelope", "An Envelope of any namespace is taken.", "R1015", rewritten(_foreign, _made_soap11)),
     _mutant(
         "bp-version-client",

@@ -147,6 +147,15 @@ MUTANTS = (
             problem(415, "text/xml, please"),
         ),
     ),
+    _mutant(
+        "bp-quoted-charset",
+        "A charset in quotation marks is 415.",
+        "charset-forms",
+        instead(
+            lambda request: posted(request) and '"' in (request.field("Content-Type") or ""),
+            problem(415, "text/xml, please"),
+        ),
+    ),
     _mutant("bp-fault-200", "Faults are 200.", "R1126", _faults(becomes(200))),
     _mutant("bp-fault-400", "Faults are 400.", "R1126", _faults(becomes(400))),
     _mutant(

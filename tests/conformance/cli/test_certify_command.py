@@ -25,7 +25,7 @@ _INDEPENDENT_ROBOTS = Path(selftest.__file__).parent / "independent_robots"
 
 def _certify(tmp_path, *arguments):
     command = [sys.executable, "-m", "roaas", "certify", *arguments, "--out", str(tmp_path / "out")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert "Traceback" not in done.stdout + done.stderr
     result = tmp_path / "out" / "result.json"
     return done, json.loads(result.read_text(encoding="utf-8")) if result.exists() else None
@@ -34,7 +34,7 @@ def _certify(tmp_path, *arguments):
 def test_a_closed_port_is_not_reached(tmp_path, closed_port):
     done, result = _certify(tmp_path, "--rest", closed_port, "--profile", "full")
     assert done.returncode == 3
-    assert "could not be reached" in done.stderr
+    assert done.stderr.startswith("error: the robot could not be reached"), "nothing stands before the reason"
     assert closed_port.removeprefix("http://127.0.0.1:") in result["target"]["rest"]
     assert {item["verdict"] for item in result["requirements"]} == {"error"}
 
@@ -128,12 +128,12 @@ def test_wrong_usage_is_told_by_name(tmp_path, arguments, named):
 def test_a_first_statement_is_written_and_can_be_used(tmp_path, web_server):
     statement = tmp_path / "robot.toml"
     command = [sys.executable, "-m", "roaas", "certify", "--init", str(statement), "--rest", web_server]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     done, result = _certify(tmp_path, str(statement), "--effort", "quick")
     assert done.returncode == 1
     assert result["target"]["rest"] == web_server
-    again = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    again = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert again.returncode == 2
     assert "exists already" in again.stderr
 
@@ -167,7 +167,7 @@ def _broken_off(tmp_path, where, break_off):
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
         _until(run, "motion:")
         break_off(run)
-        said, errors = run.communicate(timeout=60)
+        said, errors = run.communicate(timeout=240)
     assert "Traceback" not in said + errors
     return run.returncode, json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
 
@@ -202,7 +202,7 @@ def test_the_suite_runs_in_somebody_elses_project(tmp_path):
     with _independent_robot("plain") as (_, rest, _):
         command = [sys.executable, "-m", "pytest", "-q", "-p", "roaas_pytest", "--pyargs", "conformance", "test_own.py"]
         command += ["--robot-rest", rest, "--robot-class", "rest-formats", "--robot-effort", "quick"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stdout
     assert "passed" in done.stdout
 

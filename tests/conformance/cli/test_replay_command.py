@@ -1,13 +1,16 @@
 """``roaas replay`` sends a finding's requests again, in order, and says whether it is still there."""
 
+import base64
 import json
 import threading
+import zlib
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 from click.testing import CliRunner
 
 from conformance.contract.files import CONTRACT_VERSION
+from conformance.engine.permission import moves
 from conformance.engine.sequence import read_request, written
 from conformance.transport.exchange import Request
 from conformance.verdict.evidence import Sent
@@ -86,7 +89,8 @@ def _replay(*arguments):
 def test_a_finding_is_still_there_until_it_is_repaired(robot, tmp_path):
     (tmp_path / "token").write_text("sesame\n", encoding="utf-8")
     result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}")
-    arguments = (result, "--allow-motion", "--token-file", str(tmp_path / "token"))
+    base = f"HTTP://127.0.0.1:{robot.server_port}/elsewhere"
+    arguments = (result, "--allow-motion", "--token-file", str(tmp_path / "token"), "--token-for", base)
     there = _replay(*arguments)
     assert (there.exit_code, there.output.split(":")[0]) == (1, "still there")
     assert robot.asked == [("PUT", "/a?b=%20", b"\x00body", "Bearer sesame"), ("GET", "/a?b=%20", b"", "Bearer sesame")]
@@ -113,11 +117,13 @@ def test_what_an_answer_shows_by_itself_is_judged_as_in_the_run(robot, tmp_path)
     }
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
     (tmp_path / "robot.toml").write_text(f'[endpoints]\nrest = "{base}"\n', encoding="utf-8")
-    by_checks = (str(tmp_path), "--statement", str(tmp_path / "robot.toml"))
+    (tmp_path / "token").write_text("sesame", encoding="utf-8")
+    by_checks = (str(tmp_path), "--statement", str(tmp_path / "robot.toml"), "--token-file", str(tmp_path / "token"))
     there, checked = _replay(str(tmp_path)), _replay(*by_checks)
     assert (there.exit_code, checked.exit_code) == (1, 1)
     assert "judged as in the run" in there.output
     assert "still there: http/date: " in checked.output
+    assert robot.asked[-1][3] == "Bearer sesame"
     robot.repaired = True
     gone, checked = _replay(str(tmp_path)), _replay(*by_checks)
     assert (gone.exit_code, checked.exit_code) == (0, 0), (gone.output, checked.output)
@@ -129,6 +135,81 @@ def test_what_moves_the_robot_asks_first(robot, tmp_path):
     refused = _replay(_result(tmp_path, f"http://127.0.0.1:{robot.server_port}"))
     assert (refused.exit_code, robot.asked) == (2, [])
     assert "--allow-motion" in refused.output
+
+
+@pytest.mark.parametrize(
+    "others", [[], ["http://127.0.0.1:1"], ["http://localhost:{port}"], ["https://127.0.0.1:{port}"]]
+)
+def test_the_token_goes_to_no_address_that_the_user_did_not_name(robot, tmp_path, others):
+    (tmp_path / "token").write_text("sesame", encoding="utf-8")
+    result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}", ("GET",))
+    trusted = [part for url in others for part in ("--token-for", url.format(port=robot.server_port))]
+    refused = _replay(result, "--token-file", str(tmp_path / "token"), *trusted)
+    assert (refused.exit_code, robot.asked) == (2, [])
+    assert f"--token-for http://127.0.0.1:{robot.server_port}" in refused.output
+
+
+def _moves(method="GET", headers=(), body=b"", raw=None):
+    (item,) = written([Sent(0.0, Request(method, "http://r2/", headers, body, raw))])
+    return moves({"sequence": [item]})
+
+
+def _soap(operation):
+    inside = f'<t:{operation} xmlns:t="http://soap.turtlebot.mybot.org/"/>'
+    return f'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body>{inside}</e:Body></e:Envelope>'.encode()
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        b"GET / HTTP/1.1\r\nHost: r2\r\n\r\nPUT /robot/velocity/ HTTP/1.1\r\nHost: r2\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: r2\r\nContent-Length: 1\r\n\r\nxDELETE /a/ HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\n\npost\t/a HTTP/1.1\n\n",
+        b"PATCH / HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\nX-HTTP-Method-Override: PUT\r\n\r\n",
+    ],
+)
+def test_octets_that_hold_another_request_move_the_robot(raw):
+    assert _moves(raw=raw)
+
+
+def test_what_moves_is_told_by_what_is_sent():
+    heads = b"GET /a HTTP/1.1\r\nHost: r2\r\n\r\nHEAD /b HTTP/1.1\r\nHost: r2\r\n\r\n"
+    assert not any((_moves(), _moves("HEAD"), _moves(raw=heads), _moves("POST", body=_soap("GetPose"))))
+    assert _moves(headers=(("X-HTTP-Method-Override", "PUT"),))
+    assert _moves("POST", body=_soap("ExecuteDeliveryRequest"))
+    assert _moves("POST", body=_soap("GetPose").replace(b"</e:Body>", b"<x/></e:Body>"))
+    assert _moves("POST", body=b"<")
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"method": "GET / HTTP/1.1\r\nPUT"},
+        {"url": "http://r2/ HTTP/1.1\r\nPUT /"},
+        {"url": "file:///etc/passwd"},
+        {"headers": [["A", "b\r\nX: y"]]},
+        {"headers": [["A\r\nX", "y"]]},
+        {"body": base64.b64encode(zlib.compress(bytes(26 * 1024 * 1024))).decode()},
+        {"body": base64.b64encode(zlib.compress(b"whole")[:-2]).decode()},
+        {"body": base64.b64encode(b"no deflate").decode()},
+    ],
+)
+def test_a_sequence_that_no_run_wrote_is_refused(part):
+    (item,) = written([Sent(0.0, Request("GET", "http://r2/"))])
+    with pytest.raises(ValueError, match=r"no part|cut short|Error -3"):
+        read_request({**item, **part})
+
+
+def test_a_bomb_in_a_result_is_wrong_usage(robot, tmp_path):
+    result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}", ("GET",))
+    document = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    bomb = base64.b64encode(zlib.compress(bytes(60 * 1024 * 1024))).decode()
+    document["requirements"][0]["failures"][0]["sequence"][0]["body"] = bomb
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    refused = _replay(result)
+    assert (refused.exit_code, robot.asked) == (2, [])
+    assert "no well-made" in refused.output
 
 
 @pytest.mark.parametrize("requirement", ["http/head", "http/no-such"])

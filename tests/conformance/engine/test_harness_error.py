@@ -12,6 +12,7 @@ from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.rest import calls
 from conformance.robot import delivery, delivery_messages
 from conformance.selftest.robots import running
+from conformance.transport import raw
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
@@ -55,12 +56,18 @@ def _without_an_element(monkeypatch):
     monkeypatch.setattr(delivery_messages, "delivery", wrong)
 
 
+def _cut_short(monkeypatch):
+    make = raw.chunked
+    monkeypatch.setattr(raw, "chunked", lambda body, size: make(body, size)[:-2])
+
+
 @pytest.mark.parametrize(
     ("mistake", "requirement"),
     [
         (_misspelt, "http/charset"),
         (_with_letters, "rest-delivery/put"),
         (_without_an_element, "soap-delivery/delivery"),
+        (_cut_short, "http/chunked"),
     ],
 )
 def test_a_mistake_of_the_suite_s_own_is_no_failure(statement, tmp_path, monkeypatch, mistake, requirement):

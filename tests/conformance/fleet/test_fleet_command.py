@@ -54,7 +54,7 @@ def test_each_robot_has_its_end_whatever_the_others_do(tmp_path, web_server, clo
     old.write_text('{"verdict": "conformant"}')
     options = ["--parallel", "3", "--class", "rest-resources", "--effort", "quick", "--timeout", "30"]
     options += ["--sign", str(tmp_path / "keys" / PRIVATE_NAME)]
-    done = subprocess.run(command(fleet, *options), capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command(fleet, *options), capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 1, done.stderr
     found = {robot["name"]: robot for robot in read_fleet(tmp_path / "out" / "fleet.json")["robots"]}
     assert {name: robot["outcome"] for name, robot in found.items()} == {

@@ -54,6 +54,11 @@ def test_good_answers_raise_no_alarm():
         ("GET", "/robot//pose/", 404, b"<html>"),
         ("GET", "/elsewhere", 404, b"<html>"),
         ("GET", "/robot/pose/", 406, b""),
+        ("PUT", "/robot/app/delivery/3%2F4/depot_x/1", 404, b"<html>"),
+        ("PUT", "/robot/app/delivery/3%00/depot_x/1", 400, b"<html>"),
+        ("PUT", "/robot/app/delivery/3;a=b/depot_x/1", 400, b"<html>"),
+        ("GET", "/robot/navigation/service/plan?x=[1]&y=0", 400, b"<html>"),
+        ("GET", "/robot/navigation/service/plan?x=%&y=0", 400, b"<html>"),
     ],
 )
 def test_what_a_server_answers_by_itself_need_not_be_a_problem(method, path, status, body):

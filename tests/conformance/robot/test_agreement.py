@@ -38,3 +38,11 @@ def test_what_is_made_anew_is_compared_without_its_stamps():
     poses = {"poses": [_pose(1.0), _pose(2.0)]}
     assert unstamped(poses) == unstamped({"poses": [_pose(1.0, sec=5), _pose(2.0, sec=6)]})
     assert unstamped(poses)["poses"][1] == {"header": {}, "pose": {"x": 2.0, "covariance": [2.0, 0.0]}}
+
+
+def test_a_quaternion_and_its_negative_are_one_orientation():
+    one = {"orientation": {"x": 0.0, "y": 0.0, "z": 0.6, "w": 0.8}}
+    other = {"orientation": {"x": -0.0, "y": -0.0, "z": -0.6, "w": -0.8}}
+    wrong = {"orientation": {"x": 0.0, "y": 0.0, "z": -0.6, "w": 0.8}}
+    assert disagreement(one, other, one, Slack()) == disagreement(other, one, one, Slack()) == ""
+    assert disagreement(one, wrong, one, Slack())

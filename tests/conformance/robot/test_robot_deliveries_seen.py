@@ -6,6 +6,7 @@ from itertools import count
 
 import pytest
 from hypothesis import given, settings
+from lxml import etree
 
 from conformance.contract.files import CONTRACT_DIR
 from conformance.documents.wsdl import read_file
@@ -64,8 +65,11 @@ class Robot:
         return Exchange(Request(method, "http://robot" + path), Response(204, (), b"", 1.0))
 
     def post(self, body, **_):
-        values = dict(re.findall(rb"<(\w+)>([^<]+)</\w+>", body))
-        named = {name.decode(): float(value) for name, value in values.items()}
+        # In whatever style it is written: comments, CDATA and white space say nothing.
+        texts = {
+            etree.QName(each).localname: "".join(each.xpath("text()")) for each in etree.fromstring(body).iter("*")
+        }
+        named = {name: float(texts[name]) for name in Delivery._fields}
         named["message_code"] = int(named["message_code"])
         self._arrive("soap", Delivery(**named))
         return Exchange(Request("POST", "http://robot/soap", (), body), Response(200, (), b"", 1.0))

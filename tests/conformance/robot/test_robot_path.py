@@ -75,6 +75,60 @@ def test_what_nobody_saw_is_not_judged():
     assert not judge.refuted()
 
 
+def _held_up(w, at, lost, change=lambda pose: pose, rest=0):
+    """A robot at rest for so many readings, then on a turn; its own process stands still for 0.4 s, ``at`` in the turn.
+
+    Its clock goes on meanwhile, readings go on showing the last sample, and ``lost`` of the way is not made.
+    """
+    trace, measured = drive(0.0, w, _START, seconds=1.5)
+    still = [
+        replace(trace[0], sent=-i / 50, received=-i / 50, stamp=trace[0].stamp - i / 50) for i in range(rest, 0, -1)
+    ]
+    before, after = trace[:at], trace[at:]
+    same = [replace(before[-1], sent=before[-1].sent + i / 50, received=before[-1].sent + i / 50) for i in range(1, 20)]
+    later = [
+        replace(
+            one,
+            sent=one.sent + 0.4,
+            received=one.received + 0.4,
+            stamp=one.stamp + 0.4,
+            pose=one.pose._replace(yaw=wrapped(one.pose.yaw + 0.4 * w * (1 - lost))),
+        )
+        for one in after
+    ]
+    found = [replace(one, pose=change(one.pose)) for one in (*still, *before, *same, *later)]
+    return found, [Velocity()] * rest + measured[:at] + [measured[0]] * len(same) + measured[at:]
+
+
+@pytest.mark.parametrize("at", [5, 20, 37, 50, 70])
+@pytest.mark.parametrize("lost", [0.0, 0.75, 1.0])
+@pytest.mark.parametrize("rest", [0, 100])
+def test_odometry_that_was_held_up_once_fails_nobody(at, lost, rest):
+    judge = Judge(_IDS)
+    judge_path(judge, *_held_up(2.5, at, lost, rest=rest), Noise())
+    assert judge.evidence["rest-resources/pose-rotation"].cases
+    assert not judge.refuted()
+
+
+@pytest.mark.parametrize("at", [5, 37, 70])
+def test_odometry_that_was_held_up_once_excuses_nobody(at):
+    judge = Judge(_IDS)
+    judge_path(judge, *_held_up(1.2, at, 0.0, lambda pose: pose._replace(yaw=0.7 * pose.yaw), rest=100), Noise())
+    assert judge.refuted()
+
+
+def test_one_jump_while_many_readings_show_a_robot_at_rest_fails_nobody():
+    trace, measured = drive(0.5, 0.0, _START)
+    still = [
+        replace(trace[0], sent=-i / 50, received=-i / 50, stamp=trace[0].stamp - i / 50) for i in range(200, 0, -1)
+    ]
+    moved = [one if i < 5 else replace(one, pose=one.pose._replace(y=one.pose.y + 0.2)) for i, one in enumerate(trace)]
+    judge = Judge(_IDS)
+    judge_path(judge, still + moved, [Velocity()] * len(still) + measured, Noise())
+    assert judge.evidence["rest-resources/pose-motion"].cases
+    assert not judge.refuted()
+
+
 def test_a_robot_that_did_not_move_is_not_judged():
     judge = Judge(_IDS)
     judge_path(judge, *drive(0.0, 0.0, Pose(0, 0, 0)), Noise())

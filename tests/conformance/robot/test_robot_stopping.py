@@ -1,10 +1,8 @@
 import json
-import threading
 import time
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
+from toy_body import serving
 
 from conformance.rest.interface import RestInterface
 from conformance.robot.stopping import bring_to_rest, leave_at_rest
@@ -47,34 +45,6 @@ class Heard(Listener):
         self.exchanges.append(exchange)
 
     unanswered = answered
-
-
-@contextmanager
-def serving(body: Body):
-    class Handler(BaseHTTPRequestHandler):
-        protocol_version = "HTTP/1.1"
-        wbufsize = -1
-
-        def _do(self) -> None:
-            sent = self.rfile.read(int(self.headers.get("Content-Length") or 0))
-            status, value = body.answer(self.command, self.path, sent)
-            content = b"" if value is None else json.dumps(value).encode()
-            self.send_response(status)
-            self.send_header("Content-Type", "application/json")
-            self.send_header("Content-Length", str(len(content)))
-            self.end_headers()
-            self.wfile.write(content)
-
-        do_GET = do_PUT = do_DELETE = _do  # noqa: N815 - http.server's names
-
-        def log_message(self, *_: object) -> None:
-            return
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    server.server_close()
 
 
 def api(url: str, *, motion: bool = True, timeout_s: float = 10.0) -> RestInterface:

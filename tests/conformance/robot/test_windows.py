@@ -148,9 +148,40 @@ def test_half_as_long_again_is_too_long_where_samples_are_frequent():
     assert let_go(1.5).late(_LIMITS)
 
 
+def in_silence(holds: float, hz: float = 50, seed: int | None = None) -> LetGo:
+    """The same, and nobody asked from 0.95 s on until it had to have begun to end."""
+    whole = let_go(holds, hz, seed=seed)
+    before = tuple(one for one in whole.turns if one.at < 0.95)
+    until = LetGo(_FAST, 0.0, 0.02, before).longest(_LIMITS) + 0.02
+    behind = tuple(one for one in whole.turns if one.at > until)
+    return LetGo(_FAST, 0.0, 0.02, before + behind, len(before))
+
+
+@few
+@given(rates, st.floats(1.0, 1.15), seeds)
+def test_a_robot_that_ends_while_nobody_asks_is_not_blamed(hz, holds, seed):
+    seen = in_silence(holds, hz, seed)
+    assert (seen.early(_LIMITS), seen.late(_LIMITS), seen.is_void(_LIMITS)) == (None, None, False)
+    assert seen.rests(_LIMITS)
+
+
+@pytest.mark.parametrize("hz", [20, 50])
+def test_a_robot_that_ends_only_when_it_is_asked_is_seen(hz):
+    late = in_silence(1.9, hz).late(_LIMITS)
+    assert late is not None
+    assert late.at > 1.4
+
+
 def test_readings_far_apart_say_nothing_of_the_hold_time():
     assert not let_go(1.0).is_void(_LIMITS)
     assert let_go(1.0, begins=0.4).is_void(_LIMITS)
+
+
+def test_a_velocity_that_was_not_looked_at_in_its_time_was_not_seen_to_hold():
+    assert let_go(1.0).was_held(_LIMITS)
+    assert let_go(1.0, begins=0.6).was_held(_LIMITS)
+    assert not let_go(1.0, begins=0.97).was_held(_LIMITS)
+    assert not let_go(0.0, begins=0.5).was_held(_LIMITS)
 
 
 def way(factor: float, seed: int, *, jump: int | None = None, hz: float = 10) -> set[str]:

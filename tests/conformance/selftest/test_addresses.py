@@ -15,6 +15,8 @@ def test_addresses_in_bodies_and_fields_are_the_proxys():
 def test_a_prefix_is_taken_off_and_put_on():
     assert PREFIXED.inward(Request("rest", "GET", "/api/x")).target == "/x"
     assert PREFIXED.inward(Request("rest", "GET", "/x")) is None
+    assert PREFIXED.inward(Request("rest", "GET", "http://p:3/api/x?y=http://z/")).target == "/x?y=http://z/"
+    assert PREFIXED.inward(Request("rest", "GET", "http://p:3/x")) is None
     assert PREFIXED.outward(Response(201, [("Location", "/x")])).field("Location") == "/api/x"
     assert PREFIXED.public("rest") == "http://p:3/api"
 

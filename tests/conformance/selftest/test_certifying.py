@@ -43,3 +43,13 @@ def test_a_run_that_takes_too_long_is_given_up_and_has_caught_nothing(listening)
 def test_fail_and_warn_count_as_caught():
     verdicts = {"a": "pass", "b": "fail", "c": "warn", "d": "skip", "e": "error"}
     assert Outcome(1, verdicts, {}, 1, 1.0).caught() == ("b", "c")
+
+
+def test_no_further_check_begins_once_enough_is_known(tmp_path):
+    run = robot_of(job(enough=frozenset({"http/date"})), tmp_path).run
+    run.judge.check("http/date", True, None, "a date")
+    run.judge.check("http/head", False, None, "no content")
+    assert not run.aborted
+    run.judge.check("http/date", False, None, "a date")
+    assert run.aborted.startswith("http/date has failed")
+    assert run.judge.refuted() == {"http/head": 1, "http/date": 1}

@@ -9,6 +9,7 @@ from conformance.contract.files import Contract
 from conformance.documents import wsdl
 from conformance.documents.openapi import operations_of
 from conformance.selftest.certifying import Outcome
+from conformance.selftest.comparison import SchemathesisResult
 from conformance.selftest.generated import judging
 from conformance.selftest.generated.catalogue import every_change, generated_mutants
 from conformance.selftest.generated.judging import CAUGHT, GIVEN_UP, NOT_REACHED, GeneratedResult, judge
@@ -159,3 +160,29 @@ def test_five_mutants_are_caught_and_one_that_alters_nothing_is_told_apart():
     assert rates_by(results, "class")["rest-resources"] == Rate(3, 0, 1)
     assert document(results, 0)["all"]["rate"] == 1.0
     assert "5 of 5 (100.0%, at least 56.6%), 1 not reached" in summary(results)
+    report = Report("plain", generated_results=results, seed=7)
+    report.compared = [SchemathesisResult(names[0], caught=True, findings=()), SchemathesisResult(names[2], False, ())]
+    page = report.matrix()
+    assert "--generated 6 --seed 7 --target plain" in page
+    assert "| `rest-resources` | 3 | 3 | 100.0% |" in page
+    assert "this suite: 2 of 2" in page
+    assert "plain Schemathesis: 1 of 2" in page
+
+
+def test_what_is_known_to_blame_the_good_robot_shows_nothing(monkeypatch):
+    mutant, jobs = named("status:getSensors:200-500"), []
+
+    def blames(job):
+        """Blame every robot for one requirement, and end a run for which that is enough."""
+        jobs.append(job)
+        return Outcome(1, {"rest-resources/sensors-type": "fail"}, {}, 9, 0.1)
+
+    monkeypatch.setattr(judging, "run_job", blames)
+    with RobotPool("plain", 1, 0) as pool:
+        (result,) = judge(pool, [mutant], efforts=("quick",), tell=lambda _: None)
+    assert (result.outcome, result.by) == (NOT_REACHED, ())
+    enough = [job.enough for job in jobs if job.enough]
+    assert "rest-resources/sensors-type" in enough[0]
+    assert not any("rest-resources/sensors-type" in later for later in enough[1:])
+    # The run that was ended by it is run again, to its end.
+    assert (jobs[0].requirements, jobs[0].classes) == (jobs[2].requirements, jobs[2].classes)

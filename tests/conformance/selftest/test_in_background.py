@@ -11,7 +11,7 @@ from conformance.selftest.wire import IncompleteMessageError
 def test_it_is_done_with_its_arguments():
     done, given = threading.Event(), []
     later(0.01, lambda *arguments: (given.extend(arguments), done.set()), 1, "b")
-    assert done.wait(5)
+    assert done.wait(30)
     assert given == [1, "b"]
 
 
@@ -26,7 +26,7 @@ def test_a_run_that_is_over_is_nobodys_business(error, monkeypatch):
 
     before = set(threading.enumerate())
     later(0, act)
-    assert raised.wait(5)
+    assert raised.wait(30)
     for thread in set(threading.enumerate()) - before:
         thread.join(5)
     assert told == []

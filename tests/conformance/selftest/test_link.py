@@ -60,7 +60,7 @@ def target():
 @pytest.fixture
 def ends(target):
     """Both ends of one connection over a link."""
-    with linked(QUICK, 1, target.getsockname()) as (address,), socket.create_connection(address, timeout=10) as client:
+    with linked(QUICK, 1, target.getsockname()) as (address,), socket.create_connection(address, timeout=30) as client:
         robot, _ = target.accept()
         robot.settimeout(10)
         with robot:
@@ -97,7 +97,7 @@ def test_where_nobody_listens_the_connection_is_broken_off(target):
     target.close()
     with (
         linked(QUICK, 1, nowhere) as (address,),
-        socket.create_connection(address, timeout=10) as client,
+        socket.create_connection(address, timeout=30) as client,
         pytest.raises(ConnectionResetError),
     ):
         client.recv(1)

@@ -62,7 +62,7 @@ def proxy(robot):
 
 def request(url, method="GET", path="/robot/pose/", body=None, **headers):
     where = urlsplit(url)
-    connection = http.client.HTTPConnection(where.hostname, where.port, timeout=10)
+    connection = http.client.HTTPConnection(where.hostname, where.port, timeout=30)
     try:
         connection.request(method, where.path + path, body, headers)
         response = connection.getresponse()
@@ -73,7 +73,7 @@ def request(url, method="GET", path="/robot/pose/", body=None, **headers):
 
 def raw(url, octets):
     where = urlsplit(url)
-    with socket.create_connection((where.hostname, where.port), timeout=10) as sock:
+    with socket.create_connection((where.hostname, where.port), timeout=30) as sock:
         sock.sendall(octets)
         sock.shutdown(socket.SHUT_WR)
         got = b""
@@ -165,7 +165,7 @@ def test_a_request_that_ends_in_the_middle_reaches_its_own_hook_and_no_robot(pro
 def test_a_serial_robot_waits_for_the_request_before(proxy):
     proxy.serial = True
     where = urlsplit(proxy.rest)
-    with socket.create_connection((where.hostname, where.port), timeout=10) as half:
+    with socket.create_connection((where.hostname, where.port), timeout=30) as half:
         half.sendall(b"GET / HTTP/1.1\r\n")
         time.sleep(0.2)
         with socket.create_connection((where.hostname, where.port), timeout=0.5) as other:
@@ -191,7 +191,7 @@ def test_it_speaks_tls_with_a_certificate_of_its_own(robot, tmp_path):
     try:
         where = urlsplit(proxy.rest)
         trust = ssl.create_default_context(cafile=str(ca_file))
-        connection = http.client.HTTPSConnection(where.hostname, where.port, timeout=10, context=trust)
+        connection = http.client.HTTPSConnection(where.hostname, where.port, timeout=30, context=trust)
         connection.request("GET", "/")
         assert connection.getresponse().status == 200
         connection.close()

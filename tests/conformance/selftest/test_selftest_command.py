@@ -1,6 +1,9 @@
 """``roaas selftest`` and ``roaas contract`` as a user meets them."""
 
 import json
+import signal
+import subprocess
+import sys
 
 import pytest
 from click.testing import CliRunner
@@ -42,6 +45,22 @@ def test_a_mutant_is_caught_and_a_good_one_is_not_blamed(tmp_path):
     assert document["format"] == "roaas-selftest/1"
     assert document["faults"][0]["caught"] == ["rest-resources/sensors-unique"]
     assert "sensors-twice" in (tmp_path / "selftest.md").read_text()
+
+
+@pytest.mark.parametrize("faults", [("--generated", "40"), ("--short", "--no-compare")])
+def test_an_interrupted_self_test_keeps_what_it_has(tmp_path, faults):
+    words = [*faults, "--target", "plain", "--seeds", "0", "--parallel", "1", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "roaas", "selftest", *words]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        first = process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        rest = process.stderr.read()
+        assert process.wait(60) == 130, first + rest
+    assert first.startswith("[1/")
+    assert "Traceback" not in rest
+    document = json.loads((tmp_path / "selftest.json").read_text())
+    assert len(document["generated"]["mutants"] if "generated" in document else document["faults"]) == 1
+    assert "interrupted" in document["notes"][0]
 
 
 def test_requirements_are_listed():

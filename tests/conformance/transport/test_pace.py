@@ -56,16 +56,18 @@ def test_a_long_request_has_longer_and_its_client_knows_what_was_late(listening)
         left = 200_000
         while left > 0:
             left -= len(sock.recv(65536))
-        time.sleep(0.6)
+        time.sleep(0.4)
         sock.sendall(_OK)
 
     client = _client(listening(slowly), 0.2)
     exchange = client.send("PUT", "/", body=b"x" * 200_000)
     assert exchange.response.status == 204
     assert client.connection.pace.lateness_s == 0.0
+    began = time.monotonic()
     with pytest.raises(NoAnswerError, match=r"within 0\.2 s"):
         client.send("GET", "/")
-    assert client.connection.pace.lateness_s == pytest.approx(0.2, abs=0.01)
+    # A busy machine wakes the client later than at the deadline, and that is late as well.
+    assert 0.19 < client.connection.pace.lateness_s < time.monotonic() - began
 
 
 def test_a_long_answer_has_longer(listening):

@@ -2,7 +2,7 @@ import pytest
 
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError
-from conformance.transport.raw import FramingError, head, parse, talk
+from conformance.transport.raw import FramingError, chunked, head, parse, talk
 
 
 def test_two_answers_in_one_stream():
@@ -66,6 +66,31 @@ def test_talk_reads_until_the_answer_is_whole(listening):
     assert b"Bearer secret" in octets
     came = talk(client, octets, answers=1)
     assert (came.closed, came.octets[-2:]) == (False, b"ok")
+
+
+def test_talk_waits_before_it_sends_the_rest(listening):
+    heard = []
+
+    def handle(connection):
+        heard.append(connection.recv(1000))
+        connection.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
+        heard.append(connection.recv(1000))
+        connection.sendall(b"HTTP/1.1 204 No Content\r\n\r\n")
+        connection.recv(1000)
+
+    client = HttpClient(listening(handle), Connection(timeout_s=5))
+    came = talk(client, b"head" + b"content", answers=1, cuts=(4,), pause_s=5.0)
+    assert (heard, came.early, parse(came.octets, "PUT", closed=False)[0].status) == ([b"head", b"content"], True, 204)
+
+
+def test_talk_goes_on_where_nothing_comes(listening):
+    client = HttpClient(listening(lambda connection: connection.recv(10) and connection.recv(1000)), Connection())
+    came = talk(client, b"xyz", timeout_s=0.4, cuts=(1, 2), pause_s=0.01)
+    assert (came.octets, came.early, came.sent_all) == (b"", False, True)
+
+
+def test_chunks_with_extensions_and_trailers():
+    assert chunked(b"hello", 3, b";a=1", b"X: y\r\n") == b"3;a=1\r\nhel\r\n2;a=1\r\nlo\r\n0;a=1\r\nX: y\r\n\r\n"
 
 
 def test_talk_has_a_deadline(listening):

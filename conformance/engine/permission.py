@@ -1,0 +1,90 @@
+"""What a recorded finding would do if it were sent again: judged by its octets, as a result may be anybody's.
+
+What cannot be told to be harmless may move the robot, so that nothing a result says of itself is believed: neither a
+method beside octets of another one, nor which endpoint only reads.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlsplit
+
+from conformance.contract.files import CONTRACT_DIR
+from conformance.engine.sequence import read_request
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from conformance.transport.exchange import Request
+
+_SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+# Servers differ in where they see one request end and the next one begin, so a method that writes counts wherever it
+# stands; and some take the method from a field (X-HTTP-Method-Override).
+_WRITES: Final = re.compile(rb"(?:PUT|POST|DELETE|PATCH)[ \t]|method", re.IGNORECASE)
+_PORTS: Final = {"http": 80, "https": 443}
+
+
+def moves(failure: Mapping[str, Any]) -> bool:
+    """Whether sending a finding's requests again may move the robot.
+
+    Raises:
+        ValueError, KeyError, TypeError: it is not well made.
+    """
+    requests = (read_request(item) for item in failure.get("sequence") or ())
+    # What was too large to be kept is not sent.
+    return any(request is not None and not _only_reads(request) for request in requests)
+
+
+def strangers(failure: Mapping[str, Any], trusted: Iterable[str]) -> list[str]:
+    """The addresses that a finding's requests go to and that are none of the trusted ones, as scheme://host:port.
+
+    Raises:
+        ValueError, KeyError, TypeError: it is not well made.
+    """
+    known = {origin(url) for url in trusted}
+    asked = {origin(str(item["url"])) for item in failure.get("sequence") or ()}
+    return sorted(asked - known)
+
+
+def origin(url: str) -> str:
+    """Scheme, host and port of a URL (RFC 6454 4), as one text.
+
+    Raises:
+        ValueError: it is no http or https URL.
+    """
+    parts = urlsplit(url)
+    if parts.scheme not in _PORTS or not parts.hostname:
+        raise ValueError(f"{url[:200]!r} is no http or https URL")
+    host = f"[{parts.hostname}]" if ":" in parts.hostname else parts.hostname
+    return f"{parts.scheme}://{host}:{parts.port or _PORTS[parts.scheme]}"
+
+
+def _only_reads(request: Request) -> bool:
+    if request.raw is not None:
+        return not _WRITES.search(request.raw)
+    if any(_WRITES.search(f"{name}: {value}".encode()) for name, value in request.headers):
+        return False
+    return request.method in _SAFE or (request.method == "POST" and _asks(request.body))
+
+
+def _asks(body: bytes) -> bool:
+    """Whether a body is a SOAP message for an operation of the contract that only reads."""
+    # Imported late: lxml and xmlschema cost a third of a second that a REST finding need not pay.
+    from conformance.soap.envelope import NotSoapError, read  # noqa: PLC0415
+
+    try:
+        message = read(body)
+    except NotSoapError:
+        return False
+    return len(message.payload) == 1 and str(message.payload[0].tag) in _questions()
+
+
+@cache
+def _questions() -> frozenset[str]:
+    """The elements that ask the contract's subscribers service for something."""
+    from conformance.documents.wsdl import read_file  # noqa: PLC0415 - as above
+
+    operations = read_file(CONTRACT_DIR / "subscribers.wsdl").operations
+    return frozenset(operation.request for operation in operations if operation.request)

@@ -1,0 +1,149 @@
+"""Robots whose velocities begin or end by something else than time, or come back after they have ended."""
+
+import json
+import threading
+import time
+from typing import Any
+
+from conformance.selftest.messages import Forward, Request, Response
+from conformance.selftest.mutants.changes import GOAL, LINEAR, VELOCITY, parsed, plain, rest, success
+from conformance.selftest.mutants.in_background import later
+from conformance.selftest.mutants.input_effects import sent
+from conformance.selftest.mutants.mutant import of_class
+
+_PUT, _PUT_LINEAR, _PUTS = rest("PUT", VELOCITY), rest("PUT", LINEAR), rest("PUT", VELOCITY, LINEAR)
+_DELETE, _PUT_GOAL = rest("DELETE", GOAL), rest("PUT", GOAL)
+# Nobody asks: nothing has come for so long; and how often is looked, s.
+_SILENT_S, _LOOK_S = 0.12, 0.04
+_LIMITS = (0.7, 2.5)
+
+
+class _Remembering:
+    """Knows the last velocity that was accepted, and how many requests have come."""
+
+    def __init__(self) -> None:
+        self.last: Any = None
+        self.turn = 0
+        self.asked = 0.0
+        self.lock = threading.Lock()
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        self.asked = time.monotonic()
+        response = forward(request)
+        if _PUT_GOAL(request) and success(response):
+            self.turn += 1
+        if _PUTS(request):
+            self.put(request, response, forward)
+        self.asked = time.monotonic()
+        return response
+
+    def put(self, request: Request, response: Response, _forward: Forward) -> None:
+        """What comes of a PUT of a velocity."""
+        value = parsed(request.body)
+        if not success(response) or not isinstance(value, dict):
+            return
+        with self.lock:
+            self.turn += 1
+            self.last = {**(self.last or {}), "linear": value} if _PUT_LINEAR(request) and self.last else value
+
+
+class _Asleep(_Remembering):
+    """Its watch stands still while nobody asks anything."""
+
+    def put(self, request: Request, response: Response, forward: Forward) -> None:
+        """See _Remembering."""
+        super().put(request, response, forward)
+        if success(response) and self.last and "angular" in self.last:
+            later(_LOOK_S, self._watch, self.turn, request.copy(), forward)
+
+    def _watch(self, turn: int, request: Request, forward: Forward) -> None:
+        until = time.monotonic() + 5
+        while time.monotonic() < until and self.turn == turn:
+            if time.monotonic() - self.asked > _SILENT_S:
+                sent(request, forward, "PUT", VELOCITY, self.last)
+            time.sleep(_LOOK_S)
+
+
+class _Renewed(_Remembering):
+    """What is refused renews what was accepted."""
+
+    def put(self, request: Request, response: Response, forward: Forward) -> None:
+        """See _Remembering."""
+        super().put(request, response, forward)
+        if 400 <= response.status < 500 and self.last and "angular" in self.last and any(_parts(self.last)):
+            sent(request, forward, "PUT", VELOCITY, self.last)
+
+
+class _Revived(_Remembering):
+    """A linear part is driven with the angular one that was commanded last, whenever that was."""
+
+    def put(self, request: Request, response: Response, forward: Forward) -> None:
+        """See _Remembering."""
+        super().put(request, response, forward)
+        if _PUT_LINEAR(request) and success(response) and self.last and "angular" in self.last:
+            sent(request, forward, "PUT", VELOCITY, self.last)
+
+
+class _Resuming(_Remembering):
+    """After a goal is cancelled, the velocity from before it is driven again."""
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        response = super().__call__(request, forward)
+        if _DELETE(request) and response.status == 204 and self.last and "angular" in self.last:
+            # Not before the navigation's own last word, which is zero.
+            later(0.2, sent, request.copy(), forward, "PUT", VELOCITY, self.last)
+        return response
+
+
+def _parts(twist: Any) -> tuple[float, float]:
+    try:
+        return abs(twist["linear"]["x"]), abs(twist["angular"]["z"])
+    except (TypeError, KeyError):
+        return 0.0, 0.0
+
+
+def _one_at_once(request: Request, forward: Forward) -> Response:
+    """A velocity near both limits at once is driven with half of its linear part."""
+    value: Any = parsed(request.body) if _PUT(request) else None
+    if any(part < 0.7 * limit for part, limit in zip(_parts(value), _LIMITS, strict=True)):
+        return forward(request)
+    value["linear"]["x"] /= 2
+    response = forward(request.copy(body=json.dumps(value).encode()))
+    return plain(204)(request) if success(response) else response
+
+
+def _deleted_later(request: Request, forward: Forward) -> Response:
+    """DELETE of a goal is answered before anything is done."""
+    if not _DELETE(request) or forward(request.copy(method="GET")).status != 200:
+        return forward(request)
+    later(0.3, sent, request.copy(), forward, "DELETE", GOAL)
+    return plain(204)(request)
+
+
+_mutant = of_class("safety", "rest")
+
+MUTANTS = (
+    _mutant("safety-asleep", "A velocity ends only while somebody asks.", "hold-ends", _Asleep),
+    _mutant("safety-renewed-by-refusal", "A refused velocity renews the one before it.", "hold-ends", _Renewed),
+    _mutant("safety-resuming", "After DELETE the velocity from before the goal is driven again.", "cancel", _Resuming),
+    _mutant(
+        "linear-revives-turning",
+        "PUT of a linear velocity brings back a turning that had ended.",
+        "rest-resources/linear-keeps-angular",
+        _Revived,
+    ),
+    _mutant(
+        "velocity-one-at-once",
+        "Near both of its limits at once the robot drives at half the speed.",
+        "rest-resources/velocity-range",
+        lambda: _one_at_once,
+    ),
+    _mutant(
+        "goal-deleted-later",
+        "DELETE is 204, and the goal is cancelled 0.3 s later.",
+        "rest-resources/goal-delete",
+        lambda: _deleted_later,
+    ),
+)
