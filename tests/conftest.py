@@ -1,6 +1,7 @@
 """Fixtures for every room's tests: a ROS domain of one's own."""
 
 import fcntl
+import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +13,9 @@ from hypothesis import settings
 # How long an example takes is the machine's affair, which others may use as well.
 settings.register_profile("unhurried", deadline=None)
 settings.load_profile("unhurried")
+
+# Who runs the tests in the background has Ctrl-C ignored, and so would all that they start and interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
 _DOMAIN_IDS = range(40, 102)

@@ -72,4 +72,4 @@ def test_a_command_that_is_ended_leaves_no_process_behind(tmp_path):
     assert process.wait(60) == ExitCode.INTERRUPTED
     process.stderr.close()
     assert children
-    assert psutil.wait_procs(children, timeout=10)[1] == []
+    assert psutil.wait_procs(children, timeout=60)[1] == []

@@ -101,7 +101,7 @@ def test_a_newcomers_way_through_the_pages(tmp_path):
             rest = robot.rest.removeprefix("http://")
             words = [word.replace("robot:7003", rest) for word in documented(start)[1:]]
             command = [sys.executable, "-m", "roaas", *words]
-            return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+            return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240, check=False)
 
         assert run("roaas certify --init robot.toml --rest http://robot:7003").returncode == 0
         statement = tmp_path / "robot.toml"
@@ -133,7 +133,7 @@ def test_a_file_for_a_ci_service_is_valid(text, tmp_path):
     (tmp_path / "file.yml").write_text(text, encoding="utf-8")
     linter = Path(sys.executable).with_name("check-jsonschema")
     command = [linter, "--builtin-schema", f"vendor.{kind}", tmp_path / "file.yml"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stdout
     for job in document.get("jobs", {}).values():
         ours = next(step for step in job["steps"] if "/ci/github@" in step.get("uses", ""))

@@ -39,7 +39,7 @@ def built(folder, mode):
     (folder / "src").mkdir()
     sources(folder / "src", mode)
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, folder / "src"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return {path.name: path for path in folder.iterdir() if path.is_file()}
 
@@ -55,7 +55,7 @@ def installed(twice, tmp_path_factory):
     wheel = next(path for name, path in twice[0].items() if name.endswith(".whl"))
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--target", folder, wheel]
-    subprocess.run(command, check=True, timeout=120, capture_output=True)
+    subprocess.run(command, check=True, timeout=240, capture_output=True)
     return folder
 
 
@@ -75,7 +75,7 @@ def run(installed, folder, *words):
     environment |= {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, *map(str, words)]
     return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=240, check=False
     )
 
 
