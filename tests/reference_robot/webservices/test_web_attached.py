@@ -108,15 +108,18 @@ def test_health_is_described_and_comes_in_every_format(attached):
 
 def test_a_velocity_that_is_not_renewed_ends_with_zero(attached, nav2):
     nav2.base.forget()
-    began = time.monotonic()
-    while time.monotonic() - began < 2 * HOLD:
+    renewed = began = time.monotonic()
+    while renewed - began < 2 * HOLD:
+        last, renewed = renewed, time.monotonic()
         assert attached.call("PUT", VELOCITY, json=twist(x=0.2)).status_code == 200
         velocity = nav2.base.next("velocity")
+        if velocity["x"] == 0.0:  # this machine stood still for so long that the velocity before was not renewed in time
+            assert time.monotonic() - last > HOLD
+            velocity = nav2.base.next("velocity")
         assert (velocity["x"], velocity["frame"]) == (0.2, "base_link")
         time.sleep(HOLD / 4)
-    renewed = time.monotonic()
     assert nav2.base.next("velocity")["x"] == 0.0
-    assert HOLD / 2 < time.monotonic() - renewed < 3 * HOLD
+    assert HOLD < time.monotonic() - renewed < 3 * HOLD
     # Once, and not at all where the client has stopped the robot itself.
     assert attached.call("PUT", VELOCITY, json=twist(x=0.1)).status_code == 200
     assert attached.call("PUT", VELOCITY, json=twist(x=0.0)).status_code == 200
