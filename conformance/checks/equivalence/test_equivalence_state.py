@@ -1,24 +1,23 @@
 """One state, read over REST and over SOAP."""
 
 import time
-from typing import Any, Final
+from typing import Final
 
-import msgspec
 import pytest
 
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element, projected
-from conformance.robot.agreement import Slack, disagreement, entries_of, stamp_of, unstamped
-from conformance.robot.drive import Drive
+from conformance.robot.agreement import Slack, disagreement, entries_of, unstamped
 from conformance.robot.geometry import Pose
 from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
-from conformance.robot.goals import choose_goals, make_room
-from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY, TWIST
+from conformance.robot.goals import choose_goals
+from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.robot.plan import plan_of, query, reachable
-from conformance.robot.robot import FARTHEST, POSE, SENSORS, SERVICES, STILL, VELOCITY, Robot
+from conformance.robot.robot import SENSORS, SERVICES, Robot
 from conformance.robot.soap_services import ask, returned
+from conformance.robot.state_over_soap import STATES, answered, compare
 from conformance.soap.service import SoapService
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
@@ -29,94 +28,15 @@ _SLACK: Final = Slack()
 _SAME: Final = Slack(0.0, 0.0)
 # More than any tolerance that is asked for here, m.
 _END_OFF: Final = 0.3
-# Odometry is no rarer than that where nothing is declared, Hz.
-_SELDOM_HZ: Final = 5.0
-_STATES: Final[dict[str, tuple[str, str, Shape]]] = {
-    "pose": (POSE, "GetPose", ODOMETRY),
-    "velocity": (VELOCITY, "GetVelocity", TWIST),
-}
-
-
-def _answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
-    """The one value that a response returns."""
-    found, problem = returned(exchange)
-    if problem or len(found) != 1:
-        return None, problem or f"{len(found)} return elements"
-    return from_element(found[0], shape.schema), ""
-
-
-def _compare(robot: Robot, subscribers: SoapService, judge: Judge, name: str) -> None:
-    """Compare a state as REST and SOAP give it; asked again where one may be an odometry message behind the other."""
-    path, _, _ = _STATES[name]
-    if f"equivalence/{name}" in judge.refuted():
-        return  # it costs three tries each time
-    pause_s = 1 / (robot.limits.odometry_hz or _SELDOM_HZ)
-    for apart_s in (0.0, pause_s, pause_s):
-        problem, exchange = _state_difference(robot, subscribers, name, apart_s)
-        if not problem:
-            break
-    if problem is not None:
-        judge.check(
-            f"equivalence/{name}",
-            not problem,
-            exchange,
-            f"what GET {path} gives just before and after",
-            found=problem,
-            cause=problem.split(" is ")[0].split("[")[0],
-        )
-
-
-def _slack(robot: Robot) -> Slack:
-    """What a sample may lie outside those before and after it: with the noise, of which each sample has its own."""
-    noise = robot.limits.noise
-    return Slack(_SLACK.absolute + FARTHEST * max(msgspec.structs.astuple(noise)), _SLACK.relative)
-
-
-def _state_difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float) -> tuple[str | None, Exchange]:
-    """Read a state over REST, over SOAP and over REST again, so far apart: in what SOAP's lies not between the others.
-
-    None where REST gives none: judged by those who observe it.
-    """
-    path, operation, shape = _STATES[name]
-    before, _ = robot.read(path, shape)
-    time.sleep(apart_s)
-    exchange = ask(subscribers, operation)
-    between, problem = _answered(exchange, shape)
-    time.sleep(apart_s)
-    after, _ = robot.read(path, shape)
-    if before is None or after is None:
-        return None, exchange
-    problem = problem or disagreement(before, between, after, _slack(robot))
-    if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
-        problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"
-    return problem, exchange
 
 
 @pytest.mark.phase("reading")
 @pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
-def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+def test_pose_and_velocity(robot: Robot, subscribers: SoapService, effort: Effort) -> None:
     """Whatever the robot does just now."""
     for _ in range(effort.cases(50)):
-        for name in _STATES:
-            _compare(robot, subscribers, judge, name)
-
-
-@pytest.mark.phase("motion")
-@pytest.mark.motion
-@pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
-def test_pose_and_velocity_in_motion(robot: Robot, subscribers: SoapService, judge: Judge) -> None:
-    """On an arc, where no component of the velocity that a robot has is zero."""
-    make_room(robot)
-    drive = Drive(robot)
-    arc = robot.share_of_limits(0.3, -0.4)
-    drive.command(arc)
-    drive.reach(arc)
-    for _ in range(5):
-        drive.command(arc)
-        for name in _STATES:
-            _compare(robot, subscribers, judge, name)
-    drive.command(STILL)
-    drive.reach(STILL)
+        for name in STATES:
+            compare(robot, subscribers, name)
 
 
 @pytest.mark.phase("reading")
@@ -177,7 +97,7 @@ def _compare_plans(
 ) -> None:
     before, _ = robot.read(query(**parameters), GET_PLAN)
     exchange = ask(subscribers, "GetPlan", **parameters)
-    between, problem = _answered(exchange, GET_PLAN)
+    between, problem = answered(exchange, GET_PLAN)
     after, _ = robot.read(query(**parameters), GET_PLAN)
     if before is None or after is None:
         return

@@ -113,7 +113,8 @@ def test_a_velocity_that_is_not_renewed_ends_with_zero(attached, nav2):
         last, renewed = renewed, time.monotonic()
         assert attached.call("PUT", VELOCITY, json=twist(x=0.2)).status_code == 200
         velocity = nav2.base.next("velocity")
-        if velocity["x"] == 0.0:  # this machine stood still for so long that the velocity before was not renewed in time
+        # This machine stood still for so long that the velocity before was not renewed in time.
+        if velocity["x"] == 0.0:
             assert time.monotonic() - last > HOLD
             velocity = nav2.base.next("velocity")
         assert (velocity["x"], velocity["frame"]) == (0.2, "base_link")
