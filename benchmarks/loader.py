@@ -104,7 +104,9 @@ def _by_wrk(call: Call, connections: int, seconds: float, pin: Callable[[], None
 def alternately(calls: list[Call], rate: float, seconds: float) -> list[Load]:
     """Send each request once in turn, so many turns a second, each when the answer before it is complete.
 
-    What the machine does to one server it does to all, which waiting for minutes between them would not say.
+    What the machine does to one server it does to all, which waiting for minutes between them would not say. Whoever
+    comes first finds the processors asleep, and whoever comes second what the first has set going: so each turn
+    begins with the next of them.
     """
     connections = [_Connection(call.host, call.port, call.octets()) for call in calls]
     seen: list[list[tuple[float, bool]]] = [[] for _ in calls]
@@ -112,11 +114,12 @@ def alternately(calls: list[Call], rate: float, seconds: float) -> list[Load]:
     gc.disable()
     for turn in range(round(rate * seconds)):
         time.sleep(max(0.0, started + turn / rate - time.perf_counter()))
-        for connection, answers in zip(connections, seen, strict=True):
+        for place in range(turn, turn + len(connections)):
+            connection = connections[place % len(connections)]
             connection.send()
             while (outcome := connection.received()) is None:
                 pass
-            answers.append(outcome)
+            seen[place % len(connections)].append(outcome)
     gc.enable()
     took = time.perf_counter() - started
     for connection in connections:

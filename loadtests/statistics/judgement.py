@@ -7,6 +7,7 @@ itself. Neither is called a difference.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -46,13 +47,23 @@ def judge(ratio: float, effect: Interval | None, noise: Interval | None) -> Judg
     biased = not noise[0] <= 1 <= noise[1]
     if not biased and ratio > reach and low > 1:
         return Judgement("differs")
-    if biased and low > reach:
-        return Judgement("bounded", low / reach, _biased(noise))
+    if biased and (bound := _beyond_bias(ratio, low, noise)) > 1:
+        return Judgement("bounded", bound, _biased(noise))
     bound = max(high, 1 / low) * (reach if biased else 1.0)
     if bound > _SHARP:
         return Judgement("none", bound, f"even a factor of {_SHARP:g} is not excluded")
     inside = _biased(noise) if biased else "the effect is no greater than an interface may differ from itself"
     return Judgement("noise", bound, inside)
+
+
+def _beyond_bias(ratio: float, low: float, noise: Interval) -> float:
+    """The least ratio that is left when the bias that the A/A run shows is taken off.
+
+    Ratio and bias are known by their intervals, each by blocks of its own, so that their uncertainties add as variances
+    do (JCGM 100:2008, GUM, 5.1.2), on the logarithmic scale. Which way the bias goes is not known: the worse is taken.
+    """
+    bias, uncertain = math.sqrt(noise[0] * noise[1]), math.log(noise[1] / noise[0]) / 2
+    return ratio / max(bias, 1 / bias) * math.exp(-math.hypot(math.log(ratio / low), uncertain))
 
 
 def _biased(noise: Interval) -> str:
