@@ -14,7 +14,7 @@ from conformance.documents.xsd_shapes import Element
 from conformance.robot import delivery_messages
 from conformance.robot.soap_services import declared_return, outgoing
 from conformance.soap import content
-from conformance.soap.calls import SoapResponse, judge_answer, read_exchange, send
+from conformance.soap.calls import SoapResponse, call, judge_answer, read_exchange, send
 from conformance.soap.envelope import envelope
 from conformance.soap.messages import padded
 from conformance.soap.service import SoapService
@@ -31,7 +31,11 @@ pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
 _VALID = "soap-subscribers/response-valid"
 _OWN = "soap-subscribers/concurrent-answers"
 _ONE = ("GetPose", "GetVelocity")
-_READ = (*_ONE, "GetSensors", "GetNavigationServices")
+_LISTS = ("GetSensors", "GetNavigationServices")
+_READ = (*_ONE, *_LISTS)
+_IDS = dict(
+    zip(_READ, (f"soap-subscribers/{name}" for name in ("pose", "velocity", "sensors", "services")), strict=True)
+)
 
 
 def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapResponse) -> etree._Element | None:
@@ -97,18 +101,33 @@ def test_pose_and_velocity(subscribers: SoapService, judge: Judge, effort: Effor
 def test_lists(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """GetSensors and GetNavigationServices list complete items, with full type names, and none twice."""
     for _ in range(effort.cases(40)):
-        for operation, id_ in (
-            ("GetSensors", "soap-subscribers/sensors"),
-            ("GetNavigationServices", "soap-subscribers/services"),
-        ):
-            answer = call_valid(subscribers, Node(clark(delivery_messages.NAMESPACE, operation)))
-            judge_answer(judge, id_, answer.accepted, answer, f"{operation}Response")
-            if not answer.succeeded:
-                continue
-            wrapper = _wrapper(judge, subscribers, operation, answer)
-            if wrapper is not None:
-                problem = _list_problem(wrapper, declared_return(subscribers, operation))
-                judge.check(id_, not problem, answer.exchange, "a list of complete items", found=problem)
+        for operation in _LISTS:
+            _list(judge, subscribers, operation)
+
+
+def _list(judge: Judge, subscribers: SoapService, operation: str) -> None:
+    """Ask for a list, and judge what comes."""
+    id_ = _IDS[operation]
+    answer = call_valid(subscribers, Node(clark(delivery_messages.NAMESPACE, operation)))
+    judge_answer(judge, id_, answer.accepted, answer, f"{operation}Response")
+    wrapper = _wrapper(judge, subscribers, operation, answer) if answer.succeeded else None
+    if wrapper is not None:
+        problem = _list_problem(wrapper, declared_return(subscribers, operation))
+        judge.check(id_, not problem, answer.exchange, "a list of complete items", found=problem)
+
+
+@pytest.mark.requirement(*_IDS.values(), "soap-subscribers/goal", _VALID)
+def test_after_a_refusal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """What comes right after a request that was refused is answered as ever."""
+    for _ in range(effort.cases(10)):
+        for operation in (*_IDS, "GetGoal"):
+            call(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetNothing")))
+            if operation in _ONE:
+                _complete(judge, _IDS[operation], subscribers, operation)
+            elif operation in _LISTS:
+                _list(judge, subscribers, operation)
+            else:
+                _goal(judge, subscribers)
 
 
 def _list_problem(wrapper: etree._Element, expected: Element) -> str:
@@ -132,22 +151,27 @@ def _list_problem(wrapper: etree._Element, expected: Element) -> str:
 @pytest.mark.requirement("soap-subscribers/goal", _VALID)
 def test_goal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """GetGoal gives a complete goal; without one an empty response, or a fault."""
-    expected = declared_return(subscribers, "GetGoal")
     for _ in range(effort.cases(30)):
-        answer = call_valid(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
-        if answer.fault is not None:
-            judge.check("soap-subscribers/goal", True, answer.exchange, "a fault where there is no goal")
-            continue
-        wrapper = _wrapper(judge, subscribers, "GetGoal", answer) if answer.succeeded else None
-        if wrapper is None:
-            judge_answer(judge, "soap-subscribers/goal", False, answer, "GetGoalResponse")
-            continue
-        returned = content.content_of(wrapper, expected)
-        empty = returned is None or (len(returned) == 0 and not text_of(returned).strip())
-        problem = "" if empty or returned is None else next(content.incomplete(returned, expected), "")
-        judge.check(
-            "soap-subscribers/goal", not problem, answer.exchange, "an empty response or a complete goal", found=problem
-        )
+        _goal(judge, subscribers)
+
+
+def _goal(judge: Judge, subscribers: SoapService) -> None:
+    """Ask for the goal, and judge what comes."""
+    expected = declared_return(subscribers, "GetGoal")
+    answer = call_valid(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
+    if answer.fault is not None:
+        judge.check("soap-subscribers/goal", True, answer.exchange, "a fault where there is no goal")
+        return
+    wrapper = _wrapper(judge, subscribers, "GetGoal", answer) if answer.succeeded else None
+    if wrapper is None:
+        judge_answer(judge, "soap-subscribers/goal", False, answer, "GetGoalResponse")
+        return
+    returned = content.content_of(wrapper, expected)
+    empty = returned is None or (len(returned) == 0 and not text_of(returned).strip())
+    problem = "" if empty or returned is None else next(content.incomplete(returned, expected), "")
+    judge.check(
+        "soap-subscribers/goal", not problem, answer.exchange, "an empty response or a complete goal", found=problem
+    )
 
 
 @pytest.mark.requirement("soap-subscribers/size")
