@@ -8,14 +8,14 @@ import pytest
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element, projected
 from conformance.robot.agreement import Slack, disagreement, entries_of, unstamped
-from conformance.robot.geometry import Pose
+from conformance.robot.geometry import Pose, pose_of
 from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals
-from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS
+from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.robot.plan import plan_of, query, reachable
-from conformance.robot.robot import SENSORS, SERVICES, Robot
+from conformance.robot.robot import POSE, SENSORS, SERVICES, Robot
 from conformance.robot.soap_services import ask, returned
 from conformance.robot.state_over_soap import STATES, answered, compare
 from conformance.soap.service import SoapService
@@ -28,6 +28,8 @@ _SLACK: Final = Slack()
 _SAME: Final = Slack(0.0, 0.0)
 # More than any tolerance that is asked for here, m.
 _END_OFF: Final = 0.3
+# How far ahead a plan in the odometry's frame leads, m.
+_AHEAD: Final = 0.3
 
 
 @pytest.mark.phase("reading")
@@ -75,8 +77,9 @@ def _compare_lists(
 @pytest.mark.phase("reading")
 @pytest.mark.requirement("equivalence/plan")
 def test_plan(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """The same question, with all its parameters or with few, has the same answer."""
-    here = robot.map_pose()
+    """The same question, with all its parameters or with few, or in the odometry's frame, has the same answer."""
+    odometry, _ = robot.read(POSE, ODOMETRY)
+    here = robot.in_map(pose_of(odometry["pose"]["pose"])) if odometry else None
     goals = reachable(robot, here, max(1.0, robot.statement.motion.radius_m), 3) if here else []
     if not goals:
         pytest.skip("the robot has no plan to any pose around it")
@@ -88,8 +91,10 @@ def test_plan(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effo
             few["frame_id"] = frame
         full: dict[str, float | str] = {"x": goal.x, "y": goal.y, "yaw": 0.1 * index, "frame_id": frame}
         full |= {"tolerance": 0.2, "start_x": start.x, "start_y": start.y, "start_yaw": start.yaw}
-        for parameters in (few, full):
-            _compare_plans(robot, subscribers, judge, goal, parameters)
+        there = pose_of(odometry["pose"]["pose"]).ahead(_AHEAD)
+        other: dict[str, float | str] = {"x": there.x, "y": there.y, "frame_id": odometry["header"]["frame_id"]}
+        for end, parameters in ((goal, few), (there, other), (goal, full)):
+            _compare_plans(robot, subscribers, judge, end, parameters)
 
 
 def _compare_plans(
@@ -107,6 +112,8 @@ def _compare_plans(
     elif not problem and plan_of(between).poses[-1].distance(goal) > _END_OFF:
         # A planner may answer the same question in another way each time; then only what was asked for is the same.
         problem = "the end is another one"
+    elif not problem and plan_of(between).frames != plan_of(after).frames:
+        problem = f"the frame is {min(plan_of(between).frames)}"
     judge.check(
         "equivalence/plan",
         not problem,

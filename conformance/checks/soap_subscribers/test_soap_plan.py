@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from conformance.documents.xml_names import local
+from conformance.documents.xml_names import clark, local
+from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.robot import delivery_messages, soap_services
 from conformance.robot.geometry import Pose
 from conformance.robot.plan import START_OFF
 from conformance.soap import content
 from conformance.soap.callable_services import SoapServices
-from conformance.soap.calls import SoapResponse, judge_answer
+from conformance.soap.calls import SoapResponse, call, judge_answer
 from conformance.soap.service import SoapService
 from conformance.soap.valid_messages import call_valid
 from conformance.verdict.effort import Effort
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
 _PLAN = "soap-subscribers/plan"
 _TOLERANCE = 0.25
+# A path that is not told right after so many refusals, and is otherwise, is not told because of them.
+_REFUSALS = 3
 
 
 @dataclass(frozen=True)
@@ -90,22 +93,42 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
         # Frame and tolerance may be left out: then they are map and 0.1 (contract, REST).
         given = {"frame_id": frame, "tolerance": repr(_TOLERANCE)} if number % 2 or frame != "map" else {}
         before = _here(soap, subscribers) or here
-        answer = call_valid(
-            subscribers, delivery_messages.request("GetPlan", x=target.x, y=target.y, yaw="0.0", **given)
-        )
+        request = delivery_messages.request("GetPlan", x=target.x, y=target.y, yaw="0.0", **given)
+        answer = call_valid(subscribers, request)
         after = _here(soap, subscribers) or before
         if answer.fault is not None:
             continue
         planned += 1
-        wrapper = answer.first if answer.accepted else None
-        path, problem = (None, answer.describe()) if wrapper is None else _path(wrapper, expected)
+        path, problem = _told(answer, expected)
         if path is not None:
             problem = _problem(path, before, after, target, frame)
         judge.check(_PLAN, not problem, answer.exchange, "a path from the robot to the asked pose", found=problem)
         if planned >= wanted:
+            _after_refusals(subscribers, judge, expected, request)
             break
     if not planned and answer is not None:
         judge_answer(judge, _PLAN, False, answer, "a plan to where the robot is")
+
+
+def _told(answer: SoapResponse, expected: Element) -> tuple[_Path | None, str]:
+    """The path that an answer without a fault tells, and what is wrong with it."""
+    wrapper = answer.first if answer.accepted else None
+    return (None, answer.describe()) if wrapper is None else _path(wrapper, expected)
+
+
+def _after_refusals(subscribers: SoapService, judge: Judge, expected: Element, request: Node) -> None:
+    """Judge what is answered right after a request that was refused, where the same is answered by a path else."""
+    none = 0
+    for _ in range(_REFUSALS):
+        call(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetNothing")))
+        answer = call_valid(subscribers, request)
+        if answer.fault is None:
+            problem = _told(answer, expected)[1]
+            judge.check(_PLAN, not problem, answer.exchange, "a path, after another request was refused", found=problem)
+        elif call_valid(subscribers, request).fault is None:
+            none += 1
+            if none == _REFUSALS:
+                judge_answer(judge, _PLAN, False, answer, "a path, after another request was refused")
 
 
 def _problem(path: _Path, before: Pose, after: Pose, target: Pose, frame: str) -> str:
