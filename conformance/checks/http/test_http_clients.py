@@ -7,17 +7,22 @@ import pytest
 from conformance.rest import by_hand
 from conformance.rest.interface import RestInterface
 from conformance.rest.questions import Question, questions, rounds
+from conformance.rest.validity import require_valid
+from conformance.robot.delivery import path_of
 from conformance.robot.plan_questions import plan_questions
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Unanswered
-from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
+from conformance.transport.parallel import MOST_CLIENTS, Outgoing, is_busy, send_together
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 # A robot that is wrong one time in fifty is asked often enough to be wrong several times.
 _ROUNDS = 40
 _IN_A_ROW = 6
+_TURNS = 12
+_COORDINATES = ("1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
+_NO_CODE = "none"
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +54,34 @@ def test_answers_do_not_cross(api: RestInterface, judge: Judge, asked: list[Ques
             found=stranger,
             cause="another's answer",
         )
+
+
+@pytest.mark.phase("delivery")
+@pytest.mark.motion
+@pytest.mark.requirement("http/concurrent-answers")
+def test_answers_to_deliveries_do_not_cross(api: RestInterface, judge: Judge) -> None:
+    """Of deliveries at one moment those that are valid are taken, and those that are not are refused."""
+    if not api.run.contract.own:
+        return
+    paths = [path_of(code, *_COORDINATES) for code in ("3", _NO_CODE)]
+    require_valid(api.run.contract, "PUT", paths[0])
+    # What is done with each alone is for others to judge.
+    taken, refused = (api.client.send("PUT", path).response for path in paths)
+    if not taken.ok or refused.ok:
+        return
+    turn = [Outgoing(api.client, "PUT", path) for path in paths] * (MOST_CLIENTS // len(paths))
+    for came in send_together([turn] * api.run.effort.cases(_TURNS)):
+        for request, attempt in zip(turn, came, strict=True):
+            if isinstance(attempt, Unanswered) or is_busy(attempt):
+                continue
+            wanted = request.path == paths[0]
+            judge.check(
+                "http/concurrent-answers",
+                attempt.response.ok == wanted,
+                attempt,
+                f"{'2xx' if wanted else '4xx'} for this delivery, while others are answered",
+                cause="another's answer",
+            )
 
 
 @pytest.mark.requirement("http/pipelining")
