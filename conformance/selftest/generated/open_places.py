@@ -38,6 +38,11 @@ RULES = (
         "A document of XML may begin with a byte order mark (XML 1.0 4.3.3), and every receiver has to take it "
         "(BP R4001); what forbids one is RFC 8259 8.1, of JSON.",
     ),
+    Rule(
+        r"body-bom:\w+:body:text",
+        "A stream of YAML may begin with a byte order mark, which is no part of its content (YAML 1.2.2 5.2); that "
+        "there is none is said of JSON (contract.md#json, RFC 8259 8.1).",
+    ),
     Rule(r"status:putDelivery:2\d\d-2\d\d", "A delivery answers 2xx, and 204 is only preferred (contract.md#rest)."),
     Rule(
         r"header-charset:[a-z]\w+:Content-Type-of-errors",
