@@ -1,5 +1,6 @@
 """One state in several formats: read each, and compare value by value."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +30,13 @@ class Disagreement:
     exchange: Exchange
 
 
-def disagreements(api: RestInterface, call: Call, media_types: list[str]) -> tuple[list[Disagreement], Exchange]:
+# By format and place.
+Found = dict[tuple[str, str], Disagreement]
+
+
+def disagreements(
+    api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
+) -> tuple[list[Disagreement], Exchange]:
     """Read a resource as JSON, in the other formats, and as JSON again, until all say the same.
 
     Only what both JSON answers say alike is compared, so that what changes between two reads blames nobody; what
@@ -38,44 +45,65 @@ def disagreements(api: RestInterface, call: Call, media_types: list[str]) -> tup
     Returns:
         What disagrees in every turn; and the last JSON exchange.
     """
-    schema = call.operation.shape or {}
-    suspects: dict[tuple[str, str], Disagreement] | None = None
-    exchange = None
+    suspects: Found | None = None
     for _ in range(_TURNS):
-        first = call.send(api, ("Accept", JSON))
-        others = [(name, call.send(api, ("Accept", name))) for name in media_types]
-        exchange = call.send(api, ("Accept", JSON))
-        snapshots = [_snapshot(item, JSON, schema) for item in (first, exchange)]
-        if any(shown is None for shown in snapshots):
-            return [], exchange  # what is wrong with that, others judge
-        known = steady(shown for shown in snapshots if shown is not None)
-        found = {
-            (name, item.place): item
-            for name, other in others
-            for item in _compare(known, snapshots, _snapshot(other, name, schema), name, other)
-        }
+        renew()
+        found, exchange = one_turn(api, call, media_types)
         suspects = found if suspects is None else {key: item for key, item in found.items() if key in suspects}
         if not suspects:
             break
-    if exchange is None:
-        raise AssertionError("unreachable: there is at least one turn")
     return list((suspects or {}).values()), exchange
 
 
-def judge_same_values(api: RestInterface, call: Call, media_types: list[str]) -> Exchange:
-    """Judge that the formats of a resource agree, where it can be read; give the last JSON exchange."""
-    found, exchange = disagreements(api, call, media_types)
-    first = found[0] if found else None
+def one_turn(api: RestInterface, call: Call, media_types: list[str]) -> tuple[Found, Exchange]:
+    """Read a resource as JSON, in the other formats, and as JSON again, once.
+
+    Returns:
+        What disagrees, by format and place (nothing where JSON cannot be read, which others judge); and the last JSON
+        exchange.
+    """
+    schema = call.operation.shape or {}
+    first = call.send(api, ("Accept", JSON))
+    others = [(name, call.send(api, ("Accept", name))) for name in media_types]
+    last = call.send(api, ("Accept", JSON))
+    snapshots = [_snapshot(item, JSON, schema) for item in (first, last)]
+    if any(shown is None for shown in snapshots):
+        return {}, last
+    known = steady(shown for shown in snapshots if shown is not None)
+    return {
+        (name, item.place): item
+        for name, other in others
+        for item in _compare(known, snapshots, _snapshot(other, name, schema), name, other)
+    }, last
+
+
+def judge_same_values(
+    api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
+) -> Exchange:
+    """Judge that the formats of a resource agree, where it can be read; give the last JSON exchange.
+
+    Args:
+        api: the robot's REST interface.
+        call: reads the resource.
+        media_types: other than JSON.
+        renew: what keeps the state as it is, before each turn.
+    """
+    found, exchange = disagreements(api, call, media_types, renew)
     if exchange.response.ok:
-        api.run.judge.check(
-            "rest-formats/same-values",
-            first is None,
-            first.exchange if first else exchange,
-            f"the same values in all formats of {call.operation.template}",
-            found=first.description if first else "",
-            cause=call.operation.id,
-        )
+        judge_disagreement(api, call, found[0] if found else None, exchange)
     return exchange
+
+
+def judge_disagreement(api: RestInterface, call: Call, found: Disagreement | None, exchange: Exchange) -> None:
+    """Judge that the formats of a resource agree."""
+    api.run.judge.check(
+        "rest-formats/same-values",
+        found is None,
+        found.exchange if found else exchange,
+        f"the same values in all formats of {call.operation.template}",
+        found=found.description if found else "",
+        cause=call.operation.id,
+    )
 
 
 def _snapshot(exchange: Exchange, media_type: str, schema: Schema) -> dict[str, Any] | None:

@@ -66,6 +66,8 @@ STILL: Final = Velocity()
 
 # Of a sample's noise: one in fifteen thousand is farther off than this, if the noise is normal.
 FARTHEST: Final = 4.0
+# Odometry is no rarer than that where nothing is declared, Hz.
+_SELDOM_HZ: Final = 5.0
 
 
 def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float = 1.0, samples: int = 1) -> bool:
@@ -134,6 +136,11 @@ class Robot:
         A quarter more than declared and a quarter of a second, for a loaded machine and a network between.
         """
         return 1.25 * self.limits.settle_s + 0.25 + 4 * self.usual_s
+
+    @property
+    def sample_s(self) -> float:
+        """How long the robot has one sample of its odometry, and one interface may be behind another, at most, s."""
+        return 1 / (self.limits.odometry_hz or _SELDOM_HZ)
 
     def patience(self, seconds: float) -> Patience:
         """A wait for what the robot has so many seconds for."""

@@ -16,8 +16,6 @@ from conformance.soap.service import SoapService
 from conformance.transport.exchange import Exchange
 
 _SLACK: Final = Slack()
-# Odometry is no rarer than that where nothing is declared, Hz.
-_SELDOM_HZ: Final = 5.0
 #: Path, operation and shape of each state.
 STATES: Final[dict[str, tuple[str, str, Shape]]] = {
     "pose": (POSE, "GetPose", ODOMETRY),
@@ -31,11 +29,6 @@ def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
     if problem or len(found) != 1:
         return None, problem or f"{len(found)} return elements"
     return from_element(found[0], shape.schema), ""
-
-
-def pause_of(robot: Robot) -> float:
-    """How long a reading may be behind another that came by another interface, by one odometry message, s."""
-    return 1 / (robot.limits.odometry_hz or _SELDOM_HZ)
 
 
 def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float) -> tuple[str | None, Exchange]:
@@ -75,8 +68,7 @@ def compare(robot: Robot, subscribers: SoapService, name: str, renew: Callable[[
     """
     if f"equivalence/{name}" in robot.judge.refuted():
         return  # it costs three tries each time
-    pause_s = pause_of(robot)
-    for apart_s in (0.0, pause_s, pause_s):
+    for apart_s in (0.0, robot.sample_s, robot.sample_s):
         renew()
         problem, exchange = difference(robot, subscribers, name, apart_s)
         if not problem:

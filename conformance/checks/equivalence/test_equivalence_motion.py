@@ -14,7 +14,7 @@ import pytest
 from conformance.robot.drive import Drive
 from conformance.robot.goals import make_room
 from conformance.robot.robot import STILL, Robot, Velocity
-from conformance.robot.state_over_soap import STATES, compare, difference, judge_difference, pause_of
+from conformance.robot.state_over_soap import STATES, compare, difference, judge_difference
 from conformance.soap.service import SoapService
 from conformance.transport.exchange import Exchange
 
@@ -61,7 +61,7 @@ def _first_readings(
     drive.command(wanted)
     drive.reach(wanted)
     # The first time as soon as may be; then when both interfaces must have heard of it.
-    pause_s = pause_of(drive.robot) if change else 0.0
+    pause_s = drive.robot.sample_s if change else 0.0
     time.sleep(pause_s)
     left = dict(suspects)
     for name, moves in suspects:
