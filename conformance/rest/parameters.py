@@ -43,7 +43,8 @@ def wrong_texts(parameter: Parameter) -> list[Wrong]:
         outside = [schema[key] + step for key, step in (("minimum", -1), ("maximum", 1)) if key in schema]
         if "enum" in schema:
             whole = [value for value in schema["enum"] if isinstance(value, int)]
-            outside += [max(whole) + 1, min(whole) - 1, 0, -1] if whole else []
+            # The last becomes one that is allowed where only the lower 32 bits of a number are kept.
+            outside += [max(whole) + 1, min(whole) - 1, 0, -1, min(whole) + 2**32] if whole else []
         found += [
             Wrong(parameter.name, str(value), f"{value}, which is not allowed, at {parameter.name}", str(value))
             for value in dict.fromkeys(outside)

@@ -13,7 +13,7 @@ from conformance.documents.xml import parse
 from conformance.documents.xml_names import XSI, clark, local, namespace
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd import Types
-from conformance.documents.xsd_shapes import Element
+from conformance.documents.xsd_shapes import Element, Simple
 from conformance.soap.messages import declarations, sequences, simple_leaves, with_text
 
 STRANGE: Final = "urn:example:strange"
@@ -110,11 +110,16 @@ def _values(element: Element, base: Node) -> Iterator[Mutation]:
         name = base.at(path).name
         for text in lexical.unreadable(simple):
             yield Mutation("lexical", f"{name} is {text!r}", (with_text(base, path, text),))
-        for text in lexical.outside(simple):
+        for text in (*lexical.outside(simple), *_wrapped(simple, base.at(path).text)):
             yield Mutation("range", f"{name} is {text}", (with_text(base, path, text),))
         if simple.builtin in lexical.FLOATS:
             for text in lexical.NON_FINITE:
                 yield Mutation("non-finite", f"{name} is {text}", (with_text(base, path, text),))
+
+
+def _wrapped(simple: Simple, text: str) -> tuple[str, ...]:
+    """What becomes the same value where only the lower 32 bits of an integer are kept."""
+    return (str(int(text) + 2**32),) if simple.builtin in lexical.INTEGERS else ()
 
 
 def _nil(element: Element, base: Node) -> Iterator[Mutation]:

@@ -40,7 +40,7 @@ class XmlStyle:
         comments: whether comments stand between elements.
         text: how texts are written (TEXTS).
         empty_tags: whether an empty element is written as one tag.
-        location: whether the payload carries xsi:schemaLocation.
+        location: whether the payload carries xsi:schemaLocation, with a query, whose "&" is a predefined entity.
         header: whether there is an empty Header where the message has none.
         identified: whether the Envelope has an attribute of another namespace, wsu:Id.
     """
@@ -74,7 +74,7 @@ def single_changes() -> tuple[tuple[str, XmlStyle], ...]:
         ("comments between elements", XmlStyle(comments=True)),
         *((f"texts: {text}", XmlStyle(text=text)) for text in TEXTS[1:]),
         ("start and end tags for empty elements", XmlStyle(empty_tags=False)),
-        ("xsi:schemaLocation", XmlStyle(location=True)),
+        ("xsi:schemaLocation with a predefined entity", XmlStyle(location=True)),
         ("an empty Header", XmlStyle(header=True)),
         ("an attribute of another namespace on the Envelope", XmlStyle(identified=True)),
     )
@@ -158,7 +158,7 @@ class _Writer:
         if self.style.location and scope and namespace(node.tag) not in {"", ENVELOPE} and "xsi" not in scope:
             scope["xsi"] = XSI
             made.append(f"xmlns:xsi={self._quoted(XSI)}")
-            made.append(f"xsi:schemaLocation={self._quoted(namespace(node.tag) + ' nowhere.xsd')}")
+            made.append(f"xsi:schemaLocation={self._quoted(namespace(node.tag) + ' nowhere.xsd?of=robot&as=xsd')}")
         return made
 
     def _attribute(self, key: str, scope: dict[str, str], made: list[str]) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from conformance.contract.limits import TAKEN_OCTETS
 from conformance.documents.representation import UnreadableError, flattened, local_name, parse_xml, read
 from conformance.documents.writing import xml_bytes
 from conformance.rest.applicable import applicable_operations
@@ -83,6 +84,11 @@ def test_xml_is_taken(api: RestInterface, judge: Judge) -> None:
             if taken and exchange.response.ok:
                 fault = _echo_fault(call, exchange)
                 judge.check(_ID, not fault, exchange, "the accepted value", found=fault, cause=f"{operation.id} echo")
+        if taken:
+            end = body.rindex(b"</")
+            large = call.rewritten(api, body[:end] + b" " * (TAKEN_OCTETS - len(body)) + body[end:])
+            exchange = large.send(api)
+            judge.check(_ID, is_taken(exchange), exchange, f"64 KiB of {XML} taken", cause=f"{operation.id} 64 KiB")
         if taken and status != 409:
             other = settles_at(api, call)
             if other is not None:

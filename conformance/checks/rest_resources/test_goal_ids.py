@@ -69,6 +69,8 @@ def test_goal_ids(robot: Robot, judge: Judge, explore: Explorer) -> None:
                 cause="another id" if problem.startswith("goal_id") else problem,
             )
 
+    # Also with little effort: as octets it is twice as long.
+    explore(st.just("\u00e9" * _LONGEST), try_id, cases=1)
     explore(st.one_of(st.sampled_from(_KNOWN), st.text(_CHARACTERS, min_size=1, max_size=_LONGEST)), try_id, cases=40)
     robot.delete_goal()
     await_none(robot)

@@ -167,22 +167,44 @@ def _judge_defaults(robot: Robot, judge: Judge, start: Pose, goal: Pose) -> None
     )
 
 
-@pytest.mark.requirement("rest-resources/plan-frame")
+@pytest.mark.requirement("rest-resources/plan-frame", "rest-resources/plan-start", "rest-resources/plan-end")
 def test_plan_in_other_frames(robot: Robot, here: Pose, judge: Judge) -> None:
-    """A plan asked for in another frame is in that frame, or refused."""
+    """A plan asked for in another frame is in that frame, its numbers too, or refused."""
     odometry, _ = robot.read(POSE, ODOMETRY)
     if odometry is None:
         pytest.skip("the robot's pose cannot be read")
     # In a frame that nobody knows there is no plan; a path in another one than was asked for is none either.
     for frame, there in ((odometry["header"]["frame_id"], pose_of(odometry["pose"]["pose"])), ("no_such_frame", here)):
-        exchange = robot.get(query(x=there.x + 0.3, y=there.y, frame_id=frame))
+        goal = there._replace(x=there.x + 0.3)
+        exchange = robot.get(query(x=goal.x, y=goal.y, frame_id=frame))
         message, problem = read_as(exchange.response, GET_PLAN)
+        plan = None if problem else plan_of(message)
         if 400 <= exchange.response.status < 500:
             problem = ""
-        elif not problem and plan_of(message).frames != {frame}:
-            problem = f"frames {sorted(plan_of(message).frames)}"
+        elif plan is not None and plan.frames != {frame}:
+            problem = f"frames {sorted(plan.frames)}"
         judge.check(
             "rest-resources/plan-frame", not problem, exchange, f"path and poses in {frame!r}, or 4xx", found=problem
+        )
+        if plan is not None and not problem and there is not here:
+            _judge_place(robot, judge, plan, there, goal, exchange)
+
+
+def _judge_place(robot: Robot, judge: Judge, plan: Plan, there: Pose, goal: Pose, exchange: Exchange) -> None:
+    """Judge that a path in the odometry's frame leads from where the odometry says to the goal."""
+    odometry, _ = robot.read(POSE, ODOMETRY)
+    moved = 0.0 if odometry is None else there.distance(pose_of(odometry["pose"]["pose"]))
+    for id_, pose, wanted, off in (
+        ("rest-resources/plan-start", plan.poses[0], there, START_OFF + moved),
+        ("rest-resources/plan-end", plan.poses[-1], goal, 0.1 * 1.05 + 0.01),
+    ):
+        judge.check(
+            id_,
+            pose.distance(wanted) <= off,
+            exchange,
+            f"({wanted.x:.3f}, {wanted.y:.3f}) in the odometry's frame",
+            found=f"({pose.x:.3f}, {pose.y:.3f})",
+            cause="odometry's frame",
         )
 
 

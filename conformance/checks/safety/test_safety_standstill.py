@@ -8,8 +8,12 @@ pytestmark = [pytest.mark.phase("stays"), pytest.mark.needs("rest"), pytest.mark
 
 
 @pytest.mark.requirement(
-    "safety/cancel-stays", "safety/client-vanished", "safety/refused-keeps", "strict-input/velocity-refused"
+    "http/not-acceptable-undone",
+    "safety/cancel-stays",
+    "safety/client-vanished",
+    "safety/refused-keeps",
+    "strict-input/velocity-refused",
 )
 def test_robot_stays_at_rest(standstill: Standstill) -> None:
-    """Goals that were cancelled, clients that vanished and velocities that were refused move nothing afterwards."""
+    """Goals that were cancelled, clients that vanished and what was refused move nothing afterwards."""
     standstill.judge()

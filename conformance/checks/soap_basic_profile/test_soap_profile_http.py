@@ -4,14 +4,17 @@ from typing import Final
 
 import pytest
 
+from conformance.contract.limits import TAKEN_OCTETS
 from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xml_node import Node
 from conformance.soap.callable_services import SoapServices, callable_services, repetitions
 from conformance.soap.calls import SoapResponse, call, judge_answer, read_exchange, send
 from conformance.soap.envelope import envelope
+from conformance.soap.messages import padded
 from conformance.soap.service import SoapService
-from conformance.soap.valid_messages import candidates, quiet_example
+from conformance.soap.valid_messages import candidates, quiet_example, require_valid_document
+from conformance.transport import raw
 from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -186,3 +189,36 @@ def test_forms_of_the_media_type(soap: SoapServices, judge: Judge) -> None:
                 judge_answer(
                     judge, f"soap-basic-profile/{name}", answer.accepted, answer, f"2xx for Content-Type: {media_type}"
                 )
+
+
+@pytest.mark.requirement("soap-basic-profile/chunked")
+def test_messages_in_chunks(soap: SoapServices, judge: Judge) -> None:
+    """A message is the same in chunks as in one piece, as clients send it that write while they serialize."""
+    for service in callable_services(soap, "soap-basic-profile/chunked"):
+        good = quiet_example(service)
+        if good is None:
+            judge.note("soap-basic-profile/chunked", f"the {service.name} service took none of the messages tried")
+            continue
+        small = require_valid_document(service, envelope([good[1]]).written())
+        large = require_valid_document(service, padded(small, TAKEN_OCTETS))
+        for document, size in ((small, 7), (large, 4096), (large, TAKEN_OCTETS)):
+            _judge_chunked(judge, service, document, size)
+
+
+def _judge_chunked(judge: Judge, service: SoapService, document: bytes, size: int) -> None:
+    fields = ("Content-Type: text/xml; charset=utf-8", 'SOAPAction: ""', "Transfer-Encoding: chunked")
+    octets = raw.head(service.client, "POST", service.path, *fields) + raw.chunked(document, size)
+    attempt, _ = raw.read_one(service.client, octets, raw.talk(service.client, octets, answers=1), "POST")
+    judge.check(
+        "soap-basic-profile/chunked",
+        isinstance(attempt, Exchange) and (read_exchange(attempt).accepted or _knows_no_chunks(attempt)),
+        attempt,
+        f"2xx for a message of {len(document):,} octets in chunks of {size:,}",
+        found=read_exchange(attempt).describe() if isinstance(attempt, Exchange) else attempt.came,
+        cause=attempt.came,
+    )
+
+
+def _knows_no_chunks(exchange: Exchange) -> bool:
+    """Whether a server of HTTP/1.0, which has no chunks, asks for a length (RFC 9112 6.1)."""
+    return exchange.response.http_version == "HTTP/1.0" and exchange.response.status == 411

@@ -14,7 +14,7 @@ from conformance.soap.envelope import envelope
 from conformance.soap.forms import written_integer
 from conformance.soap.messages import padded, variants, with_text
 from conformance.soap.service import SoapService
-from conformance.soap.valid_messages import call_valid, require_valid_document
+from conformance.soap.valid_messages import call_valid, require_valid_document, typed
 from conformance.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
@@ -123,6 +123,19 @@ def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort
         lambda case: taken(case[0], case[1], "several changes of syntax"),
         cases=60,
     )
+
+
+@pytest.mark.requirement("soap-delivery/typed-values", _VALID)
+def test_typed_values(publishers: SoapService, judge: Judge) -> None:
+    """Values that say what type they are of, as PHP's and ksoap2's clients write them, are the same values."""
+    for operation in _BOTH:
+        declared = publishers.contract.shape(clark(delivery_messages.NAMESPACE, operation))
+        if declared is None:
+            pytest.skip(f"the contract has no {operation}")
+        payload = delivery_messages.delivery(operation)
+        document = require_valid_document(publishers, typed(envelope([payload]), declared, payload))
+        answer = send(publishers, document)
+        _answered(judge, "soap-delivery/typed-values", operation, answer, "the same with xsi:type on each value")
 
 
 @pytest.mark.requirement("soap-delivery/addressing")

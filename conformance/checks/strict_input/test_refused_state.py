@@ -1,6 +1,7 @@
 """What the contract does not allow changes nothing: neither the velocity, nor the goal, nor what the robot delivers."""
 
 from functools import partial
+from http import HTTPStatus
 from typing import Any, Final
 
 import pytest
@@ -29,6 +30,7 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.needs("rest"), pytest.mark.motion]
+_UNDONE: Final = "http/not-acceptable-undone"
 _VELOCITY: Final = "strict-input/velocity-refused"
 _CORRECT: Final = ("3", "1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
 _BAD_PARTS: Final = (
@@ -149,7 +151,7 @@ def _invalid_goals(near: Any, frame: str) -> list[tuple[str, dict[str, Any]]]:
 
 
 @pytest.mark.phase("effect")
-@pytest.mark.requirement("strict-input/delivery-refused")
+@pytest.mark.requirement("strict-input/delivery-refused", _UNDONE)
 def test_an_invalid_delivery_reaches_nobody(
     api: RestInterface, soap: SoapServices, probe: RosProbe, judge: Judge
 ) -> None:
@@ -174,16 +176,21 @@ def test_an_invalid_delivery_reaches_nobody(
         judge.check("strict-input/delivery-refused", status >= 400, exchange, "a refusal of an invalid delivery")
     if observer is None:
         return
+    # Valid, but for what the client wants to be told in.
+    silent = Delivery(3, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0)
+    answer = rest.send("PUT", silent.rest_path, headers=(("Accept", "image/png"),), fresh=True)
     last = Delivery(3, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
     put_delivery(api, last.rest_path, fresh=True)
     try:
-        seen = [one.delivery for one in observer.collect(1)]
+        seen = [one.delivery for one in observer.collect(1 + answer.response.ok)]
     except (NoObserverError, ProbeError) as nobody:
         pytest.skip(str(nobody))
     if last not in seen:
         judge.note("strict-input/delivery-refused", "judged by the answers alone: no valid delivery was seen to arrive")
         return
-    others = [one for one in seen if one != last]
+    if answer.response.status == HTTPStatus.NOT_ACCEPTABLE:
+        judge.check(_UNDONE, silent not in seen, answer, "no message for a delivery that is answered 406")
+    others = [one for one in seen if one not in {last, silent}]
     # A robot may have other clients: one order that looks like none of ours may be theirs.
     odd = [one for one in others if _is_of_ours(one)] or (others if len(others) > 1 else [])
     judge.check(

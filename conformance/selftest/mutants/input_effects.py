@@ -1,7 +1,7 @@
 """Robots that refuse what is invalid, and do it all the same."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from typing import Any
 
 from conformance.selftest.messages import Forward, Request, Response
@@ -15,7 +15,9 @@ from conformance.selftest.mutants.changes import (
     Make,
     deliveries,
     parsed,
+    problem,
     rest,
+    success,
 )
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped
@@ -49,12 +51,16 @@ def goal_ahead(request: Request, forward: Forward, distance: float) -> None:
     sent(request, forward, "PUT", GOAL, {"goal": {"target_pose": target}})
 
 
-def after_refusal(where: Callable[[Request], bool], act: Callable[[Request, Forward], None]) -> Make:
-    """An invalid request is refused, and something is done."""
+def after_refusal(
+    where: Callable[[Request], bool],
+    act: Callable[[Request, Forward], None],
+    statuses: Container[int] = frozenset(_INVALID),
+) -> Make:
+    """A request is refused, as invalid or with one of other statuses, and something is done."""
 
     def change(request: Request, forward: Forward) -> Response:
         response = forward(request)
-        if where(request) and response.status in _INVALID:
+        if where(request) and response.status in statuses:
             act(request, forward)
         return response
 
@@ -64,6 +70,13 @@ def after_refusal(where: Callable[[Request], bool], act: Callable[[Request, Forw
 def _deliver(request: Request, forward: Forward) -> None:
     path = f"{DELIVERIES}3/depot_x/1/depot_y/2/dest_x/3/dest_y/4/source_x/5/source_y/6"
     sent(request, forward, "PUT", path)
+
+
+def _delivered_in_vain(request: Request, forward: Forward) -> Response:
+    """A delivery is made, and its answer is lost because nothing that could be said is acceptable."""
+    response = forward(request)
+    unwanted = deliveries(request) and (request.field("Accept") or "").startswith("image/")
+    return problem(406, "nothing that you would have")(request) if unwanted and success(response) else response
 
 
 def _soap_refusal(request: Request, forward: Forward) -> Response:
@@ -88,6 +101,25 @@ MUTANTS = (
         "An invalid velocity is refused, and the robot drives.",
         "velocity-refused",
         after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)),
+    ),
+    _mutant(
+        "http-406-and-driven",
+        "A velocity is answered 406, and the robot drives.",
+        "http/not-acceptable-undone",
+        after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2), {406}),
+    ),
+    _mutant(
+        "http-406-and-goal",
+        "A goal is answered 406, and the robot has a goal.",
+        "http/not-acceptable-undone",
+        after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5), {406}),
+    ),
+    _mutant(
+        "http-406-and-delivered",
+        "A delivery is answered 406, and published.",
+        "http/not-acceptable-undone",
+        lambda: _delivered_in_vain,
+        observer=True,
     ),
     _mutant(
         "input-goal-refused-and-taken",

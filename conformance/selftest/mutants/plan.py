@@ -43,6 +43,13 @@ def _detour(poses: list[Any]) -> list[Any]:
     return [*poses[:middle], _moved(poses[middle], 25.0, -25.0), *poses[middle:]]
 
 
+def _aside(value: Any) -> None:
+    """A path in the odometry's frame has the numbers of another one."""
+    path = value["plan"]
+    if path["header"]["frame_id"] == "odom":
+        path["poses"] = [_moved(pose, 1.5, -1.0) for pose in path["poses"]]
+
+
 def _turned(poses: list[Any]) -> list[Any]:
     last = poses[-1]
     q = last["pose"]["orientation"]
@@ -99,6 +106,12 @@ MUTANTS = (
     _mutant("plan-jumps", "In the middle of a plan there is a leap of 35 m.", "plan-continuous", _led(_detour)),
     _mutant("plan-jumps-sometimes", "One plan in 50 has a leap in it.", "plan-continuous", _led(_detour, nth=50)),
     _mutant("plan-mixed-frames", "Only the first pose is in the frame of the path.", "plan-frame", _told(_frame)),
+    _mutant(
+        "plan-frame-in-name-only",
+        "A plan in the odometry's frame is off as if that lay elsewhere on the map.",
+        ("plan-start", "plan-end"),
+        _told(_aside),
+    ),
     _mutant(
         "plan-frameless",
         "The path's header has no frame.",

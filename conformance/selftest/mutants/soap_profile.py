@@ -15,6 +15,7 @@ from conformance.selftest.mutants.changes import (
     page,
     posted,
     problem,
+    rewritten,
     soap,
     status,
     text,
@@ -88,6 +89,15 @@ def _any_type(request: Request, forward: Forward) -> Response:
     return forward(request)
 
 
+def _in_chunks(request: Request) -> bool:
+    return posted(request) and request.field("Transfer-Encoding") is not None
+
+
+def _first_part(request: Request) -> None:
+    """Of what comes in chunks, as much as a buffer holds."""
+    request.body = request.body[:8192]
+
+
 MUTANTS = (
     _mutant("bp-fault-hint", "A Fault has a child of the robot's own.", "R1000", _faults(fault_tree(hinted))),
     _mutant("bp-fault-qualified", "The children of a Fault are qualified.", "R1001", _faults(fault_tree(qualified))),
@@ -156,6 +166,10 @@ MUTANTS = (
             problem(415, "text/xml, please"),
         ),
     ),
+    _mutant(
+        "bp-no-chunks", "A message in chunks is 411.", "chunked", instead(_in_chunks, problem(411, "a length, please"))
+    ),
+    _mutant("bp-few-chunks", "Of a message in chunks, 8 KiB are read.", "chunked", rewritten(_in_chunks, _first_part)),
     _mutant("bp-fault-200", "Faults are 200.", "R1126", _faults(becomes(200))),
     _mutant("bp-fault-400", "Faults are 400.", "R1126", _faults(becomes(400))),
     _mutant(

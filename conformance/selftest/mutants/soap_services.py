@@ -117,6 +117,15 @@ MUTANTS = (
         "range",
         _refused(rb">\s*[+-]?[\d.]+[eE][+-]?\d+\s*<", "no number"),
     ),
+    _acting(
+        "soap-no-types", "A value that says its type is a fault.", "typed-values", _refused(rb":type=", "an attribute")
+    ),
+    _acting(
+        "soap-no-entities",
+        "A message with a predefined entity is a fault.",
+        "syntax",
+        _refused(rb"&(?:amp|lt|gt|quot|apos);", "entities are dangerous"),
+    ),
     _acting("soap-no-plus", "Numbers with a plus sign are a fault.", "range", _refused(rb">\s*\+[\d.]", "plus sign")),
     _acting("soap-no-negatives", "Negative doubles are a fault.", "range", _refused(rb">\s*-[\d.]", "negative")),
     _acting(

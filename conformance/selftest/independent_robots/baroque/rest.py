@@ -74,6 +74,8 @@ class Rest:
     ) -> Reply:
         if method not in resources.METHODS[path]:
             raise NotTakenError(405, f"{ask.method:.40} is none of {resources.METHODS[path]}")
+        if method == "PUT":
+            _format(ask)  # before anything is done
         body = self._body
         match (method, path):
             case ("GET", "/robot/pose/"):
@@ -198,9 +200,19 @@ def _wanted(ask: Ask) -> str | None:
     return next(writer for writer, weight in rated.items() if weight == best) if best else None
 
 
-def _shown(ask: Ask, root: str, value: Any) -> Reply:
+def _format(ask: Ask) -> str:
+    """What to answer in.
+
+    Raises:
+        NotTakenError: nothing that the client would have.
+    """
     format_ = _wanted(ask)
     if format_ is None:
         raise NotTakenError(406, f"nothing here is {ask.fields['accept']:.200}")
+    return format_
+
+
+def _shown(ask: Ask, root: str, value: Any) -> Reply:
+    format_ = _format(ask)
     charset = ";charset=UTF-8" if format_ != "application/json" else ""
     return Reply(200, _WRITERS[format_](root, value), format_ + charset, [("vary", "accept")])

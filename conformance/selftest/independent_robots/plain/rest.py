@@ -152,6 +152,7 @@ class Rest:
         return _shown(200, goal_value(goal), "MoveBaseActionGoal", headers)
 
     def _put_goal(self, headers: Message, body: bytes, _target: str) -> Answer:
+        _format(headers)  # before anything is done
         given = self._input(headers, body, "MoveBaseActionGoal", reading.GOAL)
         target = given["goal"]["target_pose"]
         where = "goal.target_pose"
@@ -267,10 +268,20 @@ def plan_value(body: Body, given: dict[str, Any]) -> dict[str, Any]:
     return {"plan": {"header": header, "poses": [{"header": header, "pose": pose} for pose in poses]}}
 
 
-def _shown(status: int, value: Any, root: str, headers: Message) -> Answer:
+def _format(headers: Message) -> str:
+    """What to answer in.
+
+    Raises:
+        RefusedError: nothing that the client would have.
+    """
     format_ = choose(_accept(headers))
     if format_ is None:
         raise RefusedError(406, f"Accept: {headers.get('Accept')!r} has nothing of this robot's")
+    return format_
+
+
+def _shown(status: int, value: Any, root: str, headers: Message) -> Answer:
+    format_ = _format(headers)
     media_type = format_ + ("; charset=utf-8" if format_ == "text/plain" else "")
     return Answer(status, written(value, root, format_), media_type, {"Vary": "Accept"})
 
