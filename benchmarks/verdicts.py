@@ -30,6 +30,7 @@ NO_LINK = "none"
 # The worst that may be undecided: of twenty runs one.
 UNDECIDED_SHARE = 0.05
 _CONFORMANT, _NOT_CONFORMANT = 0, 1
+_NAMED = 5  # requirements of one reason; more are counted
 
 
 def main() -> int:
@@ -143,8 +144,13 @@ def _tell(result: ControlResult) -> None:
     seconds = f"{result.outcome.seconds:.1f} s" if result.outcome else result.not_tried
     print(f"{result.robot} {result.variant or NO_LINK} seed {result.seed}: {word}, {seconds}", flush=True)
     for kind, said in (("", why), ("warns: ", _warned(result))):
+        by_reason: dict[str, list[str]] = {}
         for id_, reason in said.items():
-            print(f"  {kind}{id_}: {reason[:300]}", flush=True)
+            by_reason.setdefault(reason, []).append(id_)
+        for reason, ids in by_reason.items():
+            # A run that broke off says one thing of all of them.
+            who = ", ".join(ids) if len(ids) <= _NAMED else f"{len(ids)} requirements"
+            print(f"  {kind}{who}: {reason[:300]}", flush=True)
 
 
 def _table(results: list[ControlResult]) -> str:
