@@ -34,6 +34,17 @@ RULES = (
         "(contract.md#plans), and each question makes a new one, so that no two formats have to agree on it.",
     ),
     Rule(
+        r"(default|scale|single|ulp|ignore|lag|clamp|round):[gG]etPlan:request\.tolerance:\w+",
+        "A path that ends at the asked pose itself is within every tolerance (contract.md#plans): where plans are made "
+        "so, no answer becomes another by another tolerance. Of a planner that makes use of it, plan-end judges the path "
+        "by the tolerance that was sent.",
+    ),
+    Rule(
+        r"ulp:putGoal:answer\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
+        "What a robot answers to a goal is what it has made of it: it may bring a quaternion to unit length, and take a "
+        "pose from one frame to another and back (contract.md#goals asks for the goal, not for its last bit).",
+    ),
+    Rule(
         r"body-bom:\w+:body:xml",
         "A document of XML may begin with a byte order mark (XML 1.0 4.3.3), and every receiver has to take it "
         "(BP R4001); what forbids one is RFC 8259 8.1, of JSON.",
