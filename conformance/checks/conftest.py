@@ -7,6 +7,7 @@ import pytest
 from conformance.rest.interface import RestInterface
 from conformance.rest.observers import Observer as RestObserver
 from conformance.robot.clock import Clock
+from conformance.robot.goal_observer import GoalObserver
 from conformance.robot.interfaces import Interfaces
 from conformance.robot.observer import Observer as RobotObserver
 from conformance.robot.probe.client import RosProbe
@@ -31,6 +32,7 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection, clock: Cl
     if interfaces.rest is not None:
         connection.listeners.append(RestObserver(interfaces.rest, [service.endpoint for service in services]))
         connection.listeners.append(RobotObserver(interfaces.rest, clock))
+        connection.listeners.append(GoalObserver(interfaces.rest))
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(service) for service in services}
         connection.listeners.append(SoapObserver(run.judge, answers))
