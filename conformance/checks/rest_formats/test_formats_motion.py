@@ -16,8 +16,9 @@ from conformance.rest.calls import JSON, Call
 from conformance.rest.formats import Found, judge_disagreement, judge_same_values, one_turn
 from conformance.rest.interface import RestInterface
 from conformance.robot.drive import Drive
-from conformance.robot.goals import make_room
-from conformance.robot.robot import LINEAR, POSE, STILL, VELOCITY, Robot, Velocity
+from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
+from conformance.robot.goals import choose_goals, make_room
+from conformance.robot.robot import GOAL_PATH, LINEAR, POSE, STILL, VELOCITY, Robot, Velocity
 from conformance.verdict.effort import Effort
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
@@ -57,6 +58,30 @@ def test_formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> 
     for (id_, _), left in suspects.items():
         for item in left.values():
             judge_disagreement(api, by_id[id_], item, item.exchange)
+
+
+@pytest.mark.requirement("rest-formats/same-values")
+def test_formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> None:
+    """One goal after another is the same in all formats, from the first reading on."""
+    calls = [call for call in reads(api) if call.operation.template == GOAL_PATH and _others(call)]
+    if effort.name == "quick" or not calls:
+        return  # one goal is looked at in any case
+    left: Found | None = None
+    for number, pose in enumerate(choose_goals(robot, 1.5, 1 + _CHANGES)):
+        body = goal_body(pose, robot.statement.motion.frame, f"formats {number}")
+        put_goal(robot, body)
+        await_goal(robot, body)
+        time.sleep(robot.settle_s if left else 0.0)
+        found, _ = one_turn(api, calls[0], _others(calls[0]))
+        if not number:
+            continue  # there was none before
+        left = found if left is None else {place: item for place, item in found.items() if place in left}
+        if not left:
+            break
+    for item in (left or {}).values():
+        judge_disagreement(api, calls[0], item, item.exchange)
+    robot.delete_goal()
+    await_none(robot)
 
 
 def _others(call: Call) -> list[str]:
