@@ -36,13 +36,17 @@ RULES = (
     Rule(
         r"(default|scale|single|ulp|ignore|lag|clamp|round):[gG]etPlan:request\.tolerance:\w+",
         "A path that ends at the asked pose itself is within every tolerance (contract.md#plans): where plans are made "
-        "so, no answer becomes another by another tolerance. Of a planner that makes use of it, plan-end judges the path "
-        "by the tolerance that was sent.",
+        "so, no answer becomes another by another tolerance. Of a planner that makes use of it, plan-end judges the "
+        "path by the tolerance that was sent.",
     ),
     Rule(
         r"ulp:putGoal:answer\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
-        "What a robot answers to a goal is what it has made of it: it may bring a quaternion to unit length, and take a "
-        "pose from one frame to another and back (contract.md#goals asks for the goal, not for its last bit).",
+        "What a robot answers to a goal is what it has made of it: it may bring a quaternion to unit length, and take "
+        "a pose from one frame to another and back (contract.md#goals asks for the goal, not for its last bit).",
+    ),
+    Rule(
+        r"(default|scale|negate|ulp|ignore|lag|clamp):ExecuteCoffeeRequest:request\.arg0\.message_code:soap",
+        "ExecuteCoffeeRequest publishes code 4, whatever code it is given (contract.md#soap-publishers).",
     ),
     Rule(
         r"body-bom:\w+:body:xml",
@@ -55,6 +59,11 @@ RULES = (
         "there is none is said of JSON (contract.md#json, RFC 8259 8.1).",
     ),
     Rule(r"status:putDelivery:2\d\d-2\d\d", "A delivery answers 2xx, and 204 is only preferred (contract.md#rest)."),
+    Rule(
+        r"header-(drop|change):put\w+:Vary",
+        "Vary tells caches which answers are fit for whom: it is asked for on a response that may be cached "
+        "(RFC 9110 12.5.5), and the answer to a PUT is none (9.3.4).",
+    ),
     Rule(
         r"header-charset:[a-z]\w+:Content-Type-of-errors",
         "An error is JSON, whose media type has no charset parameter: one that is added has no effect (RFC 8259 11).",
