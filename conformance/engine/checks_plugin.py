@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 # counted; then what is no delivery, while it is seen whether more comes of them; attacks that are one last.
 PHASES = (
     *("reach", "reading", "motion", "standstill", "stays", "input"),
-    *("delivery", "effect", "arrival", "describe", "aside", "late", "attack"),
+    *("delivery", "effect", "arrival", "describe", "aside", "late", "attack", "last"),
 )
 
 _NO_ADDRESS = "the robot's {} interface has no address"

@@ -117,6 +117,11 @@ class Batch:
         left_s = self._collected + watched_s - time.monotonic()
         self._judge_only([], self._observer.collect(0, max(0.0, left_s)))
 
+    def look_again(self) -> None:
+        """Judge whether an earlier delivery has come again since, whatever else was sent meanwhile."""
+        seen = self._observer.collect(0, 0.0)
+        self._judge_again([one.delivery for one in seen if self._key(one.delivery) in self._earlier])
+
     def _collect(self, sent: Sequence[_Sent]) -> list[Seen]:
         """What arrived since this was asked last; what is not just what was sent is looked at for a little longer."""
         seen = self._observer.collect(len(sent), 0.0)

@@ -11,6 +11,11 @@ _MOST: Final = 80
 # What the rate may be off, and what a stamp may be older than its reading, in comparison with the others, s.
 _SHARE: Final = 0.05
 _OLDER_S: Final = 0.05
+# Readings from which it shows whether the part below a second is in its unit: how many, and how far apart two are, s.
+_FINE: Final = 60
+_NEAR_S: Final = (0.2, 0.45)
+_ENOUGH: Final = 10
+_HARDLY: Final = 0.1
 
 
 class Clock:
@@ -19,12 +24,15 @@ class Clock:
     def __init__(self) -> None:
         self._readings: list[tuple[float, float]] = []
         self._every = _EVERY_S
+        self._first: list[tuple[float, float]] = []
 
     def take(self, at: float, stamp: float) -> None:
         """Take a reading: the time on the wall and the robot's own, s."""
         if self._readings and at < self._readings[-1][0] + self._every:
             return
         self._readings.append((at, stamp))
+        if len(self._first) < _FINE:
+            self._first.append((at, stamp))
         if len(self._readings) > _MOST:
             self._readings, self._every = self._readings[::2], 2 * self._every
 
@@ -50,7 +58,27 @@ class Clock:
             if there - here >= apart
         )
 
+    @property
+    def fine_rate(self) -> float | None:
+        """The rate within a second: the median over readings that are near each other; None where too few tell.
+
+        Of odometry that is slow, two readings may have the same stamp: those say nothing. A stamp whose nanoseconds are
+        counted in milliseconds has the right rate over many seconds, and hardly one in between.
+        """
+        near = [
+            (later - earlier) / (there - here)
+            for index, (here, earlier) in enumerate(self._first)
+            for there, later in self._first[index + 1 :]
+            if _NEAR_S[0] <= there - here <= _NEAR_S[1] and later != earlier
+        ]
+        return median(near) if len(near) >= _ENOUGH else None
+
     def is_right(self, time_scale: float) -> bool:
         """Whether the rate is the declared one within 5 %, and what the odometry's age may come to."""
         rate = self.rate
         return rate is not None and abs(rate - time_scale) <= time_scale * (_SHARE + _OLDER_S / self.span_s)
+
+    def stands_between(self, time_scale: float) -> bool:
+        """Whether the stamps hardly advance within a second, and leap from one to the next."""
+        fine = self.fine_rate
+        return fine is not None and abs(fine) < time_scale * _HARDLY

@@ -31,6 +31,12 @@ class Pose(NamedTuple):
             frame.x + cos * self.x - sin * self.y, frame.y + sin * self.x + cos * self.y, wrapped(self.yaw + frame.yaw)
         )
 
+    def seen_in(self, frame: Pose) -> Pose:
+        """This pose in a frame that lies at ``frame``: what seen_from() leads back."""
+        cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
+        x, y = self.x - frame.x, self.y - frame.y
+        return Pose(cos * x + sin * y, cos * y - sin * x, wrapped(self.yaw - frame.yaw))
+
 
 def middle_of(poses: Sequence[Pose]) -> Pose:
     """The medians of x and y, with the last heading: of several readings, at least one, a few may be out."""

@@ -224,6 +224,10 @@ class Robot:
         """A pose of the odometry in the frame of goals and plans."""
         return pose.seen_from(Pose(*self.statement.motion.odom_to_map))
 
+    def in_odometry(self, pose: Pose) -> Pose:
+        """A pose in the frame of goals and plans, in the odometry's frame."""
+        return pose.seen_in(Pose(*self.statement.motion.odom_to_map))
+
     def in_arena(self, pose: Pose) -> bool:
         """Whether the statement lets the robot be driven to a pose in the frame of goals."""
         arena = self.statement.motion.arena

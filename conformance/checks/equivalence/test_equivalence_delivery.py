@@ -97,6 +97,17 @@ def test_nothing_follows(api: RestInterface, watched: list[Batch]) -> None:
         pytest.skip(str(nobody))
 
 
+@pytest.mark.phase("last")
+@pytest.mark.requirement(*_IDS)
+def test_nothing_follows_much_later(watched: list[Batch]) -> None:
+    """Nor is it one more message when all else has been tried."""
+    try:
+        for batch in watched:
+            batch.look_again()
+    except (NoObserverError, ProbeError) as nobody:
+        pytest.skip(str(nobody))
+
+
 def _order(how: str, delivery: Delivery) -> Order:
     return Order(how, delivery, (str(delivery.message_code), *map(repr, delivery[1:])))
 

@@ -33,3 +33,11 @@ def test_clock(robot: Robot, judge: Judge, clock: Clock) -> None:
         found=f"{rate:.3f} times as fast over {clock.span_s:.1f} s",
         cause="another rate",
     )
+    judge.check(
+        "rest-resources/pose-clock",
+        not clock.stands_between(scale),
+        robot.get(POSE),
+        "nanoseconds that advance as the time does within a second",
+        found=f"{clock.fine_rate or 0.0:.2g} times as fast within a second",
+        cause="below a second",
+    )

@@ -1,7 +1,7 @@
 """A goal that is driven to: it ends there, is then no longer current, and its id can be used again."""
 
 import time
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -10,8 +10,10 @@ from conformance.robot.drive import Drive
 from conformance.robot.geometry import Pose, middle_of
 from conformance.robot.goal import NEW, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals
+from conformance.robot.message_shapes import ODOMETRY
 from conformance.robot.plan import ask, judge_start
-from conformance.robot.robot import Robot
+from conformance.robot.robot import POSE, Robot
+from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
@@ -39,8 +41,7 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface
     if here is None:
         pytest.skip("the robot's pose cannot be read")
     (there,) = choose_goals(robot, 0.6 if robot.watchfulness == 1 else 0.4, 1)
-    body = goal_body(there, robot.statement.motion.frame, "reached")
-    exchange = put_goal(robot, body)
+    body, exchange = _put(robot, there)
     status = exchange.response.status
     if not judge.check("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal"):
         return
@@ -56,6 +57,18 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface
     judge.check("rest-resources/goal-id-again", status in NEW, again, "201 or 202 for a goal whose id has ended before")
     await_none(robot, 0.1)
     robot.delete_goal()
+
+
+def _put(robot: Robot, there: Pose) -> tuple[dict[str, Any], Exchange]:
+    """Put a goal: where the statement says that the frames differ, in the odometry's, if the robot takes that."""
+    odometry, _ = robot.read(POSE, ODOMETRY)
+    if odometry is not None and any(robot.statement.motion.odom_to_map):
+        body = goal_body(robot.in_odometry(there), odometry["header"]["frame_id"], "reached")
+        exchange = put_goal(robot, body)
+        if exchange.response.status in NEW:
+            return body, exchange
+    body = goal_body(there, robot.statement.motion.frame, "reached")
+    return body, put_goal(robot, body)
 
 
 def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: float) -> bool:

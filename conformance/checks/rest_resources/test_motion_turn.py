@@ -28,6 +28,8 @@ _LINEAR: Final = slice(0, 3)
 _ANGULAR: Final = slice(3, 6)
 # A robot that drops its angular velocity needs so long to show it, s.
 _SHOWS_S: Final = 0.2
+# Of the hold time: so long after a command it is given again, and holds from then on.
+_AGAIN: Final = 0.3
 # How often it is tried to tell how long a velocity holds.
 _ATTEMPTS: Final = 3
 # In this time several samples come, from any robot, s.
@@ -100,15 +102,15 @@ def _refused(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> Non
 
 
 def _arc(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
-    """A linear part beside the angular one, and away again."""
-    ahead = Velocity(linear_x=0.3 * robot.limits.linear_m_s)
+    """A linear part beside the angular one, ahead and then back."""
+    ahead, back = (Velocity(linear_x=share * robot.limits.linear_m_s) for share in (0.3, -0.3))
     drive.refresh(turning)
     if not drive.command_linear(ahead):
         return
     for _ in range(_TRIES):
         # Whether a PUT of the linear part renews the angular one too is the robot's affair: so again, and in time.
         drive.refresh(turning)
-        drive.command_linear(ahead)
+        drive.command_linear(back)
         drive.keep(min(_SHOWS_S, drive.holds_until - time.monotonic()))
         keeps, found = drive.sees(turning, 1.5, part=_ANGULAR, until=drive.holds_until)
         if keeps is not None:
@@ -252,9 +254,12 @@ def _watch(robot: Robot, drive: Drive, turning: Velocity) -> LetGo | None:
     is refused does not renew it.
     """
     drive.refresh(turning)
+    limits = robot.limits
+    if limits.hold_s is not None:
+        # So long that a robot which takes the next command for a repetition of this one ends it clearly too early.
+        drive.keep(drive.trace.sent + _AGAIN * limits.hold_s - time.monotonic())
     if not drive.command(turning):
         return None
-    limits = robot.limits
     full = drive.trace.sent
     if robot.actuated(0) and limits.hold_s is not None:
         drive.command_linear(turning)

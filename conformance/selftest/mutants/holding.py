@@ -97,6 +97,31 @@ class _Resuming(_Remembering):
         return response
 
 
+class _Deaf(_Remembering):
+    """While a velocity holds, what asks for the same is answered and forgotten."""
+
+    _HOLD_S = 1.0
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._taken = 0.0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        value: Any = parsed(request.body) if _PUTS(request) else None
+        if isinstance(value, dict) and self.last and time.monotonic() < self._taken + self._HOLD_S:
+            value = {**self.last, "linear": value} if _PUT_LINEAR(request) else value
+            if value == self.last:
+                return plain(204)(request)
+        return super().__call__(request, forward)
+
+    def put(self, request: Request, response: Response, forward: Forward) -> None:
+        """See _Remembering."""
+        super().put(request, response, forward)
+        if success(response):
+            self._taken = time.monotonic()
+
+
 def _parts(twist: Any) -> tuple[float, float]:
     try:
         return abs(twist["linear"]["x"]), abs(twist["angular"]["z"])
@@ -127,6 +152,7 @@ _mutant = of_class("safety", "rest")
 MUTANTS = (
     _mutant("safety-asleep", "A velocity ends only while somebody asks.", "hold-ends", _Asleep),
     _mutant("safety-renewed-by-refusal", "A refused velocity renews the one before it.", "hold-ends", _Renewed),
+    _mutant("safety-deaf", "While a velocity holds, the same one again does not renew it.", "hold", _Deaf),
     _mutant("safety-resuming", "After DELETE the velocity from before the goal is driven again.", "cancel", _Resuming),
     _mutant(
         "linear-revives-turning",

@@ -51,6 +51,10 @@ def goal_ahead(request: Request, forward: Forward, distance: float) -> None:
     sent(request, forward, "PUT", GOAL, {"goal": {"target_pose": target}})
 
 
+def _give_up(request: Request, forward: Forward) -> None:
+    sent(request, forward, "DELETE", GOAL)
+
+
 def after_refusal(
     where: Callable[[Request], bool],
     act: Callable[[Request, Forward], None],
@@ -77,6 +81,17 @@ def _delivered_in_vain(request: Request, forward: Forward) -> Response:
     response = forward(request)
     unwanted = deliveries(request) and (request.field("Accept") or "").startswith("image/")
     return problem(406, "nothing that you would have")(request) if unwanted and success(response) else response
+
+
+def _ordered_by(method: str) -> Make:
+    """A delivery by a method that the resource does not have is answered as ever, and made."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        if deliveries(request.copy(method="PUT")) and request.method == method:
+            forward(request.copy(method="PUT"))
+        return forward(request)
+
+    return lambda: change
 
 
 def _soap_refusal(request: Request, forward: Forward) -> Response:
@@ -128,10 +143,30 @@ MUTANTS = (
         after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)),
     ),
     _mutant(
+        "input-goal-refused-and-ended",
+        "An invalid goal is refused, and the active one is cancelled.",
+        "goal-refused",
+        after_refusal(rest("PUT", GOAL), _give_up),
+    ),
+    _mutant(
         "input-delivery-refused-and-made",
         "An invalid delivery is refused, and published.",
         "delivery-refused",
         after_refusal(deliveries, _deliver),
+        observer=True,
+    ),
+    _mutant(
+        "input-delivery-by-get",
+        "GET of what PUT orders is 405, and orders it.",
+        "delivery-refused",
+        _ordered_by("GET"),
+        observer=True,
+    ),
+    _mutant(
+        "input-delivery-by-options",
+        "OPTIONS of what PUT orders is answered, and orders it.",
+        "delivery-refused",
+        _ordered_by("OPTIONS"),
         observer=True,
     ),
     _mutant(

@@ -127,6 +127,10 @@ def _carried(odometry: Any) -> None:
     odometry["header"]["stamp"]["nanosec"] += 10**9
 
 
+def _in_milliseconds(odometry: Any) -> None:
+    odometry["header"]["stamp"]["nanosec"] //= 10**6
+
+
 def _earlier(odometry: Any) -> None:
     odometry["header"]["stamp"]["sec"] -= 1
 
@@ -209,6 +213,9 @@ MUTANTS = (
     ),
     _mutant(
         "odometry-lost", "When the odometry ceases, pose and velocity are the last ones for ever.", "pose-fresh", _Lost
+    ),
+    _mutant(
+        "pose-clock-milliseconds", "The stamp's nanoseconds are milliseconds.", "pose-clock", _told(_in_milliseconds)
     ),
     _mutant("pose-clock-fast", "The stamps' clock goes a tenth too fast.", "pose-clock", _FastClock),
     _mutant(

@@ -92,6 +92,13 @@ def _whole(request: Request, forward: Forward) -> Response:
     return plain(204)(request) if response.status == 200 else response
 
 
+def _whole_back(request: Request, forward: Forward) -> Response:
+    """PUT of a linear part that leads back sets the whole velocity."""
+    vector = parsed(request.body) if _PUT_LINEAR(request) else None
+    back = isinstance(vector, dict) and isinstance(vector.get("x"), int | float) and vector["x"] < 0
+    return _whole(request, forward) if back else forward(request)
+
+
 def _stuck(request: Request, forward: Forward) -> Response:
     """Valid linear velocities are accepted and forgotten."""
     if _PUT_LINEAR(request):
@@ -265,5 +272,11 @@ MUTANTS = (
     ),
     _mutant(
         "linear-stops-turning", "PUT of a linear velocity ends the turning.", "linear-keeps-angular", lambda: _whole
+    ),
+    _mutant(
+        "linear-back-stops-turning",
+        "PUT of a linear velocity that leads back ends the turning.",
+        "linear-keeps-angular",
+        lambda: _whole_back,
     ),
 )

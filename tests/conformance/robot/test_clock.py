@@ -12,15 +12,16 @@ _EPOCH = 1_700_000_000.0
 seeds = st.integers(0, 10_000)
 
 
-def clock(rate: float, seconds: float, seed: int, hz: float = 5.0, *, jump: float = 0.0) -> Clock:
-    """A clock that was read a dozen times a second."""
+def clock(rate: float, seconds: float, seed: int, hz: float = 5.0, *, jump: float = 0.0, unit: float = 1.0) -> Clock:
+    """A clock that was read a dozen times a second; the part below a second is in a unit of so many."""
     by, told = random.Random(seed), Clock()  # noqa: S311 - no secret
     at = by.uniform(0, 1)
     begun = at
     while at < begun + seconds:
         sample = int(at * hz) / hz
         late = 0.3 if by.random() < 0.02 else by.uniform(0, 0.01)
-        told.take(at + late, _EPOCH + rate * sample + (jump if at > begun + seconds / 2 else 0.0))
+        shown = _EPOCH + rate * sample + (jump if at > begun + seconds / 2 else 0.0)
+        told.take(at + late, shown // 1 + shown % 1 * unit)
         at += by.uniform(0.02, 0.15)
     return told
 
@@ -45,3 +46,13 @@ def test_a_simulation_may_declare_another_scale():
 def test_too_short_a_time_says_nothing():
     assert Clock().rate is None
     assert clock(1.0, 4.5, 1).rate is None
+
+
+@given(seeds, st.floats(5.4, 60.0), st.sampled_from((1.0, 2.0, 5.0, 20.0, 50.0)), st.sampled_from((0.0, 3600.0, -40.0)))
+def test_a_right_clock_does_not_stand_within_a_second(seed, seconds, hz, jump):
+    assert not clock(1.0, seconds, seed, hz, jump=jump).stands_between(1.0)
+
+
+@given(seeds, st.floats(5.4, 60.0), st.sampled_from((20.0, 50.0)), st.sampled_from((1e-3, 1e-6)))
+def test_nanoseconds_in_another_unit_are_seen(seed, seconds, hz, unit):
+    assert clock(1.0, seconds, seed, hz, unit=unit).stands_between(1.0)
