@@ -25,6 +25,7 @@ from conformance.robot.walk import Walk
 from conformance.transport.exchange import Exchange
 
 _IDS: Final = st.sampled_from((None, "a", "b", "a ", "A"))
+_RATHER_XML: Final = ("Accept", "application/xml, */*;q=0.1")
 _WHICH: Final = st.integers(0, 1)
 
 
@@ -131,7 +132,8 @@ class GoalMachine(RuleBasedStateMachine):
     def _cancel(self) -> bool:
         if not self._look():
             return False
-        exchange = self._robot.delete_goal()
+        # In whatever the client would be told, a goal is cancelled.
+        exchange = self._robot.delete_goal(_RATHER_XML)
         status = exchange.response.status
         if self._active is None:
             fine = status in {*CANCELLED, HTTPStatus.NOT_FOUND}

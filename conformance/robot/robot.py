@@ -211,9 +211,9 @@ class Robot:
         exchange = self.get(GOAL_PATH)
         return read_as(exchange.response, GOAL)[0], exchange
 
-    def delete_goal(self) -> Exchange:
+    def delete_goal(self, *headers: tuple[str, str]) -> Exchange:
         """Cancel the goal."""
-        return self.rest.send("DELETE", GOAL_PATH)
+        return self.rest.send("DELETE", GOAL_PATH, headers=headers)
 
     def map_pose(self) -> Pose | None:
         """Where the robot is in the frame of goals and plans, by the statement's transform."""

@@ -44,3 +44,19 @@ def test_quality_zero(api: RestInterface, judge: Judge) -> None:
                 found=f"{sent} is sent",
                 cause=sent,
             )
+
+
+@pytest.mark.requirement("http/accept-parameters")
+def test_charset_in_accept(api: RestInterface, judge: Judge) -> None:
+    """Many clients write the charset that they can read into Accept."""
+    cases = [(call, media_type) for call in answered(api) for media_type in call.operation.formats]
+    for call, media_type in api.run.effort.draw(cases, 20, f"{api.run.seed}/accept charset"):
+        if call.send(api, ("Accept", media_type)).response.media_type != media_type:
+            continue
+        exchange = call.send(api, ("Accept", f"{media_type}; charset=utf-8"))
+        judge.check(
+            "http/accept-parameters",
+            exchange.response.ok and exchange.response.media_type == media_type,
+            exchange,
+            f"{media_type} for Accept: {media_type}; charset=utf-8",
+        )

@@ -16,8 +16,8 @@ pytestmark = pytest.mark.needs("rest")
 _NOTHING = "image/png"
 # How a field may be written (RFC 9110 5.1, RFC 9112 5): its name in any case, white space around its value or none.
 _FIELDS = ("accept: {}", "ACCEPT: {}", "aCCept:{}", "Accept:\t{} \t", "Accept:   {}")
-# One list in several lines (RFC 9110 5.3): the last one holds what the robot has.
-_LINES = ("Accept: image/png", "Accept: image/webp;q=0.5", "Accept: {}")
+# One list in several lines (RFC 9110 5.3): the last one holds what the robot has, or the first.
+_LINES = (("Accept: image/png", "Accept: image/webp;q=0.5", "Accept: {}"), ("Accept: {}", "Accept: image/webp;q=0.5"))
 # So much later than its answer a connection may end, s.
 _ENDS_S = 2.0
 # Between two pieces of a request, s; so many pieces make the longest that any network would.
@@ -68,10 +68,14 @@ def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
             f"{wanted} for {line!r}, as for Accept: {media_type}",
             cause=form,
         )
-    attempt = _asked(api, call.path, *(line.format(media_type) for line in _LINES))
-    judge.check(
-        "http/field-lines", _sort(attempt) == wanted, attempt, f"{wanted} for a list whose last line has {media_type}"
-    )
+    for lines in _LINES:
+        attempt = _asked(api, call.path, *(line.format(media_type) for line in lines))
+        judge.check(
+            "http/field-lines",
+            _sort(attempt) == wanted,
+            attempt,
+            f"{wanted} for a list of {len(lines)} lines, of which one has {media_type}",
+        )
 
 
 @pytest.mark.phase("reading")

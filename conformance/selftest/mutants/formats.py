@@ -14,6 +14,7 @@ from conformance.selftest.mutants.changes import (
     When,
     altered,
     header,
+    instead,
     problem,
     rest,
     rewritten,
@@ -25,6 +26,7 @@ from conformance.selftest.mutants.xml_trees import named, tree
 
 _GET = rest("GET")
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
+_SMALL = 32 * 1024
 
 
 def _typed(media_type: str) -> Callable[[Response], bool]:
@@ -83,9 +85,17 @@ _mutant = of_class("rest-formats", "rest")
 
 
 def _no_xml_input(request: Request, forward: Forward) -> Response:
-    if _PUT(request) and request.media_type.endswith("xml"):
+    if _xml_put(request):
         return problem(415, f"Content-Type: {request.media_type} is not taken")(request)
     return forward(request)
+
+
+def _xml_put(request: Request) -> bool:
+    return _PUT(request) and request.media_type.endswith("xml")
+
+
+def _no_id(request: Request) -> None:
+    request.body = re.sub(rb"<goal_id>.*</goal_id>", b"", request.body, flags=re.DOTALL)
 
 
 def _json_problem(response: Response) -> None:
@@ -163,6 +173,15 @@ MUTANTS = (
         "Answers name two media types, each in a field of its own.",
         "http/field-once",
         _told(lambda answer: answer.fields.append(("Content-Type", "text/html"))),
+    ),
+    _mutant(
+        "format-large-xml",
+        "More than 32 KiB of XML are 413.",
+        "xml-input",
+        instead(lambda request: _xml_put(request) and len(request.body) > _SMALL, problem(413, "too large")),
+    ),
+    _mutant(
+        "format-xml-id-lost", "A goal that comes as XML gets another id.", "xml-input", rewritten(_xml_put, _no_id)
     ),
     _mutant("format-no-xml-input", "XML is not taken in PUT.", "xml-input", lambda: _no_xml_input),
     _mutant(

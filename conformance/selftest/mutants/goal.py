@@ -221,6 +221,12 @@ MUTANTS = (
     ),
     _mutant("goal-delete-ignored", "DELETE is 204 and cancels nothing.", "goal-delete", instead(_DELETE, plain(204))),
     _mutant(
+        "goal-delete-for-xml",
+        "DELETE by a client that would rather have XML is 204 and cancels nothing.",
+        "goal-delete",
+        instead(lambda request: _DELETE(request) and "xml" in (request.field("Accept") or ""), plain(204)),
+    ),
+    _mutant(
         "goal-delete-conflict",
         "DELETE of a goal cancels it, and is 409.",
         "goal-delete",

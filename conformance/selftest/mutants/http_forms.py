@@ -8,6 +8,7 @@ from conformance.selftest.messages import Change, Forward, Request, Response, un
 from conformance.selftest.mutants.changes import (
     altered,
     anything,
+    becomes,
     deliveries,
     header,
     instead,
@@ -59,6 +60,17 @@ def _forgetting(where: Callable[[Request], bool], *names: str) -> Callable[[], C
 def _first_line(request: Request) -> None:
     if first := request.field("Accept"):
         request.put("Accept", first)
+
+
+def _last_line(request: Request) -> None:
+    lines = [value for name, value in request.fields if name.lower() == "accept"]
+    if lines:
+        request.put("Accept", lines[-1])
+
+
+def _conditional(name: str) -> Callable[[Request], bool]:
+    """GET with a field that asks for less than all."""
+    return _having(lambda request: request.method == "GET" and request.field(name) is not None)
 
 
 _chunked = _having(lambda request: request.field("Transfer-Encoding") is not None)
@@ -139,6 +151,33 @@ MUTANTS = (
         "Of several Accept lines the first one counts.",
         "field-lines",
         rewritten(_having(lambda request: request.field("Accept") is not None), _first_line),
+    ),
+    _mutant(
+        "http-last-line",
+        "Of several Accept lines the last one counts.",
+        "field-lines",
+        rewritten(_having(lambda request: request.field("Accept") is not None), _last_line),
+    ),
+    _mutant(
+        "http-never-modified",
+        "Whoever has any entity tag is told 304.",
+        "preconditions",
+        instead(_conditional("If-None-Match"), plain(304)),
+    ),
+    _mutant(
+        "http-never-modified-since",
+        "Whoever has any date is told 304.",
+        "preconditions",
+        instead(_conditional("If-Modified-Since"), plain(304)),
+    ),
+    _mutant("http-part-of-all", "A part is 206 with all of it.", "range", altered(_conditional("Range"), becomes(206))),
+    _mutant(
+        "http-no-charset-in-accept",
+        "A format with a charset in Accept is 406.",
+        "accept-parameters",
+        instead(
+            _having(lambda request: "charset" in (request.field("Accept") or "").lower()), problem(406, "not that")
+        ),
     ),
     _mutant("http-stays-open", "Connection: close is not heeded.", "close", lambda: _kept),
     _mutant(
