@@ -29,7 +29,7 @@ _ANGULAR: Final = slice(3, 6)
 # A robot that drops its angular velocity needs so long to show it, s.
 _SHOWS_S: Final = 0.2
 # Of the hold time: so long after a command it is given again, and holds from then on.
-_AGAIN: Final = 0.3
+_AGAIN: Final = 0.25
 # How often it is tried to tell how long a velocity holds.
 _ATTEMPTS: Final = 3
 # In this time several samples come, from any robot, s.
