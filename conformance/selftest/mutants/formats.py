@@ -183,6 +183,12 @@ MUTANTS = (
     _mutant(
         "format-xml-id-lost", "A goal that comes as XML gets another id.", "xml-input", rewritten(_xml_put, _no_id)
     ),
+    _mutant(
+        "format-text-unquoted",
+        "An id in plain text is never quoted, whatever YAML makes of it then.",
+        "text-quoted",
+        _told(text(r"(?m)^(\s*id: )['\"]([^'\"\\]*)['\"]", r"\1\2"), _TEXT),
+    ),
     _mutant("format-no-xml-input", "XML is not taken in PUT.", "xml-input", lambda: _no_xml_input),
     _mutant(
         "format-problems-in-json",
