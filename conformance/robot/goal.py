@@ -15,6 +15,8 @@ NEW: Final = frozenset({201, 202})
 REPEATED: Final = frozenset({200, 202, 204})
 # 204 is what the contract asks for; a robot that says more than nothing says the same.
 CANCELLED: Final = frozenset({200, 202, 204})
+# What a client would rather be told in: whatever that is, a goal is cancelled.
+RATHER_XML: Final = ("Accept", "application/xml, */*;q=0.1")
 ACTIVE: Final = frozenset({1, 2, 3})
 _STEP_S: Final = 0.02
 _CLOSE: Final = 1e-6

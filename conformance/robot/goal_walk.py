@@ -11,6 +11,7 @@ from conformance.robot.geometry import Pose
 from conformance.robot.goal import (
     CANCELLED,
     NEW,
+    RATHER_XML,
     REPEATED,
     arrived,
     await_goal,
@@ -25,7 +26,6 @@ from conformance.robot.walk import Walk
 from conformance.transport.exchange import Exchange
 
 _IDS: Final = st.sampled_from((None, "a", "b", "a ", "A"))
-_RATHER_XML: Final = ("Accept", "application/xml, */*;q=0.1")
 _WHICH: Final = st.integers(0, 1)
 
 
@@ -132,8 +132,7 @@ class GoalMachine(RuleBasedStateMachine):
     def _cancel(self) -> bool:
         if not self._look():
             return False
-        # In whatever the client would be told, a goal is cancelled.
-        exchange = self._robot.delete_goal(_RATHER_XML)
+        exchange = self._robot.delete_goal(RATHER_XML)
         status = exchange.response.status
         if self._active is None:
             fine = status in {*CANCELLED, HTTPStatus.NOT_FOUND}

@@ -4,17 +4,21 @@ import pytest
 
 from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import Operation, is_xml, operations_of
-from conformance.documents.representation import UnreadableError, local_name, parse_xml
+from conformance.documents.representation import UnreadableError, local_name, parse_xml, read
 from conformance.rest.applicable import answered, reads
-from conformance.rest.calls import root_name
+from conformance.rest.calls import JSON, root_name
 from conformance.rest.formats import judge_same_values
 from conformance.rest.interface import RestInterface
+from conformance.robot.message_shapes import ODOMETRY
+from conformance.robot.robot import POSE
+from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 _XML = "application/xml"
 _TEXT = "text/plain"
+_TURNS = 3
 _IDS = {_XML: "rest-formats/xml", _TEXT: "rest-formats/text"}
 
 
@@ -82,3 +86,41 @@ def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None
         compared += judge_same_values(api, call, others).response.ok
     if not compared and not any(set(_IDS) & set(item.formats) for item in operations_of(api.run.contract)):
         judge.unclaimed("rest-formats/same-values", "the contract has one format only")
+
+
+@pytest.mark.requirement("rest-formats/same-values")
+def test_stamps_lie_between(api: RestInterface, judge: Judge) -> None:
+    """The odometry changes from answer to answer, but not back: XML's stamp lies between JSON's before and after."""
+    pose = next((call for call in reads(api) if call.operation.template == POSE), None)
+    for media_type in _IDS if pose is not None and api.run.contract.own else ():
+        if pose is None or media_type not in pose.operation.formats:
+            continue
+        found = ""
+        # Once a clock may be set, or an answer be late.
+        for _ in range(_TURNS):
+            exchanges = [pose.send(api, ("Accept", name)) for name in (JSON, media_type, JSON)]
+            first, other, last = map(_stamp, exchanges)
+            if first is None or other is None or last is None or first <= other <= last or last < first:
+                found = ""
+                break
+            found = f"{other} (sec, nanosec) between {first} and {last}"
+        judge.check(
+            "rest-formats/same-values",
+            not found,
+            exchanges[1],
+            f"a stamp in {media_type} that is not before JSON's just before, nor behind JSON's just after",
+            found=found,
+            cause="stamp",
+        )
+
+
+def _stamp(exchange: Exchange) -> tuple[float, float] | None:
+    """Seconds and nanoseconds of an odometry in any format; None where it cannot be read."""
+    answer = exchange.response
+    if not answer.ok:
+        return None
+    try:
+        stamp = read(answer.media_type, answer.body, ODOMETRY.schema)["header"]["stamp"]
+        return float(stamp["sec"]), float(stamp["nanosec"])
+    except (UnreadableError, TypeError, KeyError, ValueError):
+        return None

@@ -10,6 +10,7 @@ from conformance.robot.geometry import Pose
 from conformance.robot.goal import (
     CANCELLED,
     NEW,
+    RATHER_XML,
     REPEATED,
     arrived,
     await_goal,
@@ -52,7 +53,7 @@ def _judge_new(robot: Robot, judge: Judge, exchange: Exchange, body: dict[str, A
 def _cancel(robot: Robot, judge: Judge) -> Exchange:
     """Cancel the active goal; judge the status, that it is gone, and that the robot stands still in time."""
     drive = Drive(robot)
-    exchange = robot.delete_goal()
+    exchange = robot.delete_goal(RATHER_XML)
     answered = time.monotonic()
     status = exchange.response.status
     goal, none = robot.goal()

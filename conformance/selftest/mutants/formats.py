@@ -22,7 +22,7 @@ from conformance.selftest.mutants.changes import (
     text,
 )
 from conformance.selftest.mutants.mutant import of_class
-from conformance.selftest.mutants.xml_trees import named, tree
+from conformance.selftest.mutants.xml_trees import each, named, says, tree
 
 _GET = rest("GET")
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
@@ -188,6 +188,12 @@ MUTANTS = (
         "An id in plain text is never quoted, whatever YAML makes of it then.",
         "text-quoted",
         _told(text(r"(?m)^(\s*id: )['\"]([^'\"\\]*)['\"]", r"\1\2"), _TEXT),
+    ),
+    _mutant(
+        "format-xml-whole-seconds",
+        "The pose's stamp in XML has no nanoseconds.",
+        "same-values",
+        altered(rest("GET", POSE), tree(each("nanosec", says("0"))), _XML),
     ),
     _mutant("format-no-xml-input", "XML is not taken in PUT.", "xml-input", lambda: _no_xml_input),
     _mutant(
