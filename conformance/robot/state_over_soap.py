@@ -45,6 +45,9 @@ def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float
     after, _ = robot.read(path, shape)
     if before is None or after is None:
         return None, exchange
+    broken = "" if problem else shape.problem(between)
+    if broken:  # which is none that will be right a moment later
+        judge_difference(robot, name, broken, exchange)
     problem = problem or disagreement(before, between, after, _slack(robot))
     if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
         problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"

@@ -177,6 +177,9 @@ def _goal_difference(robot: Robot, subscribers: SoapService) -> tuple[str | None
     statuses = {one.response.status for one in (first, last) if one.response}
     if before is not None and after is not None and before["goal_id"]["id"] == after["goal_id"]["id"]:
         between = from_element(found[0], GOAL_AND_STATUS.schema) if found else None
+        broken = "" if between is None else GOAL_AND_STATUS.problem(between)
+        if broken:  # which is none that will be right a moment later
+            robot.judge.check("equivalence/goal", False, exchange, "a complete goal, as REST gives it", found=broken)
         shown = [projected(goal, GOAL_AND_STATUS.schema) for goal in (before, after)]
         problem = problem or ("no goal" if between is None else disagreement(shown[0], between, shown[1], _SLACK))
         return problem, exchange

@@ -1,4 +1,4 @@
-"""XML, text and JSON of one moment while the robot moves, and when it has come to rest elsewhere.
+"""XML, text and JSON of one moment: in motion and at rest elsewhere, of one goal and of one plan after another.
 
 At rest where a robot began, most of its values are zero, and none has ever been another. What a format told before a
 change may be what it tells first afterwards: so after each change the first reading counts, and what is out by it after
@@ -6,6 +6,7 @@ each of several changes is judged. One may be out because a sample of the odomet
 """
 
 import time
+from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
@@ -15,17 +16,21 @@ from conformance.rest.applicable import reads
 from conformance.rest.calls import JSON, Call
 from conformance.rest.formats import Found, judge_disagreement, judge_same_values, one_turn
 from conformance.rest.interface import RestInterface
+from conformance.rest.validity import require_valid
 from conformance.robot.drive import Drive
 from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals, make_room
-from conformance.robot.robot import GOAL_PATH, LINEAR, POSE, STILL, VELOCITY, Robot, Velocity
+from conformance.robot.plan import reachable
+from conformance.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot, Velocity
 from conformance.verdict.effort import Effort
 
-pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+pytestmark = pytest.mark.needs("rest")
 # First readings that are out after so many changes of one kind are no chance.
 _CHANGES: Final = 3
 
 
+@pytest.mark.phase("motion")
+@pytest.mark.motion
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> None:
     """On an arc, and at rest after it, every value of pose and velocity is the same in all formats."""
@@ -60,28 +65,71 @@ def test_formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> 
             judge_disagreement(api, by_id[id_], item, item.exchange)
 
 
+@pytest.mark.phase("motion")
+@pytest.mark.motion
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> None:
     """One goal after another is the same in all formats, from the first reading on."""
-    calls = [call for call in reads(api) if call.operation.template == GOAL_PATH and _others(call)]
-    if effort.name == "quick" or not calls:
+    call = _reader(api, GOAL_PATH)
+    if effort.name == "quick" or call is None:
         return  # one goal is looked at in any case
-    left: Found | None = None
-    for number, pose in enumerate(choose_goals(robot, 1.5, 1 + _CHANGES)):
-        body = goal_body(pose, robot.statement.motion.frame, f"formats {number}")
-        put_goal(robot, body)
-        await_goal(robot, body)
-        time.sleep(robot.settle_s if left else 0.0)
-        found, _ = one_turn(api, calls[0], _others(calls[0]))
-        if not number:
-            continue  # there was none before
-        left = found if left is None else {place: item for place, item in found.items() if place in left}
-        if not left:
-            break
-    for item in (left or {}).values():
-        judge_disagreement(api, calls[0], item, item.exchange)
+
+    def put() -> Iterator[Call]:
+        for number, pose in enumerate(choose_goals(robot, 1.5, 1 + _CHANGES)):
+            body = goal_body(pose, robot.statement.motion.frame, f"formats {number}")
+            put_goal(robot, body)
+            await_goal(robot, body)
+            # Where the goal before was out, this one gets the time that commands may take.
+            time.sleep(robot.settle_s if number > 1 else 0.0)
+            yield call
+
+    _judge_first(api, put())
     robot.delete_goal()
     await_none(robot)
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("rest-formats/same-values")
+def test_formats_of_plans(api: RestInterface, robot: Robot, effort: Effort) -> None:
+    """One plan after another is the same in all formats, from the first reading on."""
+    call = _reader(api, PLAN)
+    here = robot.map_pose()
+    if effort.name == "quick" or call is None or here is None:
+        return  # one plan is looked at in any case
+    goals = reachable(robot, here, max(1.0, robot.statement.motion.radius_m), 3)
+
+    def ask() -> Iterator[Call]:
+        for number in range(1 + _CHANGES if goals else 0):
+            goal, start = goals[number % len(goals)], goals[(number + 1) % len(goals)]
+            given = {"x": goal.x, "y": goal.y, "yaw": 0.3 * number}
+            given |= {"start_x": start.x, "start_y": start.y, "start_yaw": -0.4 * number}
+            asked = call
+            for name, value in given.items():
+                asked = asked.having(name, repr(value))
+            require_valid(api.run.contract, "GET", asked.path)
+            yield asked
+
+    _judge_first(api, ask())
+
+
+def _judge_first(api: RestInterface, changes: Iterator[Call]) -> None:
+    """Read what is another one each time; what is out in the first reading each time, but the first, is judged."""
+    left: Found | None = None
+    for number, call in enumerate(changes):
+        found, exchange = one_turn(api, call, _others(call))
+        if number:
+            left = found if left is None else {place: item for place, item in found.items() if place in left}
+        if left == {}:
+            if exchange.response.ok:
+                judge_disagreement(api, call, None, exchange)
+            return
+    for item in (left or {}).values():
+        judge_disagreement(api, call, item, item.exchange)
+
+
+def _reader(api: RestInterface, template: str) -> Call | None:
+    """What reads a resource, where it has several formats."""
+    return next((call for call in reads(api) if call.operation.template == template and _others(call)), None)
 
 
 def _others(call: Call) -> list[str]:
