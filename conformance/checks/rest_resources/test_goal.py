@@ -122,7 +122,8 @@ def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge, standstill: Stan
 
 
 def _cancel_again(robot: Robot, judge: Judge, body: dict[str, Any]) -> None:
-    """A goal that is cancelled, and a watch of what follows."""
+    """A velocity, a goal in its place that is cancelled, and a watch of what follows."""
+    robot.put_velocity(_slow_turn(robot))
     put_goal(robot, body)
     _await_motion(robot)
     _cancel(robot, judge)

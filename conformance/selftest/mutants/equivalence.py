@@ -42,7 +42,7 @@ from conformance.selftest.mutants.xml_trees import each, gone, named, tree
 
 _LATER_S, _SOON_S = 0.4, 0.05
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_COORDINATES = re.compile(rb"<(?:\w+:)?(\w+_[xy])>\s*([^<\s]+)\s*<")
+_COORDINATES = re.compile(rb"<(?:\w+:)?(\w+_[xy])(?:\s[^>]*)?>\s*([^<\s]+)\s*<")
 _COFFEE, _DELIVERY = soap("ExecuteCoffeeRequest"), soap("ExecuteDeliveryRequest")
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 
@@ -91,6 +91,8 @@ def _again_by_rest(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if _COFFEE(request) and success(response):
         values = {name.decode(): text.decode() for name, text in _COORDINATES.findall(request.body)}
+        if not values.keys() >= set(COORDINATES):
+            return response  # written in another encoding, or with entities in it
         pairs = "".join(f"/{name}/{values[field]}" for name, field in zip(PATH_NAMES, COORDINATES, strict=True))
         target = f"{DELIVERIES}{COFFEE}{pairs}"
         later(

@@ -153,7 +153,9 @@ MUTANTS = (
     _mutant("safety-asleep", "A velocity ends only while somebody asks.", "hold-ends", _Asleep),
     _mutant("safety-renewed-by-refusal", "A refused velocity renews the one before it.", "hold-ends", _Renewed),
     _mutant("safety-deaf", "While a velocity holds, the same one again does not renew it.", "hold", _Deaf),
-    _mutant("safety-resuming", "After DELETE the velocity from before the goal is driven again.", "cancel", _Resuming),
+    _mutant(
+        "safety-resuming", "After DELETE the velocity from before the goal is driven again.", "cancel-stays", _Resuming
+    ),
     _mutant(
         "linear-revives-turning",
         "PUT of a linear velocity brings back a turning that had ended.",

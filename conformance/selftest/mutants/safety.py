@@ -47,11 +47,11 @@ class _Relentless:
         self._turn = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        if _PUT(request) or rest("PUT", GOAL)(request):
-            self._turn += 1
         response = forward(request)
-        if _PUT(request) and success(response) and moving(request):
-            later(0.15, self._renew, self._turn, request.copy(), forward)
+        if (_PUT(request) or rest("PUT", GOAL)(request)) and success(response):
+            self._turn += 1
+            if _PUT(request) and moving(request):
+                later(0.15, self._renew, self._turn, request.copy(), forward)
         return response
 
     def _renew(self, turn: int, request: Request, forward: Forward) -> None:
