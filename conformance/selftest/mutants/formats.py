@@ -202,4 +202,10 @@ MUTANTS = (
         "problem-xml",
         altered(_GET, _json_problem, lambda response: response.status >= 400),
     ),
+    _mutant(
+        "format-problems-of-input-in-json",
+        "Errors of what is put are JSON, although XML was asked for.",
+        "problem-xml",
+        altered(_PUT, _json_problem, lambda response: response.status >= 400),
+    ),
 )
