@@ -6,10 +6,6 @@ the intervals allow for: Birge's ratio, 1 where they allow for all of it (Physic
 probability of as much scatter where they do (Cochran's Q).
 
 Intervals that are right at 95 % overlap less often than one thinks: of ten, all do in about 85 % of such experiments.
-
-The robot's event loop keeps to one processor, where there are two, and with ``--pinned`` the generator to another:
-whether they share one decides the time of a request more than what they do, and the scheduler changes its mind in
-every block. ``--free`` leaves it to that.
 """
 
 import argparse
@@ -20,12 +16,11 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from robot import LOADER_CPUS, pinned, running_robot
+from robot import running_robot
 from scipy import stats
 
 _WITHIN = 0.05
@@ -41,20 +36,14 @@ class Run(NamedTuple):
     high: float
 
 
-def measured(rest: str, soap: str, seconds: float, seed: int, cpus: set[int] | None) -> Run:
-    """One run of `roaas load`, on these processors."""
+def measured(rest: str, soap: str, seconds: float, seed: int) -> Run:
+    """One run of `roaas load`."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", "from loadtests.cli import load; load()", _STATEMENT, "--rest", rest]
         services = ["--publishers-wsdl", soap, "--subscribers-wsdl", soap.replace("publisher", "subscriber")]
         what = ["--allow-motion", "--operation", "delivery", "--client", "wire", "--rate", "200", "--warmup", "1"]
         times = ["--duration", f"{seconds:g}", "--seed", str(seed), "--out", folder]
-        done = subprocess.run(
-            [*command, *services, *what, *times],
-            check=False,
-            capture_output=True,
-            text=True,
-            preexec_fn=lambda: os.sched_setaffinity(0, cpus) if cpus else None,
-        )
+        done = subprocess.run([*command, *services, *what, *times], check=False, capture_output=True, text=True)
         file = Path(folder) / "latency.json"
         if not file.exists():
             raise RuntimeError(done.stderr)
@@ -94,17 +83,11 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=10, help="[10]")
     parser.add_argument("--seconds", type=float, default=20.0, help="of each [20]")
     parser.add_argument("--domain-id", default="50", help="ROS domain of the robot [50]")
-    parser.add_argument("--free", action="store_true", help="let the scheduler place the robot")
-    parser.add_argument("--pinned", action="store_true", help="place the generator too")
     options = parser.parse_args()
-    with ExitStack() as stack:
-        robot = stack.enter_context(running_robot(options.domain_id))
-        if not options.free:
-            stack.enter_context(pinned(robot.pids[0]))
-        cpus = LOADER_CPUS if options.pinned else None
+    with running_robot(options.domain_id) as robot:
         rest = f"http://{robot.rest.host}:{robot.rest.port}"
         soap = f"http://{robot.soap.host}:{robot.soap.port}{robot.soap.target}?wsdl"
-        runs = [measured(rest, soap, options.seconds, seed, cpus) for seed in range(1, options.runs + 1)]
+        runs = [measured(rest, soap, options.seconds, seed) for seed in range(1, options.runs + 1)]
     return 0 if agreement(runs) else 1
 
 
