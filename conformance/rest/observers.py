@@ -22,6 +22,9 @@ from conformance.transport.exchange import Exchange, Listener, NoAnswer, Request
 _CHARSET = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
 # Fields by which clients act, and which several values make meaningless (RFC 9110 5.3).
 _SINGLE = ("Content-Type", "Location", "Retry-After")
+# What asks for a part, or for an answer on a condition, and the statuses that only such a request has.
+_CONDITIONS = frozenset({"range", "if-none-match", "if-modified-since", "if-match", "if-unmodified-since"})
+_CONDITIONAL = frozenset({206, 304, 412, 416})
 
 
 class Observer(Listener):
@@ -43,6 +46,8 @@ class Observer(Listener):
         if context is None:
             return
         self._judge_fields(exchange, answer, context)
+        if answer.status in _CONDITIONAL and _is_conditional(exchange.request):
+            return  # a server's own answer (RFC 9110 13, 14), which no description need have; a part is no document
         if answer.body and not context.is_head and is_json(answer.media_type):
             self._judge_json(exchange, answer)
         if answer.ok and answer.body and (is_xml(answer.media_type) or answer.media_type == "text/plain"):
@@ -149,6 +154,10 @@ class Observer(Listener):
                     found=f"status {status}{retry} for {request.method}",
                     cause=f"{status} {operation}",
                 )
+
+
+def _is_conditional(request: Request) -> bool:
+    return any(name.lower() in _CONDITIONS for name, _ in request.headers)
 
 
 def _other_charset(answer: Response) -> str:

@@ -47,6 +47,14 @@ def test_good_answers_raise_no_alarm():
     assert seen("PUT", "/robot/velocity/", None, problem="connection closed without an answer") == set()
 
 
+def test_a_server_s_answer_to_a_range_or_a_condition_is_its_own():
+    part = [DATE, VARY, JSON, ("Content-Range", "bytes 0-3/300")]
+    assert seen("GET", "/robot/velocity/", 206, part, b'{"li', sent=(("Range", "bytes=0-3"),)) == set()
+    assert seen("GET", "/robot/velocity/", 304, [DATE], sent=(("If-None-Match", '"a"'),)) == set()
+    assert "http/declared-status" in seen("GET", "/robot/velocity/", 206, part, b'{"li')
+    assert "http/declared-status" in seen("GET", "/robot/velocity/", 304, [DATE])
+
+
 @pytest.mark.parametrize(
     ("method", "path", "status", "body"),
     [
