@@ -111,6 +111,7 @@ def test_velocities_of_many(robot: Robot, judge: Judge, effort: Effort) -> None:
     velocities = [robot.share_of_limits(*shares) for shares in _SHARES]
     for _ in range(1 if effort.name == "quick" else 4):
         for _ in range(_TRIES):
+            sent = time.monotonic()
             came = _put_together(robot, VELOCITY, [velocity.twist for velocity in velocities])
             answered = time.monotonic()
             taken = []
@@ -118,7 +119,7 @@ def test_velocities_of_many(robot: Robot, judge: Judge, effort: Effort) -> None:
                 if isinstance(one, Exchange) and one.response.ok:
                     taken.append(velocity)
                     _judge_accepted(judge, velocity, one)
-            decided = not taken or _judge_reached(robot, judge, taken, answered)
+            decided = not taken or _judge_reached(robot, judge, taken, sent, answered)
             robot.put_velocity(STILL)
             if decided:
                 break
@@ -135,15 +136,17 @@ def _judge_accepted(judge: Judge, velocity: Velocity, exchange: Exchange) -> Non
         judge.check(_PUTS, same, exchange, f"the accepted velocity, {velocity}", found=f"{said}")
 
 
-def _judge_reached(robot: Robot, judge: Judge, taken: list[Velocity], answered: float) -> bool:
+def _judge_reached(robot: Robot, judge: Judge, taken: list[Velocity], sent: float, answered: float) -> bool:
     """Judge what the robot reaches before it may end by itself, as nobody knows which of the velocities to renew.
+
+    The one that it takes last it may have had as soon as it was sent, however late another one is answered.
 
     Returns:
         Whether that could be judged: it was reached, or was not in an answer that came between settling and the end.
     """
     limits = robot.limits
     settled = answered + 1.1 * limits.settle_s
-    ends = math.inf if limits.hold_s is None else answered + 0.95 * limits.hold_s
+    ends = math.inf if limits.hold_s is None else sent + 0.95 * limits.hold_s
     until = min(answered + robot.settle_s, ends)
     expected = " or ".join(f"({velocity})" for velocity in taken)
     missed: tuple[Velocity, Exchange] | None = None

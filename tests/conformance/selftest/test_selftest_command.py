@@ -59,7 +59,8 @@ def test_an_interrupted_self_test_keeps_what_it_has(tmp_path, faults):
     assert first.startswith("[1/")
     assert "Traceback" not in rest
     document = json.loads((tmp_path / "selftest.json").read_text())
-    assert len(document["generated"]["mutants"] if "generated" in document else document["faults"]) == 1
+    done = len(document["generated"]["mutants"] if "generated" in document else document["faults"])
+    assert 1 <= done < int(first.partition("]")[0].removeprefix("[1/"))
     assert "interrupted" in document["notes"][0]
 
 
