@@ -23,6 +23,7 @@ from reference_robot.webservices.robot.goals import Goals
 POSE, VELOCITY, GOAL, HEALTH = "/robot/pose/", "/robot/velocity/", "/robot/navigation/action/goal/", "/robot/health/"
 PLAN = "/robot/navigation/service/plan?x=1&y=2"
 HOLD = 0.4
+EXECUTING = 2  # action_msgs/GoalStatus
 LEASE = str(Path(__file__).with_name("short_lease.xml"))
 
 
@@ -240,6 +241,8 @@ def test_a_foreign_robot_delivers(attached, nav2):
         )
         assert attached.call("PUT", GOAL, json=goal("ours", x=1.0)).status_code == 201
         assert nav2.navigator.next("goal") == 1.0
+        # That it is being driven to both hear by one message; an order that overtakes it would be driven instead.
+        eventually(lambda: attached.call("GET", GOAL).json()["status"]["code"] == EXECUTING)
         assert attached.call("PUT", delivery_path()).status_code == 204
         assert nav2.navigator.heard_nothing()
         nav2.navigator.do(finish=True)
