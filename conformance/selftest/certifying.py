@@ -166,12 +166,14 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
 
 
 class _EnoughKnown(Judge):
-    """A judge who lets no further check begin once one of some requirements has failed."""
+    """A judge who lets no further check begin once one of some requirements, of a class that is claimed, has failed."""
 
     def __init__(self, run: Run, enough: frozenset[str]) -> None:
         super().__init__(set(run.contract.ledger))
         self._run = run
-        self._enough = enough
+        # What fails in a class that is not claimed is no verdict, and nothing is known by it.
+        claimed = set(map(str, run.claims))
+        self._enough = frozenset(id_ for id_ in enough if id_.split("/")[0] in claimed)
 
     def check(
         self,

@@ -53,3 +53,11 @@ def test_no_further_check_begins_once_enough_is_known(tmp_path):
     run.judge.check("http/date", False, None, "a date")
     assert run.aborted.startswith("http/date has failed")
     assert run.judge.refuted() == {"http/head": 1, "http/date": 1}
+
+
+def test_what_is_not_claimed_is_never_enough(tmp_path):
+    run = robot_of(job(classes=("rest-delivery",), enough=frozenset({"http/date", "rest-delivery/put"})), tmp_path).run
+    run.judge.check("http/date", False, None, "a date")
+    assert not run.aborted
+    run.judge.check("rest-delivery/put", False, None, "2xx")
+    assert run.aborted
