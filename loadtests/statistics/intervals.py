@@ -28,6 +28,9 @@ LEAST_ROUNDS = 6
 _AT_ONCE = 100  # resamples held in memory together
 _TAIL = 0.025
 _UPPER_TAIL = 0.99
+#: On the logarithmic scale: an interval that reaches farther than a factor of 1e13 says no more than one that does not,
+#: and further on its bounds would be zero and infinite.
+_FARTHEST = 30.0
 
 
 def samples_for_point(quantile: float) -> int:
@@ -68,8 +71,9 @@ class Replicates:
         known = combined[np.isfinite(combined) & (combined > 0)]
         if len(known) < RESAMPLES / 2 or estimate <= 0:
             return None
-        low, high = (np.log(expanded_percentiles(known, self.degrees)) - math.log(estimate)).tolist()
-        return estimate * math.exp(low * self.widening), estimate * math.exp(high * self.widening)
+        reach = (np.log(expanded_percentiles(known, self.degrees)) - math.log(estimate)) * self.widening
+        low, high = np.clip(reach, -_FARTHEST, _FARTHEST).tolist()
+        return estimate * math.exp(low), estimate * math.exp(high)
 
     def difference_interval(self) -> Interval | None:
         """The 95 % interval of the second side's figure less the first's."""

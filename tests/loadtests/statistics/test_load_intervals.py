@@ -1,5 +1,7 @@
 """Statistics on made-up data, where the truth is known."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from loadtests.schedule.plan import Load, Plan
 from loadtests.statistics.figures import quantiles, series
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.intervals import (
+    Replicates,
     compare,
     figure_interval_ms,
     order_interval_ms,
@@ -16,10 +19,11 @@ from loadtests.statistics.intervals import (
     samples_for_interval,
     samples_for_point,
 )
+from loadtests.statistics.judgement import judge as judge_ratio
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.over_time import time_series
 from loadtests.statistics.recorder import Recorder
-from loadtests.statistics.rounds import Unit
+from loadtests.statistics.rounds import Sample, Unit, in_rounds
 from loadtests.statistics.threshold import judge
 
 
@@ -150,3 +154,12 @@ def test_a_stall_of_two_seconds_in_twenty_shows_in_the_p99(stall_from):
 def test_a_generator_that_waits_for_answers_would_not_have_seen_it():
     measured = simulated(STALL, 7.3, 2.0, open_model=False)
     assert max(entry["response_ms"]["p99"] or 0 for entry in series(measured, {})) < 10
+
+
+def test_an_interval_without_end_has_bounds_that_can_be_reckoned_with():
+    rounds = in_rounds(Sample(np.array([0]), np.ones((1, 2, 1)), np.array([0, 0])), "p50")
+    wild = np.geomspace(1e-200, 1e200, 2000)
+    low, high = Replicates(np.ones(1), wild[None, :], rounds, 5, 3.0).interval(wild, 1.0)
+    assert 0 < low < 1 < high < math.inf
+    assert judge_ratio(1.0, (low, high), (low, high)).verdict == "none"
+    assert judge_ratio(0.5, (low, high), (0.9, 1.1)).verdict == "none"
