@@ -180,7 +180,9 @@ def projected(value: Any, schema: Schema) -> Any:
         return value
     schema = flat(schema)
     if isinstance(value, list):
-        items = schema.get("items", {})
+        items = flat(schema.get("items", {}))
+        if not items.get("properties") and "items" not in items:
+            return list(value)  # numbers, mostly: an odometry has 72 of them in two lists
         return [projected(item, items) for item in value]
     properties: dict[str, Schema] = schema.get("properties", {})
     if not properties:
