@@ -131,7 +131,7 @@ def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[st
     teller = Progress(robot, progress)
     options = [f"--config-file={os.devnull}", f"--rootdir={_CHECKS}", "--import-mode=importlib", "--capture=no"]
     unused = ("terminal", "cacheprovider", "logging", "junitxml", "unraisableexception", "threadexception")
-    options += ["-Wignore", *(f"-pno:{name}" for name in unused)]
+    options += ["-Wignore", "--assert=plain", *(f"-pno:{name}" for name in unused)]
     try:
         with pytest.MonkeyPatch.context() as environment:
             environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
