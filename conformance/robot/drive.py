@@ -21,6 +21,8 @@ _PACE_S: Final = 0.02
 _COUNTED_ON_S: Final = 0.5
 # A velocity of which too few samples are seen is looked at for so much longer, s.
 _LONGER_S: Final = 1.0
+# How often it is begun anew to reach a velocity that was renewed too late, so that it may have ended before.
+_LAPSES: Final = 2
 
 
 class Drive:
@@ -89,7 +91,7 @@ class Drive:
     def holds_until(self) -> float:
         """Until when the last command of all components certainly holds, s of the monotonic clock."""
         hold_s = self.robot.limits.hold_s
-        return self.trace.full_sent + (_COUNTED_ON_S if hold_s is None else 0.9 * hold_s - 0.02)
+        return self.trace.full_sent + (_COUNTED_ON_S if hold_s is None else _certain_s(hold_s))
 
     def refresh(self, velocity: Velocity) -> None:
         """Command a velocity again, and let it be reached where it had ended meanwhile."""
@@ -138,22 +140,34 @@ class Drive:
         limits = self.robot.limits
         patience = min(self.robot.settle_s, within or self.robot.settle_s)
         begun = self.trace.answered if since is None else since
-        until = begun + patience
         first = len(self.trace.turns)
         count = SEVERAL if ids else 1
+        lapses = 0
         # A velocity may end before it is reached, where it does not hold for as long as the robot takes to settle.
         every = _COUNTED_ON_S if limits.hold_s is None else 0.6 * limits.hold_s
         renews = limits.hold_s is None or limits.hold_s < patience
         while True:
             asked = time.monotonic()
             if renews and asked > self.trace.sent + every:
+                lapsed = limits.hold_s is not None and asked > self.trace.sent + _certain_s(limits.hold_s)
                 self._renew()
+                if lapsed and lapses < _LAPSES:
+                    # Whoever looks was late, not the robot: that one may have slowed down meanwhile.
+                    lapses, first = lapses + 1, len(self.trace.turns)
+                    begun = self.trace.commands[-1].answered
+            until = begun + patience
             self.look()
-            there = windows.shown(limits, self.trace.turns[first:], wanted, part=part, count=count)
-            if there or (asked > until and there is not None) or asked > until + _LONGER_S:
+            turns = self.trace.turns[first:]
+            there = windows.shown(limits, turns, wanted, part=part, count=count)
+            # What was seen while it had time left, before whoever looks was held up, is not held against the robot.
+            settled = min(until, begun + limits.settle_s + self.robot.sample_s) if within is None else begun
+            late = [turn for turn in turns if turn.at >= settled]
+            decided = windows.shown(limits, late, wanted, part=part, count=count) is not None
+            if there or (asked > until and decided) or asked > until + _LONGER_S:
                 break
         for id_ in ids:
-            self._judge(drive_rules.arrival(id_, self.trace, wanted, limits, part, begun))
+            since = settled if not there and windows.newest(late) else begun
+            self._judge(drive_rules.arrival(id_, self.trace, wanted, limits, part, since))
         return bool(there)
 
     def sees(
@@ -191,3 +205,8 @@ class Drive:
     def judge_motion(self) -> None:
         """Judge whether the pose moved by what the velocity said."""
         judge_path(self.robot.judge, self.trace.odometry, self.trace.measured, self.robot.limits.noise)
+
+
+def _certain_s(hold_s: float) -> float:
+    """How long a velocity that holds for so long is certainly there after its command was sent, s."""
+    return 0.9 * hold_s - 0.02
