@@ -148,7 +148,7 @@ class Drive:
         renews = limits.hold_s is None or limits.hold_s < patience
         while True:
             asked = time.monotonic()
-            if renews and asked > self.trace.sent + every:
+            if renews and self.trace.commands and asked > self.trace.sent + every:
                 lapsed = limits.hold_s is not None and asked > self.trace.sent + _certain_s(limits.hold_s)
                 self._renew()
                 if lapsed and lapses < _LAPSES:

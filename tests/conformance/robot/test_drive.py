@@ -125,3 +125,15 @@ def test_a_velocity_that_ended_because_it_was_renewed_too_late_has_its_settle_ti
 @pytest.mark.parametrize("hold_s", [1.0, 10.0])
 def test_a_robot_that_takes_twice_its_settle_time_is_refuted(monkeypatch, looks, hold_s):
     assert not _judged(monkeypatch, 3 * _SETTLE_S, looks, hold_s)
+
+
+def test_rest_that_no_velocity_brings_about_is_waited_for_as_long(monkeypatch):
+    # A goal was cancelled: there is no command to be renewed.
+    clock = _Clock()
+    monkeypatch.setattr(drive, "time", clock)
+    body = _Body(clock, 0.0, 10.0)
+    body.tell()
+    driven = _Drive(body, {}, 1.0)
+    driven.reach(STILL, "safety/cancel", since=clock.now)
+    assert driven.judged == [False]
+    assert driven.trace.commands == ()
