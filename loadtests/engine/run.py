@@ -8,6 +8,7 @@ import signal
 import sys
 import traceback
 from contextlib import ExitStack
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,6 +37,7 @@ from loadtests.result.document import compose
 from loadtests.result.files import write
 from loadtests.result.outcome import Carried, Outcome, RunAborted
 from loadtests.result.terminal import summary
+from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S
 
 if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
@@ -96,6 +98,7 @@ class Run:
         names = self.plan.series_names()
         if not names:
             raise RunAborted(ExitCode.USAGE, "no operation can be measured with these endpoints")
+        slowest_s = 0.0
         for robot, whose in zip(self.robots, ("the robot", "the robot of --against"), strict=False):
             findings = preflight(robot, names, self.settings.load.seed)
             if whose == "the robot":
@@ -111,6 +114,9 @@ class Run:
             self.outcome.invalid += [
                 f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
             ]
+            slowest_s = max(slowest_s, findings.slowest_s)
+        if self.plan.open_model and slowest_s <= QUICK_ANSWER_S:
+            self.plan = replace(self.plan, least_block_s=SHORT_BLOCK_S)
 
     # The measurement.
 

@@ -10,7 +10,7 @@ import requests
 from loadtests.clients.failures import UNREACHABLE, CallError, answer_error
 from loadtests.clients.library import LibraryRest, LibrarySoap, new_session, read_document
 from loadtests.clients.payloads import CATALOGUE, variants
-from loadtests.clients.wire import Answer
+from loadtests.clients.wire import Answer, now_ns
 from loadtests.measuring.equivalence import deliveries_missing, pose_difference, requests_difference
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ class Findings:
         failures: what failed, by series.
         unequal: how the interfaces' payloads differ.
         notes: what could not be compared.
+        slowest_s: the longest that the wire client waited for an answer, connecting included.
     """
 
     sizes: dict[SeriesName, tuple[int, int]] = field(default_factory=dict)
@@ -35,6 +36,7 @@ class Findings:
     failures: dict[SeriesName, CallError] = field(default_factory=dict)
     unequal: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    slowest_s: float = 0.0
 
     @property
     def unreachable(self) -> bool:
@@ -92,10 +94,12 @@ def _wire_call(robot: Robot, name: SeriesName, seed: int, findings: Findings) ->
     operation, interface, _ = name
     request = robot.requests(interface, operation, seed)[0]
     connection = robot.bridge() if interface == "rosbridge" else robot.http(interface, operation)
+    began = now_ns()
     try:
         answer = connection.call(request)
     finally:
         connection.close()
+    findings.slowest_s = max(findings.slowest_s, (answer.received_ns - began) / 1e9)
     server = answer.headers.get(b"server")
     findings.servers[interface] = server.decode("latin-1") if server else None
     location = answer.headers.get(b"location")

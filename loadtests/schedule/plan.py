@@ -1,7 +1,8 @@
 """What a run does when: segments of one client on one interface, a schedule that the seed fixes.
 
-A fair duel: REST and SOAP take turns in blocks of a tenth of a second or more, in quartets REST-SOAP-SOAP-REST
-or the reverse by lot (ABBA), so that a drift of the machine or the robot meets both alike. In two quartets of
+A fair duel: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse by lot (ABBA).
+A machine's level wanders within a second: the sooner one follows the other, the more of it they share. A block has to
+be long beside an answer, though, for what is under way when it ends meets the other interface. In two quartets of
 five one interface meets itself under two names (A/A): what difference that shows is noise, and it is given as
 much time as the duel, so that it is known as well as the effect is. The library clients get quartets of their
 own, for their CPU time would delay the wire client's starts.
@@ -11,6 +12,7 @@ Three interfaces take turns likewise, in sextets; two robots over one interface 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count, product
@@ -32,14 +34,14 @@ MOVES = frozenset({"delivery", "coffee"})
 #: generator's time, and a generator that is busy for more than a fraction of it measures itself.
 LIBRARY_RATE = 250.0
 GAP_S = 0.010
-_BLOCK_S = 0.1
-_MAX_BLOCKS = 600  # bounds memory: each block keeps its own histograms
-_ARRIVALS_PER_BLOCK = 10
+#: The least length of a block: of a robot that answers within QUICK_ANSWER_S to arrivals on time, and otherwise.
+SHORT_BLOCK_S, BLOCK_S = 0.02, 0.1
+QUICK_ANSWER_S = 0.01
+_MAX_BLOCKS = 1200  # bounds memory: each block keeps its own histograms
+_ARRIVALS_PER_BLOCK = 4  # of each operation
 _TURNS, _LIBRARY_TURN = 5, 1  # of five rounds the second
 _AA_TURNS = {1: (2, 4), 2: (4,)}  # the third and the fifth; the fifth alone where two robots meet
 _NS = 1_000_000_000
-
-
 #: Names a series of the result: (operation, interface, client).
 SeriesName = tuple[str, str, str]
 
@@ -109,6 +111,7 @@ class Plan:
         connections: users that are up in all; in the closed model as many take part as the load says.
         repeat: which of several runs of the same plan this is; those after the first begin with new connections.
         offset_s: when it starts, in seconds of load since the first one's start.
+        least_block_s: BLOCK_S, or SHORT_BLOCK_S where the robot is known to be quick.
     """
 
     operations: tuple[str, ...]
@@ -125,6 +128,7 @@ class Plan:
     robots: int = 1
     repeat: int = 0
     offset_s: float = 0.0
+    least_block_s: float = BLOCK_S
 
     def as_message(self) -> dict[str, Any]:
         """A form that msgpack carries."""
@@ -163,9 +167,8 @@ class Plan:
     @cached_property
     def _rounds(self) -> list[Segment]:
         """The duel's blocks in their order, without their times."""
-        least = max(_BLOCK_S, self.load.duration_s / _MAX_BLOCKS)
-        if self.load.rate:
-            least = max(least, _ARRIVALS_PER_BLOCK / self.load.rate)
+        arrivals = _ARRIVALS_PER_BLOCK * len(self.operations)
+        least = max(self.least_block_s, self.load.duration_s / _MAX_BLOCKS, arrivals / (self.load.rate or math.inf))
         most = int(self.load.duration_s / least + 1e-9)
         rng = np.random.default_rng([self.load.seed, 1, self.repeat])
         made: list[Segment] = []
@@ -216,7 +219,7 @@ class Plan:
         ]
         if self.load.warmup_s <= 0:
             return []
-        blocks = max(len(turns), round(self.load.warmup_s / _BLOCK_S))
+        blocks = max(len(turns), round(self.load.warmup_s / BLOCK_S))
         rate = self.load.rate or 0.0
         made = []
         for index in range(blocks):

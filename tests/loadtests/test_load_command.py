@@ -63,6 +63,13 @@ def test_a_slow_robot_is_seen_to_be_slow_and_misses_its_threshold(toy, load, tmp
     assert result["thresholds"][0]["outcome"] == "missed"
     assert result["comparisons"] == []
     assert run.code == (1 if result["valid"] else 4)
+    assert result["plan"]["block_s"] >= 0.099, "long beside an answer"
+
+
+def test_a_quick_robot_is_asked_in_shorter_blocks(toy, load):
+    robot = toy()
+    runs = (load(*robot.both(), "--rate 400 --duration 1 --warmup 0 --client wire") for _ in range(5))
+    assert any(run.result["plan"]["block_s"] < 0.03 for run in runs), "a busy machine may delay the first answer once"
 
 
 def test_a_stall_is_seen_by_every_request_that_it_meets(toy, load):

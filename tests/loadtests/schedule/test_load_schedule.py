@@ -14,7 +14,7 @@ from loadtests.measuring.priority import first_in_line
 from loadtests.schedule.alarm import make_alarm
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Pacer
-from loadtests.schedule.plan import CLIENTS, Load, Plan
+from loadtests.schedule.plan import BLOCK_S, CLIENTS, SHORT_BLOCK_S, Load, Plan
 
 LOAD = Load(rate=100.0, users=None, duration_s=20.0, warmup_s=1.0, arrivals="constant", seed=1)
 PLAN = Plan(("delivery", "pose"), ("rest", "soap"), CLIENTS, LOAD, timeout_s=10.0, workers=1, connections=32)
@@ -114,8 +114,17 @@ def test_no_second_passes_without_the_wire_client():
 @given(st.floats(0.1, 3600.0), st.floats(0.01, 5000.0) | st.none())
 def test_the_number_of_blocks_is_bounded_whatever_the_run(duration, rate):
     plan = varied(duration_s=duration, rate=rate, users=None if rate else 3)
-    assert 2 <= plan.blocks <= 600
+    assert 2 <= plan.blocks <= 1200
     assert plan.length_s == pytest.approx(plan.load.warmup_s + duration, abs=1e-6)
+
+
+def test_a_quick_robots_interfaces_take_turns_sooner_and_each_block_still_has_its_arrivals():
+    slow, quick = varied(rate=400.0), replace(varied(rate=400.0), least_block_s=SHORT_BLOCK_S)
+    assert slow.block_s == pytest.approx(BLOCK_S, rel=0.02)
+    assert quick.block_s == pytest.approx(SHORT_BLOCK_S, rel=0.02)
+    counts = Counter(segment for segment, *_ in everything(quick))
+    assert min(counts.values()) >= 5
+    assert replace(varied(rate=100.0), least_block_s=SHORT_BLOCK_S).block_s == pytest.approx(0.08, rel=0.02)
 
 
 def test_all_clients_run_at_one_rate():
