@@ -115,7 +115,7 @@ class Run:
                 f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
             ]
             slowest_s = max(slowest_s, findings.slowest_s)
-        if self.plan.open_model and slowest_s <= QUICK_ANSWER_S:
+        if self.plan.open_model and self.plan.workers == 1 and slowest_s <= QUICK_ANSWER_S:
             self.plan = replace(self.plan, least_block_s=SHORT_BLOCK_S)
 
     # The measurement.

@@ -6,6 +6,8 @@ the schedule without any message between them.
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from loadtests.clients.payloads import VARIANTS
@@ -24,6 +26,7 @@ class Schedule:
         self.worker = worker
         self.workers = workers
         self._counts = self._counted()
+        self._before = self._counted_before()
 
     def _counted(self) -> list[int]:
         """Arrivals of each segment over all workers: at the rate asked for, for as long as the segment is open.
@@ -46,6 +49,19 @@ class Schedule:
             counts.append(int(owed[key] + 1e-9))
             owed[key] -= counts[-1]
         return counts
+
+    def _counted_before(self) -> list[int]:
+        """Arrivals of a segment's client and interface in the segments before it.
+
+        Workers and operations take turns from there on: in short blocks whoever comes first would get more.
+        """
+        so_far: Counter[tuple[str, str, str]] = Counter()
+        before = []
+        for segment, count in zip(self.plan.segments, self._counts, strict=True):
+            key = (segment.phase, segment.interface, segment.client)
+            before.append(so_far[key])
+            so_far[key] += count
+        return before
 
     def _rng(self, segment: int, purpose: int) -> np.random.Generator:
         return np.random.default_rng([self.plan.load.seed, purpose, self.plan.first_segment + segment])
@@ -77,7 +93,11 @@ class Schedule:
 
     def share(self, segment: int) -> int:
         """How many of a segment's arrivals are this worker's."""
-        return len(range((self.worker + segment) % self.workers, self._counts[segment], self.workers))
+        return len(self._mine(segment))
+
+    def _mine(self, segment: int) -> range:
+        """The places of this worker's arrivals among a segment's."""
+        return range((self.worker - self._before[segment]) % self.workers, self._counts[segment], self.workers)
 
     def due_ns(self, segment: int) -> list[int]:
         """The offsets of all arrivals in a segment, over all workers, in order."""
@@ -94,12 +114,12 @@ class Schedule:
     def arrivals(self, segment: int) -> list[tuple[int, int, int]]:
         """This worker's arrivals in a segment: (offset in ns, operation, payload), in order."""
         due = self.due_ns(segment)
-        kinds = np.resize(np.array(self.operations(segment)), len(due))
+        kinds = np.resize(np.roll(self.operations(segment), -self._before[segment]), len(due))
         rng = self._rng(segment, 4)
         rng.shuffle(kinds)
         payloads = rng.integers(VARIANTS, size=len(due)).tolist()
-        mine = slice((self.worker + segment) % self.workers, None, self.workers)
-        return list(zip(due[mine], kinds.tolist()[mine], payloads[mine], strict=True))
+        made = list(zip(due, kinds.tolist(), payloads, strict=True))
+        return [made[place] for place in self._mine(segment)]
 
 
 def arrivals_due(plan: Plan, elapsed_s: float, *, phase: str, interface: str | None = None) -> int:

@@ -72,7 +72,7 @@ class Segment:
     @property
     def opens_ns(self) -> int:
         """Offset at which its requests may start: after the quiet gap."""
-        return self.start_ns + min(int(GAP_S * _NS), (self.end_ns - self.start_ns) // 4)
+        return self.start_ns + min(int(GAP_S * _NS), (self.end_ns - self.start_ns) // 8)
 
     @property
     def active_s(self) -> float:

@@ -118,6 +118,24 @@ def test_the_number_of_blocks_is_bounded_whatever_the_run(duration, rate):
     assert plan.length_s == pytest.approx(plan.load.warmup_s + duration, abs=1e-6)
 
 
+def test_workers_and_operations_get_their_even_share_of_short_blocks():
+    plan = replace(varied(workers=2, rate=75.0), least_block_s=SHORT_BLOCK_S)
+    made = [everything(plan, worker, 2) for worker in range(2)]
+    for interface, client in (("rest", "wire"), ("soap", "wire"), ("soap", "zeep")):
+        met = [
+            Counter(
+                operation
+                for segment, _, operation, _ in share
+                if (plan.segments[segment].phase, plan.segments[segment].interface, plan.segments[segment].client)
+                == ("duel", interface, client)
+            )
+            for share in made
+        ]
+        assert abs(met[0].total() - met[1].total()) <= 1
+        both = met[0] + met[1]
+        assert abs(both[0] - both[1]) <= 1
+
+
 def test_a_quick_robots_interfaces_take_turns_sooner_and_each_block_still_has_its_arrivals():
     slow, quick = varied(rate=400.0), replace(varied(rate=400.0), least_block_s=SHORT_BLOCK_S)
     assert slow.block_s == pytest.approx(BLOCK_S, rel=0.02)
