@@ -20,7 +20,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -115,11 +116,32 @@ def verdict(*, met: bool) -> str:
     return "met" if met else "MISSED"
 
 
+@contextmanager
+def awake() -> Iterator[bool]:
+    """Processors do not sleep while this lasts, if that is allowed; yields whether it was (PM QoS, as cyclictest)."""
+    try:
+        descriptor = os.open("/dev/cpu_dma_latency", os.O_WRONLY)
+    except OSError:
+        yield False
+        return
+    try:
+        os.write(descriptor, bytes(4))  # microseconds that a processor may take to wake up
+        yield True
+    finally:
+        os.close(descriptor)
+
+
 def one_connection(url: str, seconds: float, rounds: int) -> bool:
-    """The wire client beside wrk."""
+    """The wire client beside wrk; on a virtual machine that sleeps between two octets, waking up is most of a time."""
     if shutil.which("wrk") is None:
         print("wire client beside wrk: not measured, wrk is not installed")
         return True
+    met = _beside_wrk("one connection, as the machine is", url, seconds, rounds)
+    with awake() as allowed:
+        return _beside_wrk("one connection, processors kept awake", url, seconds, rounds) if allowed else met
+
+
+def _beside_wrk(name: str, url: str, seconds: float, rounds: int) -> bool:
     pairs = []
     for _ in range(rounds):
         found = roaas(url, seconds, "--users", "1")["series"][0]["service_ms"]
@@ -128,11 +150,11 @@ def one_connection(url: str, seconds: float, rounds: int) -> bool:
     near = ours <= theirs * 1.3 or ours - theirs <= 40  # noqa: PLR2004 -- the target: 30 % or 40 µs
     tail = ours99 <= 2 * theirs99
     print(
-        f"one connection, median: wire {ours:.0f} us, wrk {theirs:.0f} us, ratio {ours / theirs:.2f}, "
+        f"{name}, median: wire {ours:.0f} us, wrk {theirs:.0f} us, ratio {ours / theirs:.2f}, "
         f"{ours - theirs:+.0f} us: {verdict(met=near)} (30 % or 40 us)"
     )
     print(
-        f"one connection, p99: wire {ours99:.0f} us, wrk {theirs99:.0f} us, "
+        f"{name}, p99: wire {ours99:.0f} us, wrk {theirs99:.0f} us, "
         f"ratio {ours99 / theirs99:.2f}: {verdict(met=tail)} (2)"
     )
     return near and tail
