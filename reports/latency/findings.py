@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from reports.latency import against, older
+from reports.latency import against
 from reports.latency.distributions import Series
 from reports.latency.figures.spans import means
 from reports.latency.figures.timeline import Stall, stalls
@@ -34,7 +34,7 @@ class Verdict:
 
 def verdict(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> Verdict:
     """The result's own headline, and the tone in which it is said."""
-    said = result.get("headline") or older.headline(result, series)
+    said = result["headline"]
     return Verdict(*_tone(result, series), said["words"], said["sentence"])
 
 
