@@ -58,6 +58,10 @@ RULES = (
         "A stream of YAML may begin with a byte order mark, which is no part of its content (YAML 1.2.2 5.2); that "
         "there is none is said of JSON (contract.md#json, RFC 8259 8.1).",
     ),
+    Rule(
+        r"body-empty(@[\w-]+)?:putGoal:body:\w+",
+        "A goal that is taken is answered by a status (contract.md#goals); nothing says that the answer has content.",
+    ),
     Rule(r"status:putDelivery:2\d\d-2\d\d", "A delivery answers 2xx, and 204 is only preferred (contract.md#rest)."),
     Rule(
         r"header-(drop|change):put\w+:Vary",
