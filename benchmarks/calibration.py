@@ -24,7 +24,7 @@ import numpy as np
 from scipy import signal, stats
 
 from loadtests.schedule.arrivals import Schedule
-from loadtests.schedule.plan import Load, Plan
+from loadtests.schedule.plan import SHORT_BLOCK_S, Load, Plan
 from loadtests.statistics.between_runs import IDLE_MACHINE
 from loadtests.statistics.figures import comparison, noise
 from loadtests.statistics.measured import Measured
@@ -43,7 +43,7 @@ CLAIMS = frozenset({"differs", "bounded"})
 def made_run(seed: int, seconds: float, shift: float) -> Measured:
     """A run of which only the robot's times are made; SOAP's are `shift` times REST's."""
     load = Load(RATE, None, seconds, 0.0, "constant", seed)
-    plan = Plan(("pose",), ("rest", "soap"), ("wire",), load, timeout_s=10.0, workers=1, connections=32)
+    plan = Plan(("pose",), ("rest", "soap"), ("wire",), load, 10.0, 1, 32, least_block_s=SHORT_BLOCK_S)
     schedule, recorder = Schedule(plan, 0, 1), Recorder(plan.series_of())
     rng = np.random.default_rng([seed, 99])
     kept, before = math.exp(-_STEP_S / MEMORY_S), int(10 * MEMORY_S / _STEP_S)

@@ -16,6 +16,8 @@ from conformance.soap.service import SoapService
 from conformance.transport.exchange import Exchange
 
 _SLACK: Final = Slack()
+# Two samples are farther apart than this, ns.
+_SAMPLES_APART_NS: Final = 1000
 #: Path, operation and shape of each state.
 STATES: Final[dict[str, tuple[str, str, Shape]]] = {
     "pose": (POSE, "GetPose", ODOMETRY),
@@ -45,13 +47,23 @@ def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float
     after, _ = robot.read(path, shape)
     if before is None or after is None:
         return None, exchange
-    broken = "" if problem else shape.problem(between)
+    broken = "" if problem else shape.problem(between) or restamped(between, before, after)
     if broken:  # which is none that will be right a moment later
         judge_difference(robot, name, broken, exchange)
     problem = problem or disagreement(before, between, after, _slack(robot))
     if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
         problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"
     return problem, exchange
+
+
+def restamped(message: Any, *others: Any) -> str:
+    """How a message has nearly the stamp of another: no robot samples so fast, so it is the same one told wrongly."""
+    sec, nanosec = stamp_of(message)
+    for other in map(stamp_of, others):
+        apart_ns = 1e9 * (sec - other[0]) + nanosec - other[1]
+        if 0 < abs(apart_ns) < _SAMPLES_APART_NS:
+            return f"stamp {(sec, nanosec)}, {apart_ns:+g} ns from that of the same message, {other}"
+    return ""
 
 
 def _slack(robot: Robot) -> Slack:

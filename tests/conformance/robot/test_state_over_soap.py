@@ -1,0 +1,22 @@
+"""Whether a message over SOAP is one that REST gives too."""
+
+import pytest
+
+from conformance.robot.state_over_soap import restamped
+
+
+def stamped(sec, nanosec):
+    return {"header": {"stamp": {"sec": sec, "nanosec": nanosec}}}
+
+
+@pytest.mark.parametrize("apart", [1, -1, 999])
+def test_a_stamp_that_is_off_by_some_nanoseconds_belongs_to_no_message(apart):
+    before, after = stamped(1_700_000_000, 999_999_500), stamped(1_700_000_000, 999_999_500)
+    sec, nanosec = divmod(1_700_000_000 * 10**9 + 999_999_500 + apart, 10**9)
+    assert f"{apart:+d} ns" in restamped(stamped(sec, nanosec), before, after)
+
+
+def test_the_same_stamp_and_that_of_another_sample_are_in_order():
+    before, after = stamped(5, 100), stamped(5, 20_000_100)
+    for sound in (before, after, stamped(5, 10_000_100), {}):
+        assert not restamped(sound, before, after)
