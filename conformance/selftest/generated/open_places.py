@@ -59,6 +59,12 @@ RULES = (
         "there is none is said of JSON (contract.md#json, RFC 8259 8.1).",
     ),
     Rule(
+        r"(default|scale|single|ulp|ignore|lag|clamp|round)(@[\w-]+)?:putGoal:request\."
+        r"(goal_id|header|goal\.target_pose\.header)\.stamp\.\w+:\w+",
+        "When a goal was put is a robot's own to say, as where it is left out: what is shown again are the id and the "
+        "pose (contract.md#goals).",
+    ),
+    Rule(
         r"body-empty(@[\w-]+)?:putGoal:body:\w+",
         "A goal that is taken is answered by a status (contract.md#goals); nothing says that the answer has content.",
     ),
