@@ -122,6 +122,7 @@ class _Relay:
         self._link, self._seed = link, seed
         self._connections = 0
         self._outage = (float("inf"), float("inf"))
+        self._under_way: set[asyncio.Task[None] | None] = set()
 
     async def serve(self, targets: tuple[Address, ...], pipe: Pipe) -> None:
         servers = [await self._listen(target) for target in targets]
@@ -130,7 +131,13 @@ class _Relay:
 
     async def _listen(self, target: Address) -> asyncio.Server:
         async def accepted(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            await self._relay(target, reader, writer)
+            # The loop itself holds tasks weakly: one in which both ways wait for the outage to end would be collected.
+            task = asyncio.current_task()
+            self._under_way.add(task)
+            try:
+                await self._relay(target, reader, writer)
+            finally:
+                self._under_way.discard(task)
 
         return await asyncio.start_server(accepted, "127.0.0.1", 0)
 
