@@ -39,10 +39,13 @@ class Addresses:
 
     def outward(self, response: Response) -> Response:
         """The robot's response as clients are to see it; the response itself is altered."""
-        for side, there in self.robot.items():
+        for side, robot in self.robot.items():
             here = self.public(side)
-            response.body = response.body.replace(there.encode(), here.encode())
-            response.fields = [(name, value.replace(there, here)) for name, value in response.fields]
+            # A robot may go by the Host field, which is the proxy's, and cannot know that the proxy speaks TLS.
+            asked = self.proxy[side]
+            for there in (robot, asked.replace("https:", "http:")) if asked.startswith("https:") else (robot,):
+                response.body = response.body.replace(there.encode(), here.encode())
+                response.fields = [(name, value.replace(there, here)) for name, value in response.fields]
         location = response.field("Location")
         if self.prefix and location is not None and location.startswith("/"):
             response.put("Location", self.prefix + location)

@@ -12,6 +12,12 @@ def test_addresses_in_bodies_and_fields_are_the_proxys():
     assert (response.field("Location"), response.body) == ("http://p:3/x", b"http://p:3/a http://p:4/b")
 
 
+def test_a_robot_that_goes_by_its_host_is_at_a_proxy_that_speaks_tls():
+    behind_tls = Addresses(PLAIN.robot, {"rest": "https://p:3", "soap": "https://p:4"})
+    response = behind_tls.outward(Response(200, [("Location", "http://p:3/x")], b"http://p:4/b http://r:2/c"))
+    assert (response.field("Location"), response.body) == ("https://p:3/x", b"https://p:4/b https://p:4/c")
+
+
 def test_a_prefix_is_taken_off_and_put_on():
     assert PREFIXED.inward(Request("rest", "GET", "/api/x")).target == "/x"
     assert PREFIXED.inward(Request("rest", "GET", "/x")) is None
