@@ -32,8 +32,11 @@ def asked() -> list[Question]:
 
 
 def _questions(api: RestInterface, known: list[Question]) -> list[Question]:
+    """What is asked; ends the check that asks, as one that cannot be judged, where the robot answers nothing of it."""
     if not known:
         known += questions(api, plan_questions(api))
+    if not known:
+        pytest.skip("no resource gives an answer that can be told from another's")
     return known
 
 

@@ -5,8 +5,10 @@ import json
 import signal
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
@@ -98,6 +100,27 @@ def test_a_plain_web_server_does_not_conform(tmp_path, web_server):
     assert failed["failures"][0]["request"]["curl"].endswith("/robot/pose/")
     assert (tmp_path / "out" / "certificate.html").exists()
     assert (tmp_path / "out" / "junit.xml").exists()
+
+
+def test_a_server_of_one_page_leaves_nothing_in_error(tmp_path):
+    class _Page(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(b"<html>welcome</html>")
+
+        def log_message(self, *_):
+            return
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), _Page) as server:
+        server.handle_error = lambda *_: None  # clients that break off are no news
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        url = f"http://127.0.0.1:{server.server_port}"
+        done, result = _certify(tmp_path, "--rest", url, "--effort", "quick", "--class", "http")
+        server.shutdown()
+    assert done.returncode == 1
+    assert "error" not in {item["verdict"] for item in result["requirements"]}
 
 
 def test_a_claimed_class_without_its_interface_fails(tmp_path, web_server):
