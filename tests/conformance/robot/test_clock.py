@@ -53,6 +53,7 @@ def test_a_right_clock_does_not_stand_within_a_second(seed, seconds, hz, jump):
     assert not clock(1.0, seconds, seed, hz, jump=jump).stands_between(1.0)
 
 
-@given(seeds, st.floats(5.4, 60.0), st.sampled_from((20.0, 50.0)), st.sampled_from((1e-3, 1e-6)))
+# In looks of 6 s and less one in eight hundred does not show it, of 8 s none of 1,600.
+@given(seeds, st.floats(8.0, 60.0), st.sampled_from((20.0, 50.0)), st.sampled_from((1e-3, 1e-6)))
 def test_nanoseconds_in_another_unit_are_seen(seed, seconds, hz, unit):
     assert clock(1.0, seconds, seed, hz, unit=unit).stands_between(1.0)
