@@ -1,5 +1,10 @@
-"""What is answered 406 is not done: a PUT is applied or refused, and not both (contract, several clients)."""
+"""A PUT whose answer no format can give is refused or done, and not both (contract, several clients).
 
+What is answered 406 has no effect, and what is answered as done has one (RFC 9110 9.3.4).
+"""
+
+from collections.abc import Callable
+from functools import partial
 from http import HTTPStatus
 from typing import Any, Final
 
@@ -8,27 +13,31 @@ import pytest
 from conformance.rest.calls import JSON
 from conformance.rest.interface import RestInterface
 from conformance.robot.drive import Drive
-from conformance.robot.geometry import Pose
-from conformance.robot.goal import goal_body
 from conformance.robot.message_shapes import body_of
-from conformance.robot.robot import GOAL_PATH, LINEAR, STILL, VELOCITY, Robot
+from conformance.robot.robot import GOAL_PATH, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.robot.standstill import Standstill
 from conformance.robot.stopping import bring_to_rest
+from conformance.robot.taken import goal_has_effect, turned_goal, velocity_has_effect
+from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("standstill"), pytest.mark.needs("rest"), pytest.mark.motion]
 _ID: Final = "http/not-acceptable-undone"
+# What says that a PUT has its effect.
+_EFFECT: Final = {
+    VELOCITY: "rest-resources/velocity-converges",
+    LINEAR: "rest-resources/linear-put",
+    GOAL_PATH: "rest-resources/goal-get",
+}
 # What no robot answers a PUT in.
 _NOTHING: Final = "image/png"
-# Far enough, rad, that the robot is not there before anybody looks.
-_TURN: Final = 2.5
 
 
-@pytest.mark.requirement(_ID)
+@pytest.mark.requirement(_ID, *_EFFECT.values())
 def test_what_is_not_acceptable_is_not_done(
     api: RestInterface, robot: Robot, standstill: Standstill, judge: Judge
 ) -> None:
-    """A velocity or a goal that is answered 406 moves nothing; one that is taken all the same may."""
+    """A velocity or a goal that is answered 406 moves nothing; one that is answered as done moves the robot."""
     refused = _try_each(api, robot, 0.0)
     if not refused:
         judge.note(_ID, "no PUT of a velocity or a goal is answered 406")
@@ -40,31 +49,57 @@ def test_what_is_not_acceptable_is_not_done(
     standstill.tried(_ID, "rest, and no goal, after 406", again, seconds=robot.limits.settle_s, goal=True)
 
 
+def _put(robot: Robot, path: str, value: dict[str, Any]) -> Exchange:
+    """PUT as JSON, where no format of the answer is acceptable."""
+    fields = (("Content-Type", JSON), ("Accept", _NOTHING))
+    return robot.rest.send("PUT", path, headers=fields, body=body_of(value))
+
+
 def _try_each(api: RestInterface, robot: Robot, watched_s: float) -> int:
     """PUT what would move the robot where no format is acceptable, and watch each for so long. Returns how many 406."""
     fast = robot.share_of_limits(0.4, 0.4)
-    values: list[tuple[str, Any]] = [(VELOCITY, fast.twist), (LINEAR, fast.linear)]
+    straight = Velocity(*fast[:3])
+    tried: list[tuple[str, dict[str, Any], Callable[[], bool | None]]] = [
+        (VELOCITY, fast.twist, lambda: _velocity_has_effect(api, robot, VELOCITY, fast, fast.twist)),
+        (LINEAR, fast.linear, lambda: _velocity_has_effect(api, robot, LINEAR, straight, fast.linear)),
+    ]
     here = robot.map_pose()
     if here is not None:
-        ahead = Pose(here.x, here.y, here.yaw + _TURN)
-        values.append((GOAL_PATH, goal_body(ahead, robot.statement.motion.frame, "not acceptable")))
+        puts = partial(_put, robot, GOAL_PATH), partial(robot.put, GOAL_PATH)
+        tried.append((GOAL_PATH, turned_goal(robot, here), lambda: goal_has_effect(api, *puts)))
     refused = 0
-    for path, value in values:
-        fields = (("Content-Type", JSON), ("Accept", _NOTHING))
-        exchange = robot.rest.send("PUT", path, headers=fields, body=body_of(value))
+    for path, value, has_effect in tried:
+        exchange = _put(robot, path, value)
         if exchange.response.ok:
             bring_to_rest(api)
-        if exchange.response.status != HTTPStatus.NOT_ACCEPTABLE:
-            continue
-        refused += 1
-        drive = Drive(robot)
-        drive.keep(watched_s)
-        still, found = drive.sees(STILL, 2)
-        if still and robot.goal()[0] is not None:
-            still, found = False, "a goal is active"
-        robot.judge.check(
-            _ID, still is not False, exchange, f"no effect of a PUT of {path} that is answered 406", found=found
-        )
-        if still is False:
-            bring_to_rest(api)
+            _judge_done(robot, path, exchange, done=has_effect())
+        if exchange.response.status == HTTPStatus.NOT_ACCEPTABLE:
+            refused += 1
+            _judge_undone(api, robot, path, exchange, watched_s)
     return refused
+
+
+def _velocity_has_effect(
+    api: RestInterface, robot: Robot, path: str, wanted: Velocity, value: dict[str, Any]
+) -> bool | None:
+    return velocity_has_effect(api, wanted, partial(_put, robot, path, value), partial(robot.put, path, value))
+
+
+def _judge_done(robot: Robot, path: str, exchange: Exchange, *, done: bool | None) -> None:
+    if done is not None:
+        expected = f"the effect of a PUT of {path} that is answered {exchange.response.status}"
+        found = "none, where the same PUT with Accept: application/json has it"
+        robot.judge.check(_EFFECT[path], done, exchange, expected, found=found)
+
+
+def _judge_undone(api: RestInterface, robot: Robot, path: str, exchange: Exchange, watched_s: float) -> None:
+    drive = Drive(robot)
+    drive.keep(watched_s)
+    still, found = drive.sees(STILL, 2)
+    if still and robot.goal()[0] is not None:
+        still, found = False, "a goal is active"
+    robot.judge.check(
+        _ID, still is not False, exchange, f"no effect of a PUT of {path} that is answered 406", found=found
+    )
+    if still is False:
+        bring_to_rest(api)

@@ -35,6 +35,7 @@ pytestmark = [pytest.mark.needs("rest"), pytest.mark.motion]
 _OTHER_METHODS: Final = ("GET", "HEAD", "OPTIONS", "POST", "DELETE", "PATCH")
 _SAFE: Final = {"GET", "HEAD", "OPTIONS"}
 _UNDONE: Final = "http/not-acceptable-undone"
+_DONE: Final = "equivalence/delivery-rest"
 _VELOCITY: Final = "strict-input/velocity-refused"
 _CORRECT: Final = ("3", "1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
 _BAD_PARTS: Final = (
@@ -172,7 +173,7 @@ def _invalid_goals(near: Any, frame: str) -> list[tuple[str, dict[str, Any]]]:
 
 
 @pytest.mark.phase("effect")
-@pytest.mark.requirement("strict-input/delivery-refused", _UNDONE)
+@pytest.mark.requirement("strict-input/delivery-refused", _UNDONE, _DONE)
 def test_an_invalid_delivery_reaches_nobody(
     api: RestInterface, soap: SoapServices, probe: RosProbe, judge: Judge
 ) -> None:
@@ -217,8 +218,7 @@ def test_an_invalid_delivery_reaches_nobody(
     if last not in seen:
         judge.note("strict-input/delivery-refused", "judged by the answers alone: no valid delivery was seen to arrive")
         return
-    if answer.response.status == HTTPStatus.NOT_ACCEPTABLE:
-        judge.check(_UNDONE, silent not in seen, answer, "no message for a delivery that is answered 406")
+    _judge_unwanted(judge, answer, came=silent in seen)
     for method, exchange in by_method.items():
         judge.check(
             "strict-input/delivery-refused",
@@ -237,6 +237,14 @@ def test_an_invalid_delivery_reaches_nobody(
         "no message for an invalid delivery",
         found=f"{len(odd)} messages, among them {odd[0]}" if odd else "",
     )
+
+
+def _judge_unwanted(judge: Judge, answer: Exchange, *, came: bool) -> None:
+    """A delivery whose answer the client would have in no format is made or refused, and not both."""
+    if answer.response.status == HTTPStatus.NOT_ACCEPTABLE:
+        judge.check(_UNDONE, not came, answer, "no message for a delivery that is answered 406")
+    elif answer.response.ok:
+        judge.check(_DONE, came, answer, "a message for a delivery that is accepted", found="none")
 
 
 def _is_of_ours(delivery: Delivery) -> bool:

@@ -49,6 +49,11 @@ def deliveries(request: Request) -> bool:
     )
 
 
+def unwanted(where: Where) -> Where:
+    """Those requests whose client wants to be told in something that no robot has."""
+    return lambda request: where(request) and (request.field("Accept") or "").startswith("image/")
+
+
 def soap(*operations: str) -> Where:
     """SOAP requests whose body speaks of one of these operations (of any, when there are none)."""
     names = "|".join(operations) or r"[\w.-]+"

@@ -22,6 +22,7 @@ from conformance.selftest.mutants.changes import (
     rewritten,
     soap,
     success,
+    unwanted,
     values,
 )
 from conformance.selftest.mutants.delivery import segments
@@ -145,6 +146,12 @@ MUTANTS = (
         rewritten(_DELIVERY, _cut),
     ),
     _rest_delivery("same-rest-doubled", "A REST delivery is published twice.", "delivery-rest", doubled(deliveries)),
+    _rest_delivery(
+        "same-rest-unwanted-lost",
+        "A REST delivery is answered 204 and forgotten where the client accepts no format of the answer.",
+        "delivery-rest",
+        instead(unwanted(deliveries), plain(204)),
+    ),
     _rest_delivery(
         "same-rest-again-later",
         "A REST delivery is published again 0.4 s later.",

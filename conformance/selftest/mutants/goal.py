@@ -22,6 +22,7 @@ from conformance.selftest.mutants.changes import (
     rewritten,
     status,
     success,
+    unwanted,
     values,
 )
 from conformance.selftest.mutants.goal_memory import (
@@ -206,6 +207,12 @@ MUTANTS = (
         "The same goal again is 201.",
         "goal-repeat",
         _when_active(plain(201), same=True, other_pose=False),
+    ),
+    _mutant(
+        "goal-unwanted-lost",
+        "A goal is answered 202 and forgotten where the client accepts no format of the answer.",
+        "goal-get",
+        instead(unwanted(_PUT), plain(202)),
     ),
     _mutant(
         "goal-conflict-ignored",

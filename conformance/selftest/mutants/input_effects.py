@@ -18,6 +18,7 @@ from conformance.selftest.mutants.changes import (
     problem,
     rest,
     success,
+    unwanted,
 )
 from conformance.selftest.mutants.mutant import of_class
 from conformance.selftest.mutants.soap_responses import enveloped
@@ -79,8 +80,8 @@ def _deliver(request: Request, forward: Forward) -> None:
 def _delivered_in_vain(request: Request, forward: Forward) -> Response:
     """A delivery is made, and its answer is lost because nothing that could be said is acceptable."""
     response = forward(request)
-    unwanted = deliveries(request) and (request.field("Accept") or "").startswith("image/")
-    return problem(406, "nothing that you would have")(request) if unwanted and success(response) else response
+    in_vain = unwanted(deliveries)(request) and success(response)
+    return problem(406, "nothing that you would have")(request) if in_vain else response
 
 
 def _ordered_by(method: str) -> Make:

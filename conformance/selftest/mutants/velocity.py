@@ -22,6 +22,7 @@ from conformance.selftest.mutants.changes import (
     rest,
     secretly,
     status,
+    unwanted,
     values,
 )
 from conformance.selftest.mutants.mutant import of_class
@@ -221,6 +222,12 @@ MUTANTS = (
         _driven(lambda twist: twist.update(_STILL)),
     ),
     _mutant(
+        "velocity-unwanted-lost",
+        "A velocity is answered 204 and forgotten where the client accepts no format of the answer.",
+        "velocity-converges",
+        instead(unwanted(_PUT), plain(204)),
+    ),
+    _mutant(
         "velocity-halved", "The robot drives at half of what it is told.", "velocity-converges", _driven(_times(0.5))
     ),
     _mutant(
@@ -264,6 +271,12 @@ MUTANTS = (
         lambda: _other_half,
     ),
     _mutant("linear-lost", "PUT of a linear velocity is accepted and forgotten.", "linear-put", lambda: _stuck),
+    _mutant(
+        "linear-unwanted-lost",
+        "A linear velocity is answered 204 and forgotten where the client accepts no format of the answer.",
+        "linear-put",
+        instead(unwanted(_PUT_LINEAR), plain(204)),
+    ),
     _mutant(
         "linear-put-created",
         "PUT of a linear velocity is 201.",
