@@ -50,7 +50,7 @@ def velocity_has_effect(api: RestInterface, wanted: Velocity, put: Put, usual: P
         None where there is no telling: it is refused, moves the robot neither way, or ends before it can be read.
     """
     robot = Robot(api)
-    if robot.near(wanted, STILL, 4):
+    if robot.near(wanted, STILL, 3):
         return None
     return _beside(api, lambda: _moves(robot, wanted, put), lambda: _moves(robot, wanted, usual))
 

@@ -57,7 +57,7 @@ def _put(robot: Robot, path: str, value: dict[str, Any]) -> Exchange:
 
 def _try_each(api: RestInterface, robot: Robot, watched_s: float) -> int:
     """PUT what would move the robot where no format is acceptable, and watch each for so long. Returns how many 406."""
-    fast = robot.share_of_limits(0.4, 0.4)
+    fast = robot.share_of_limits(0.6, 0.4)
     straight = Velocity(*fast[:3])
     tried: list[tuple[str, dict[str, Any], Callable[[], bool | None]]] = [
         (VELOCITY, fast.twist, lambda: _velocity_has_effect(api, robot, VELOCITY, fast, fast.twist)),
