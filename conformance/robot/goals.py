@@ -1,8 +1,9 @@
 """Where a robot may be sent."""
 
 import math
+from collections.abc import Callable
 from http import HTTPStatus
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -17,6 +18,9 @@ _FAR_M: Final = 0.7
 _PLACES: Final = 8
 # How far away open places are looked for: the nearest first, for the way there takes time.
 _DISTANCES_M: Final = (0.3, 0.5, 0.8, 1.5, 2.5)
+# How far away a goal is that has to last, where there is room, m; and how often it is tried to be in time.
+_FARTHEST_M: Final = 1.5
+_ATTEMPTS: Final = 3
 # A robot that makes room is waited for so long, s.
 _ARRIVES_S: Final = 10.0
 
@@ -52,6 +56,33 @@ def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | No
 def _turned(goal: Pose, part: int) -> Pose:
     """The place of a goal with another heading: another pose, and as reachable."""
     return Pose(goal.x, goal.y, math.remainder(goal.yaw + part, math.tau))
+
+
+def meanwhile(robot: Robot, id_: str, act: Callable[[dict[str, Any], Pose, dict[str, Any]], bool]) -> bool:
+    """Do at once what is to be done while a goal is active, with a goal of its own, which is far away.
+
+    Where each answer takes long, a goal is over before all is done that clients do with one; not before the first.
+
+    Args:
+        robot: that may have another goal, which is displaced.
+        id_: of the goal, with a number.
+        act: what is done, with the goal, its pose, and another goal under its id; whether the goal was there till then.
+
+    Returns:
+        Whether that could be done; it is tried a few times.
+    """
+    frame = robot.statement.motion.frame
+    for number in range(_ATTEMPTS):
+        try:
+            pose, other = choose_goals(robot, _FARTHEST_M, 2)
+        except pytest.skip.Exception:
+            return False  # what was judged before stays judged
+        body, against = (goal_body(one, frame, f"{id_} {number}") for one in (pose, other))
+        if not put_goal(robot, body).response.ok:
+            return False  # which is for others to judge
+        if act(body, pose, against):
+            return True
+    return False
 
 
 def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:

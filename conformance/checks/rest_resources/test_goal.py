@@ -1,6 +1,7 @@
 """The life of a goal: put, read, repeated, contradicted, displaced, cancelled, reached, and put again."""
 
 import time
+from collections.abc import Sequence
 from typing import Any, Final
 
 import pytest
@@ -20,7 +21,7 @@ from conformance.robot.goal import (
     put_goal,
     status_fault,
 )
-from conformance.robot.goals import choose_goals
+from conformance.robot.goals import choose_goals, meanwhile
 from conformance.robot.robot import STILL, Robot, Velocity
 from conformance.robot.standstill import Standstill
 from conformance.transport.exchange import Exchange
@@ -33,13 +34,15 @@ _CANCELING: Final = 3
 _STAYS_S: Final = 1.3
 
 
-def _judge_new(robot: Robot, judge: Judge, exchange: Exchange, body: dict[str, Any], *ids: str) -> bool:
-    """Judge the answer to a goal that is new, and what GET then shows."""
+def _judge_new(robot: Robot, judge: Judge, exchange: Exchange, body: dict[str, Any], pose: Pose, *ids: str) -> bool:
+    """Judge the answer to a goal that is new, and what GET then shows, unless it has ended at its ``pose``."""
     status = exchange.response.status
     holds = judge.check("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal")
     if status not in NEW and status not in REPEATED:
         return False
     goal, problem, shown = await_goal(robot, body)
+    if goal is None and arrived(robot, pose):
+        return holds
     for id_ in ("rest-resources/goal-get", *ids):
         judge.check(id_, not problem, shown, "the goal that was put", found=problem)
     if goal is not None:
@@ -50,12 +53,18 @@ def _judge_new(robot: Robot, judge: Judge, exchange: Exchange, body: dict[str, A
     return holds and not problem
 
 
-def _cancel(robot: Robot, judge: Judge) -> Exchange:
-    """Cancel the active goal; judge the status, that it is gone, and that the robot stands still in time."""
+def _cancel(robot: Robot, judge: Judge, pose: Pose) -> bool:
+    """Cancel the active goal; judge the status, that it is gone, and that the robot stands still in time.
+
+    Returns:
+        Whether there was one to cancel: it may have ended at its ``pose``.
+    """
     drive = Drive(robot)
     exchange = robot.delete_goal(RATHER_XML)
     answered = time.monotonic()
     status = exchange.response.status
+    if status == 404 and arrived(robot, pose):
+        return False
     goal, none = robot.goal()
     # 202 says that it will be done; and status.code has a word for a goal that is being cancelled.
     gone = goal is None or status == 202 or goal.get("status", {}).get("code") == _CANCELING
@@ -70,7 +79,7 @@ def _cancel(robot: Robot, judge: Judge) -> Exchange:
         found="" if status not in CANCELLED else f"GET of the goal is answered {none.came}",
     )
     drive.reach(STILL, "safety/cancel", since=answered)
-    return exchange
+    return True
 
 
 @pytest.mark.requirement(
@@ -101,36 +110,41 @@ def test_goal_until_it_is_cancelled(robot: Robot, judge: Judge, standstill: Stan
     first["goal_id"]["stamp"] = {"sec": 56, "nanosec": 78}
     # What was commanded before a goal is not taken up again when the goal is cancelled.
     robot.put_velocity(_slow_turn(robot))
-    if not _judge_new(robot, judge, put_goal(robot, first), first, "rest-resources/goal-id"):
+    if not _judge_new(robot, judge, put_goal(robot, first), first, there, "rest-resources/goal-id"):
         return
-    _repeat(robot, judge, first, goal_body(back, frame, _ID), there)
+    stamps = [goal["goal_id"]["stamp"] for goal in (robot.goal()[0], robot.goal()[0]) if goal is not None]
+    if not _repeat(robot, judge, first, there, stamps):
+        meanwhile(robot, _ID, lambda body, pose, _: _repeat(robot, judge, body, pose))
+    if not _contradict(robot, judge, first, goal_body(back, frame, _ID), there):
+        meanwhile(robot, _ID, lambda body, pose, other: _contradict(robot, judge, body, other, pose))
     _velocity_meanwhile(robot, judge)
     if robot.goal()[0] is None:
         put_goal(robot, first)  # a robot may end a goal when it takes a velocity
     second = goal_body(back, frame)
     second["goal"]["target_pose"]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
-    _displace(robot, judge, second)
+    _displace(robot, judge, second, back)
     _await_motion(robot)
-    _cancel(robot, judge)
+    if not _cancel(robot, judge, back):
+        meanwhile(robot, _ID, lambda _, pose, __: _cancel(robot, judge, pose))
     standstill.tried(
         "safety/cancel-stays",
         "rest, and no goal, after the goal was cancelled",
-        lambda: _cancel_again(robot, judge, second),
+        lambda: _cancel_again(robot, judge, second, back),
         seconds=_STAYS_S * robot.watchfulness,
         goal=True,
     )
 
 
-def _cancel_again(robot: Robot, judge: Judge, body: dict[str, Any]) -> None:
+def _cancel_again(robot: Robot, judge: Judge, body: dict[str, Any], pose: Pose) -> None:
     """A velocity, a goal in its place that is cancelled, and a watch of what follows."""
     robot.put_velocity(_slow_turn(robot))
     put_goal(robot, body)
     _await_motion(robot)
-    _cancel(robot, judge)
+    _cancel(robot, judge, pose)
     _stays(robot, judge)
 
 
-def _displace(robot: Robot, judge: Judge, second: dict[str, Any]) -> None:
+def _displace(robot: Robot, judge: Judge, second: dict[str, Any], pose: Pose) -> None:
     """Put another goal, without a goal_id, while one is active."""
     put = put_goal(robot, second)
     if put.response.status not in NEW | REPEATED:
@@ -140,8 +154,10 @@ def _displace(robot: Robot, judge: Judge, second: dict[str, Any]) -> None:
         name = "goal-fills-in" if taken else "goal-preempt"
         judge.check(f"rest-resources/{name}", False, put, "201 or 202 for another goal")
         return
-    _judge_new(robot, judge, put, second, "rest-resources/goal-preempt")
+    _judge_new(robot, judge, put, second, pose, "rest-resources/goal-preempt")
     goal, exchange = robot.goal()
+    if goal is None and arrived(robot, pose):
+        return
     filled = goal is not None and goal["goal_id"]["id"] not in {"", _ID}
     judge.check("rest-resources/goal-fills-in", filled, exchange, "a header and a goal_id of the robot's own")
 
@@ -160,10 +176,15 @@ def _judge_none(robot: Robot, judge: Judge) -> None:
         )
 
 
-def _repeat(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, Any], there: Pose) -> None:
-    """The same goal again changes nothing; another pose under its id is refused, unless it has ended ``there``."""
-    stamps = [goal["goal_id"]["stamp"] for goal in (robot.goal()[0], robot.goal()[0]) if goal is not None]
-    for _ in range(3):
+def _repeat(
+    robot: Robot, judge: Judge, body: dict[str, Any], there: Pose, stamps: Sequence[dict[str, int]] = ()
+) -> bool:
+    """The same goal again changes nothing, neither what is put nor its stamp, which was shown so twice.
+
+    Returns:
+        Whether that was seen: the goal may have ended ``there`` before.
+    """
+    for turn in range(3):
         exchange = put_goal(robot, body)
         status = exchange.response.status
         goal, shown = robot.goal()
@@ -172,7 +193,7 @@ def _repeat(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, A
         if not changed and stamps[1:] == stamps[:1] != [goal["goal_id"]["stamp"]]:
             changed = f"goal_id.stamp {goal['goal_id']['stamp']} for {stamps[0]}"
         if goal is None and arrived(robot, there):
-            return
+            return turn > 0
         judge.check(
             "rest-resources/goal-repeat",
             status in REPEATED and not changed,
@@ -180,12 +201,21 @@ def _repeat(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, A
             "200, 202 or 204 for the goal that is active already, which stays as it is",
             found=exchange.came if status not in REPEATED else changed,
         )
+    return True
+
+
+def _contradict(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, Any], there: Pose) -> bool:
+    """Another pose under the active goal's id is refused.
+
+    Returns:
+        Whether that was seen: the goal may have ended ``there`` before.
+    """
     exchange = put_goal(robot, other)
     status = exchange.response.status
     goal, shown = robot.goal()
     changed = shown.came if goal is None else difference(goal, body)
     if (status != 409 or goal is None) and arrived(robot, there):
-        return
+        return False
     judge.check(
         "rest-resources/goal-conflict",
         status == 409 and not changed,
@@ -193,6 +223,7 @@ def _repeat(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[str, A
         "409 for another pose under the active goal's id, and the goal as it was",
         found=exchange.came if status != 409 else changed,
     )
+    return True
 
 
 def _velocity_meanwhile(robot: Robot, judge: Judge) -> None:
