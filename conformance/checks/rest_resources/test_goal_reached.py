@@ -87,15 +87,15 @@ def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: f
         if goal is None or now > progress + _NO_PROGRESS_S or now > began + longest_s:
             break
     drive.judge_motion()
-    if here.distance(there) >= _REACHED_M:
-        # One sample may be out: those of a second say where the robot is.
+    moved = 0.15 if start.distance(there) > 0.35 else 0.0
+    if here.distance(there) >= _REACHED_M or start.distance(here) <= moved:
+        # One sample may be out, or from before the end: those of a second say where the robot is.
         first = len(drive.trace.odometry)
         drive.keep(_LOOKED_S)
         here = middle_of([robot.in_map(one.pose) for one in drive.trace.odometry[first:]] or [here])
     left = here.distance(there)
     # Likewise where it was at first.
     way = max(one.distance(here) for one in (start, *(robot.in_map(one.pose) for one in drive.trace.odometry[:1])))
-    moved = 0.15 if start.distance(there) > 0.35 else 0.0
     ended = goal is None
     if not ended and left > _REACHED_M and now <= progress + _NO_PROGRESS_S:
         return False  # slow, but on its way: nothing to be said against it
