@@ -1,5 +1,6 @@
 """The HTTP client of the suite: every exchange bounded, recorded and shown to those who watch."""
 
+import math
 import re
 import ssl
 import time
@@ -25,6 +26,8 @@ _HANGS_WITHIN_S = 60.0
 # From a server that has kept connections open this often, so many closed ones are dropped requests, and told as such.
 _KEPT = 10
 _DROPS = 3
+# By these nothing is done (RFC 9110 9.2.1).
+_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 @dataclass
@@ -38,6 +41,7 @@ class Connection:
         request_rate: ceiling in requests per second, or None.
         listeners: told what became of every request.
         sent: how many requests have been sent.
+        acted_at: when a request by another than a safe method was sent or answered last, s of the monotonic clock.
         pace: how fast the robot answers.
     """
 
@@ -47,6 +51,7 @@ class Connection:
     request_rate: float | None = None
     listeners: list[Listener] = field(default_factory=list)
     sent: int = 0
+    acted_at: float = -math.inf
     pace: Pace = field(default_factory=Pace)
     _next_slot: float = 0.0
 
@@ -54,15 +59,20 @@ class Connection:
         """See transport.tls_context."""
         return tls_context(self.ca_file)
 
-    def take_slot(self) -> None:
+    def take_slot(self, method: str) -> None:
         """Wait until the rate ceiling lets one more request through, and count it."""
         self.sent += 1
-        if not self.request_rate:
-            return
-        now = time.monotonic()
-        if self._next_slot > now:
-            time.sleep(self._next_slot - now)
-        self._next_slot = max(now, self._next_slot) + 1 / self.request_rate
+        if self.request_rate:
+            now = time.monotonic()
+            if self._next_slot > now:
+                time.sleep(self._next_slot - now)
+            self._next_slot = max(now, self._next_slot) + 1 / self.request_rate
+        self.note(method)
+
+    def note(self, method: str) -> None:
+        """Take down that a request is on its way, or has been answered or given up."""
+        if method not in _SAFE:
+            self.acted_at = time.monotonic()
 
 
 class HttpClient:
@@ -133,7 +143,9 @@ class HttpClient:
         started = time.monotonic()
         try:
             response = self._exchange(method, path, sent, body, deadline, fresh=fresh)
+            self.connection.note(method)
         except _SilenceError as none:
+            self.connection.note(method)
             if none.kind is NoAnswer.TIMEOUT:
                 self._hangs[endpoint].append(time.monotonic())
                 self.connection.pace.took(time.monotonic() - started, len(body))
@@ -171,7 +183,7 @@ class HttpClient:
         # A read ends at the deadline of the exchange.
         extensions = {"timeout": dict.fromkeys(("connect", "write"), deadline)}
         for attempt in (1, 2):
-            self.connection.take_slot()
+            self.connection.take_slot(method)
             set_deadline(deadline, len(body))
             started = time.perf_counter()
             kept = not fresh and attempt == 1

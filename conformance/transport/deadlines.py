@@ -4,6 +4,7 @@ httpcore is used rather than a higher client because it sends what it is given (
 parses answers strictly with h11, which makes it the judge of framing as well. What httpx cost instead: docs/design.md.
 """
 
+import contextlib
 import ssl
 import threading
 import time
@@ -19,6 +20,8 @@ from conformance.transport.pace import time_for, time_to_arrive
 MAX_ANSWER = 32 * 1024 * 1024
 # Octets that are handed to the network at once.
 _PIECE = 256 * 1024
+# A request of no more octets than this leaves in one piece.
+_AT_ONCE = 16 * 1024
 _clock = threading.local()
 
 
@@ -45,17 +48,37 @@ def _left(timeout: float | None, error: type[Exception]) -> float:
 
 
 class _DeadlineStream(httpcore.NetworkStream):
-    """A stream whose every wait ends at the exchange's deadline."""
+    """A stream whose every wait ends at the exchange's deadline.
+
+    httpcore writes a request's head and its content apart. Where both are short they are held until the answer is read,
+    and leave as one segment, as from other clients: half the system calls, and a robot is woken once.
+    """
 
     def __init__(self, stream: httpcore.NetworkStream) -> None:
         self._stream = stream
+        self._held = b""
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
+        # A server that does not take a whole request may have answered it all the same (as httpcore has it).
+        with contextlib.suppress(httpcore.WriteError):
+            self._release()
         octets = self._stream.read(max_bytes, _left(timeout, httpcore.ReadTimeout))
         _clock.at = float(getattr(_clock, "at", float("inf"))) + time_for(len(octets))
         return octets
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
+        if len(self._held) + len(buffer) <= _AT_ONCE:
+            self._held += buffer
+            return
+        self._release(timeout)
+        self._send(buffer, timeout)
+
+    def _release(self, timeout: float | None = None) -> None:
+        held, self._held = self._held, b""
+        if held:
+            self._send(held, timeout)
+
+    def _send(self, buffer: bytes, timeout: float | None) -> None:
         for start in range(0, len(buffer), _PIECE):
             self._stream.write(buffer[start : start + _PIECE], _left(timeout, httpcore.WriteTimeout))
         _clock.unsent = getattr(_clock, "unsent", 0) - len(buffer)

@@ -49,7 +49,7 @@ class PartialRequest:
             octets = octets[:head_only]
         url = f"{client.scheme}://{client.authority}{client.prefix}{path}"
         self.request = Request(method, url, (), b"", f"{shown}\r\n\r\n".encode()[: len(octets)] + body)
-        client.connection.take_slot()
+        client.connection.take_slot(method)
         try:
             self._socket = socket.create_connection((client.host, client.port), client.connection.timeout_s)
             if client.scheme == "https":

@@ -60,13 +60,15 @@ def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
         with ThreadPoolExecutor(max(1, len(clients))) as pool:
             for requests in rounds:
                 for request in requests:
-                    request.client.connection.take_slot()
+                    request.client.connection.take_slot(request.method)
                 start = threading.Barrier(len(requests))
                 jobs = [
                     pool.submit(client.send, request, start.wait)
                     for client, request in zip(clients, requests, strict=False)
                 ]
                 attempts.append([job.result() for job in jobs])
+                for request in requests:
+                    request.client.connection.note(request.method)
                 _tell(requests, attempts[-1])
     finally:
         for client in clients:

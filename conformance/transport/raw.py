@@ -93,9 +93,9 @@ def talk(
         NoAnswerError: there is no connection.
     """
     deadline = time.monotonic() + (timeout_s or client.connection.timeout_s) + time_for(len(octets))
-    client.connection.take_slot()
-    started = time.perf_counter()
     request = shown(client, octets)
+    client.connection.take_slot(request.method)
+    started = time.perf_counter()
     try:
         link = _connect(client, deadline)
     except OSError as error:
@@ -120,6 +120,7 @@ def talk(
             deadline += time_for(len(piece))
             if answers and answers_in(bytes(received), answers) == answers:
                 break
+    client.connection.note(request.method)
     return RawAnswer(bytes(received), closed, sent_all, (time.perf_counter() - started) * 1000, early)
 
 

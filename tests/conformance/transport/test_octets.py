@@ -152,3 +152,19 @@ def test_no_cookie_is_sent_back_and_no_content_is_decoded(listening):
         assert client.send("GET", "/").response.body == b"abc"
     assert len(set(recorder.requests)) == 1
     assert len(recorder.requests) == 2
+
+
+@pytest.mark.parametrize("size", [0, 12_000])
+def test_a_short_request_leaves_in_one_piece(listening, size):
+    pieces = []
+
+    def serve(connection: socket.socket) -> None:
+        pieces.append(connection.recv(65_536))
+        connection.sendall(_NOTHING)
+
+    client = HttpClient(listening(serve), Connection())
+    body = b"-" * size
+    assert client.send("PUT", "/x", body=body).response.status == 204
+    client.close()
+    (piece,) = pieces
+    assert piece.partition(b"\r\n\r\n")[2] == body
