@@ -5,6 +5,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
+import jsonschema_rs
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 
@@ -31,11 +32,21 @@ LATENCY_NAME = "latency.json"
 FLEET_NAME = "fleet.json"
 
 
+def _schema(result_format: str) -> dict[str, Any]:
+    schema: dict[str, Any] = json.loads(SCHEMA_FILES[result_format].read_text(encoding="utf-8"))
+    return schema
+
+
 @cache
 def validator(result_format: str) -> Draft202012Validator:
     """The validator of one of the formats; kept, because building one costs more than using it."""
-    schema = json.loads(SCHEMA_FILES[result_format].read_text(encoding="utf-8"))
-    return Draft202012Validator(schema)
+    return Draft202012Validator(_schema(result_format))
+
+
+@cache
+def _quick_validator(result_format: str) -> jsonschema_rs.Validator:
+    """One that passes what is right a hundred times faster, and says less of what is not."""
+    return jsonschema_rs.validator_for(_schema(result_format))
 
 
 def read_result(path: Path) -> dict[str, Any]:
@@ -60,6 +71,8 @@ def _read(path: Path, expected: str) -> dict[str, Any]:
     found = document.get("format")
     if found != expected:
         raise ResultFormatError(f"{path}: at $.format: expected {expected!r}, found {_shown(found)}")
+    if _quick_validator(expected).is_valid(document):
+        return document
     error = best_match(validator(expected).iter_errors(document))
     if error is not None:
         raise ResultInvalidError(f"{path}: {_where(error)}")
