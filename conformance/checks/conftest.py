@@ -1,6 +1,10 @@
 """What goes along with every check: the observers, which judge each exchange whoever has it, and the ROS probe."""
 
-from collections.abc import Iterator
+import importlib
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from typing import Final
 
 import pytest
 
@@ -15,8 +19,13 @@ from conformance.robot.robot import Robot
 from conformance.robot.standstill import Standstill
 from conformance.robot.stopping import bring_to_rest
 from conformance.soap.observer import PASSIVE, SoapObserver, answers_of
+from conformance.soap.service import SoapService
 from conformance.transport.client import Connection
+from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run
+
+# What is imported late because few commands need it, and is needed later in a run.
+_NEEDED_LATER: Final = ("conformance.soap.zeep_client", "schemathesis.specs.openapi")
 
 
 @pytest.fixture(scope="session")
@@ -48,6 +57,24 @@ def probe(run: Run) -> Iterator[RosProbe]:
 
 
 @pytest.fixture(scope="session")
+def _prepared(interfaces: Interfaces) -> None:
+    """For a check that mostly waits for the robot: meanwhile is imported and compiled what later ones need."""
+    services = tuple(interfaces.soap.there.values())
+    for service in services:
+        _ = service.own  # for which the robot may have to be asked: here, and not at any moment of the drive
+    threading.Thread(target=_prepare, args=(services,), name="preparing").start()
+
+
+def _prepare(services: Iterable[SoapService]) -> None:
+    # What does not work here does not where it is needed, and is told there.
+    with suppress(Exception):
+        for service in services:
+            _ = service.described.types, service.contract.types
+        for module in _NEEDED_LATER:
+            importlib.import_module(module)
+
+
+@pytest.fixture(scope="session")
 def _standstills() -> list[Standstill]:
     """The one of the run, once it is known that the robot has a REST interface."""
     return []
@@ -59,6 +86,15 @@ def standstill(api: RestInterface, _standstills: list[Standstill]) -> Standstill
     if not _standstills:
         _standstills.append(Standstill(api))
     return _standstills[0]
+
+
+@pytest.fixture(autouse=True)
+def _looked_at(_standstills: list[Standstill]) -> Iterator[None]:
+    """Behind a check that only reads: the robot stays at rest, where it was tried to move it just before."""
+    yield
+    for one in _standstills:
+        with suppress(NoAnswerError):  # whoever asks next finds that out as well, and judges it
+            one.look()
 
 
 @pytest.fixture

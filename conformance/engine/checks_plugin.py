@@ -27,12 +27,13 @@ if TYPE_CHECKING:
     from conformance.verdict.explorer import Explorer
     from conformance.verdict.run import Run
 
-# Reading first; then what drives the robot, and what has to leave it at rest, which one watch shows of all; what needs
-# a robot at rest; deliveries late, because a robot drives long after them, and of these last those whose messages are
-# counted; then what is no delivery, while it is seen whether more comes of them; attacks that are one last.
+# Reading first; then the drive that takes longest, what else drives the robot, and what has to leave it at rest, which
+# one watch shows of all: meanwhile, reading that needs a robot at rest. Deliveries late, because a robot drives long
+# after them, and of these last those whose messages are counted, when those of the others have arrived: meanwhile,
+# reading again. Then what is no delivery, while it is seen whether more comes of them; attacks that are one last.
 PHASES = (
-    *("reach", "reading", "motion", "standstill", "stays", "input"),
-    *("delivery", "effect", "arrival", "describe", "aside", "late", "attack", "last"),
+    *("reach", "reading", "drive", "motion", "standstill", "resting", "stays", "input"),
+    *("delivery", "silence", "effect", "arrival", "describe", "aside", "late", "attack", "last"),
 )
 
 _NO_ADDRESS = "the robot's {} interface has no address"

@@ -116,7 +116,7 @@ class ProbeObserver:
 
     Args:
         probe: its process.
-        connection: tells whether anything was sent meanwhile.
+        connection: tells when anything was asked for that might be a delivery.
     """
 
     exact = True
@@ -127,9 +127,10 @@ class ProbeObserver:
 
     def mark(self) -> None:
         """See DeliveryObserver."""
-        if self._probe.heard != self._connection.sent:
-            time.sleep(QUIET_S)  # what was sent since somebody collected may still be on its way
-            self._probe.heard = self._connection.sent
+        # What was asked for since somebody collected may still be on its way.
+        if self._connection.acted_at > self._probe.heard_at:
+            time.sleep(max(0.0, self._connection.acted_at + QUIET_S - time.monotonic()))
+            self._probe.heard_at = time.monotonic()
         self._probe.deliveries()
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
@@ -143,7 +144,7 @@ class ProbeObserver:
             time.sleep(then_s)
             seen += self._probe.deliveries()
         if then_s >= QUIET_S:
-            self._probe.heard = self._connection.sent
+            self._probe.heard_at = time.monotonic()
         return [Seen(delivery) for delivery in seen]
 
 

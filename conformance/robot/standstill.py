@@ -51,6 +51,8 @@ class Standstill:
     def __init__(self, api: RestInterface) -> None:
         self._api = api
         self._tried: list[Tried] = []
+        # What moved while something else was read.
+        self._moved: _Seen | None = None
 
     def tried(
         self, requirement: str, expected: str, again: Callable[[], None], *, seconds: float, goal: bool = False
@@ -70,12 +72,20 @@ class Standstill:
         none = robot.get(GOAL_PATH).response.status == HTTPStatus.NOT_FOUND
         return none and _stays(Drive(robot)) is not False
 
+    def look(self) -> None:
+        """Look once, where something was tried that might still show: for whoever has the robot to read meanwhile."""
+        if self._moved is None and self._tried and time.monotonic() < self._until:
+            self._moved = self._look(Drive(Robot(self._api)))
+
     def judge(self) -> None:
         """Watch until the last of what was tried would have shown, and judge all of it."""
-        tried, self._tried = self._tried, []
+        tried = self._tried
         if not tried:
             return
-        seen = self._watch(max(one.until for one in tried), goal=any(one.goal for one in tried))
+        try:
+            seen = self._moved or self._watch()
+        finally:
+            self._tried, self._moved = [], None
         judge = self._api.run.judge
         if seen.found:
             before = judge.refuted()
@@ -88,19 +98,30 @@ class Standstill:
         for one in tried:
             judge.check(one.requirement, not seen.found, seen.exchange, one.expected, found=seen.found, cause="moves")
 
-    def _watch(self, until: float, *, goal: bool) -> _Seen:
+    @property
+    def _until(self) -> float:
+        """When the last of what was tried would have shown, s of the monotonic clock."""
+        return max(one.until for one in self._tried)
+
+    def _watch(self) -> _Seen:
         drive = Drive(Robot(self._api))
         while True:
-            stays = _stays(drive)
-            exchange = drive.trace.turns[-1].velocity_exchange
-            if stays is False:
-                return _Seen(exchange, f"velocity {drive.trace.turns[-1].velocity}")
-            if goal:
-                active, shown = drive.robot.goal()
-                if active is not None:
-                    return _Seen(shown, "a goal is active again")
-            if time.monotonic() > until:
-                return _Seen(exchange, "")
+            moved = self._look(drive)
+            if moved is not None:
+                return moved
+            if time.monotonic() > self._until:
+                return _Seen(drive.trace.turns[-1].velocity_exchange, "")
+
+    def _look(self, drive: Drive) -> _Seen | None:
+        """What moves, or is about to; None where nothing does."""
+        if _stays(drive) is False:
+            turn = drive.trace.turns[-1]
+            return _Seen(turn.velocity_exchange, f"velocity {turn.velocity}")
+        if any(one.goal for one in self._tried):
+            active, shown = drive.robot.goal()
+            if active is not None:
+                return _Seen(shown, "a goal is active again")
+        return None
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ _GOALS: Final = 3
 _AHEAD: Final = 0.3
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
 def test_pose_and_velocity(robot: Robot, subscribers: SoapService, effort: Effort) -> None:
     """Whatever the robot does just now."""
@@ -43,7 +43,7 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, effort: Effor
             compare(robot, subscribers, name)
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/sensors", "equivalence/services")
 def test_lists(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """The same entries, in any order."""
@@ -76,7 +76,7 @@ def _compare_lists(
     )
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/plan")
 def test_plan(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """The same question, with all its parameters or with few, or in the odometry's frame, has the same answer."""

@@ -10,7 +10,7 @@ from conformance.transport.client import HttpClient
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("silence"), pytest.mark.needs("rest")]
 # More than servers used to allow on one connection, which then say that it ends.
 _MANY = 120
 

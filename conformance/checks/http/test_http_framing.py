@@ -31,7 +31,7 @@ def _first(api: RestInterface) -> Call:
     return min(calls, key=lambda call: "?" in call.path)
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("silence")
 @pytest.mark.requirement("http/framing")
 def test_every_octet_of_an_answer(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """A status line, valid fields, exactly as many octets as are said, and nothing behind them.
@@ -54,7 +54,7 @@ def test_every_octet_of_an_answer(api: RestInterface, rest: HttpClient, judge: J
             judge.check("http/framing", not fault, attempt, "one well-framed answer", found=fault)
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("silence")
 @pytest.mark.requirement("http/framing", "http/head-no-body")
 def test_answers_stay_aligned(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Of two requests sent at once, the second answer begins where the first one ends; also behind HEAD."""

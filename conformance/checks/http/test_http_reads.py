@@ -8,7 +8,7 @@ from conformance.rest.applicable import reads
 from conformance.rest.interface import RestInterface
 from conformance.verdict.effort import Effort
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("silence"), pytest.mark.needs("rest")]
 # Of each resource at standard effort; and in all at any effort with a robot that is fast enough: one fault in fifty.
 _EACH = 60
 _IN_ALL = 56

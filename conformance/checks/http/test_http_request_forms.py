@@ -48,7 +48,7 @@ def _told_apart(api: RestInterface) -> tuple[Call, str, tuple[int, str]] | None:
     return None
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("describe")
 @pytest.mark.requirement("http/field-forms", "http/field-lines")
 def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
     """A field is the same however its name and the white space around its value are written, and in several lines."""
@@ -78,7 +78,7 @@ def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
         )
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("describe")
 @pytest.mark.requirement("http/octet-stream")
 def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Where one segment ends and the next one begins means nothing."""
@@ -98,7 +98,7 @@ def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) 
             )
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("describe")
 @pytest.mark.requirement("http/close", "http/old-client")
 def test_the_end_of_a_connection(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Who asks for the end of the connection gets it, and HTTP/1.0 knows no chunks."""

@@ -22,7 +22,7 @@ _ALONE_S = 1.3
 _WATCHED_S = 0.15
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("resting")
 @pytest.mark.requirement("http/safe")
 def test_reading_changes_nothing(api: RestInterface, judge: Judge) -> None:
     """What was steady before GET, HEAD and OPTIONS of everything is the same after them."""

@@ -129,7 +129,7 @@ def test_an_id_of_digits(api: RestInterface, robot: Robot, judge: Judge) -> None
     )
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("resting")
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_of_plans(api: RestInterface, robot: Robot, effort: Effort) -> None:
     """One plan after another is the same in all formats, from the first reading on."""

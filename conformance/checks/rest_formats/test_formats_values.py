@@ -15,7 +15,7 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("rest")]
 _XML = "application/xml"
 _TEXT = "text/plain"
 _TURNS = 3

@@ -16,7 +16,7 @@ from conformance.robot.robot import POSE, Robot
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+pytestmark = [pytest.mark.phase("drive"), pytest.mark.needs("rest"), pytest.mark.motion]
 # A robot that comes no nearer for so long does not drive, s; and how long one that does is waited for, by effort.
 _NO_PROGRESS_S: Final = 5.0
 # A robot may take a goal for reached a quarter of a metre before it (Nav2 does, unless told otherwise), m.
@@ -35,6 +35,7 @@ _LONGEST_DEFAULT_S: Final = 30.0
     "rest-resources/velocity-odometry",
     "rest-resources/pose-motion",
 )
+@pytest.mark.usefixtures("_prepared")
 def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface) -> None:
     """A goal nearby is driven to and is then no longer current; its id can be used again."""
     here = robot.map_pose()

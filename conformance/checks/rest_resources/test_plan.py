@@ -14,7 +14,7 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("rest")]
 # A step that a robot cannot follow without another plan of its own, m.
 _LONGEST_STEP = 1.0
 _YAW_OFF = 0.2

@@ -90,7 +90,7 @@ def test_publishers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             judge.check("soap-delivery/interop", not problem, exchange, f"{operation} by zeep", found=problem)
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("resting")
 @pytest.mark.needs("subscribers")
 @pytest.mark.requirement("soap-subscribers/interop")
 def test_subscribers(soap: SoapServices, judge: Judge, effort: Effort) -> None:

@@ -26,7 +26,7 @@ from conformance.verdict.evidence import Judge
 if TYPE_CHECKING:
     from lxml import etree
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
+pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("subscribers")]
 _PLAN = "soap-subscribers/plan"
 _TOLERANCE = 0.25
 # A path that is not told right after so many refusals, and is otherwise, is not told because of them.

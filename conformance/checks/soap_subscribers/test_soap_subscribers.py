@@ -27,7 +27,7 @@ from conformance.verdict.evidence import Judge
 if TYPE_CHECKING:
     from lxml import etree
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("subscribers")]
+pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("subscribers")]
 _VALID = "soap-subscribers/response-valid"
 _OWN = "soap-subscribers/concurrent-answers"
 _ONE = ("GetPose", "GetVelocity")

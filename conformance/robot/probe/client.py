@@ -2,6 +2,7 @@
 
 import atexit
 import json
+import math
 import os
 import queue
 import subprocess
@@ -32,13 +33,13 @@ class Probe:
         ros: the robot's ROS side.
 
     Attributes:
-        heard: how many requests of the run had been sent when all that came of them had arrived.
+        heard_at: when all that came of the run's requests until then had arrived, s of the monotonic clock.
 
     Raises:
         ProbeError: no process can be started.
     """
 
-    heard = -1
+    heard_at = -math.inf
 
     def __init__(self, ros: Ros) -> None:
         command = [sys.executable, "-m", "conformance.robot.probe", "--domain-id", str(ros.domain_id)]

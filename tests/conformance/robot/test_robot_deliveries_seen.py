@@ -11,8 +11,9 @@ from lxml import etree
 from conformance.contract.files import CONTRACT_DIR
 from conformance.documents.wsdl import read_file
 from conformance.robot.batch import Batch, Order
-from conformance.robot.deliveries_seen import Seen
+from conformance.robot.deliveries_seen import QUIET_S, ProbeObserver, Seen
 from conformance.robot.delivery import Delivery, deliveries, doubles, path_of, written
+from conformance.transport.client import Connection
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Judge
 
@@ -155,3 +156,24 @@ def test_a_second_message_is_found_whenever_it_comes(late):
 def test_a_delivery_survives_its_path(delivery):
     parts = delivery.rest_path.split("/")
     assert Delivery(int(parts[4]), *map(float, parts[6::2])).bits == delivery.bits
+
+
+class DeafProbe:
+    heard_at = -math.inf
+
+    def deliveries(self) -> list[Delivery]:
+        return []
+
+
+def test_a_probe_waits_for_what_may_still_be_on_its_way_and_not_for_what_was_only_read():
+    probe, connection = DeafProbe(), Connection()
+    observer = ProbeObserver(probe, connection)
+    connection.note("GET")
+    observer.mark()
+    assert probe.heard_at == -math.inf
+    connection.note("PUT")
+    observer.mark()
+    assert probe.heard_at >= connection.acted_at + QUIET_S
+    heard = probe.heard_at
+    observer.mark()
+    assert probe.heard_at == heard

@@ -160,3 +160,28 @@ def test_a_robot_that_moves_or_has_a_goal_is_not_left_as_it_is(what):
         Trial(api, _CANCEL).tried(standstill)
         setattr(body, what, 0.0)
         assert not standstill.lasts
+
+
+def test_what_moved_while_something_else_was_read_is_found():
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        trial = Trial(api, _REFUSED)
+        trial.tried(standstill)
+        body.drives_at = 0.0
+        standstill.look()
+        body.drives_at = float("inf")
+        standstill.look()
+        standstill.judge()
+        assert set(_failures(api)) == {_REFUSED}
+
+
+def test_nobody_looks_when_what_was_tried_would_have_shown():
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        standstill.look()
+        standstill.tried(_REFUSED, "rest", lambda: None, seconds=0.0)
+        body.drives_at = 0.0
+        standstill.look()
+        assert api.client.connection.sent == 0
