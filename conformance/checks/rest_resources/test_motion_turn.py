@@ -12,6 +12,7 @@ from conformance.robot.drive_trace import Turn
 from conformance.robot.goals import make_room
 from conformance.robot.letting_go import LetGo
 from conformance.robot.robot import STILL, Robot, Velocity
+from conformance.robot.undisturbed import ANGULAR, judge_undisturbed
 from conformance.robot.windows import LONGEST_SAMPLE_S, SEVERAL, middle, newest, velocities
 from conformance.verdict.evidence import Judge
 
@@ -20,14 +21,9 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
 _RENEW_S: Final = 0.2
 _KEEP_S: Final = 1.3
 _ENDS_S: Final = 10.0
-# What could not be seen in time is tried so often.
-_TRIES: Final = 3
 # By its arcs a robot gets at most as far as in this time at its greatest speed, s.
 _LONGEST_ARC_S: Final = 0.5
 _LINEAR: Final = slice(0, 3)
-_ANGULAR: Final = slice(3, 6)
-# A robot that drops its angular velocity needs so long to show it, s.
-_SHOWS_S: Final = 0.2
 # Of the hold time: so long after a command it is given again, and holds from then on.
 _AGAIN: Final = 0.25
 # How often it is tried to tell how long a velocity holds.
@@ -71,61 +67,11 @@ def _turn(robot: Robot, drive: Drive, judge: Judge) -> None:
         turning = Velocity(angular_z=0.6 * limit)
         drive.command(turning)
         drive.reach(turning, "rest-resources/velocity-converges")
-    _refused(robot, drive, judge, turning)
-    if robot.actuated(0):
-        _arc(robot, drive, judge, turning)
+    judge_undisturbed(robot, drive, judge, turning)
     _renew(robot, drive, judge, turning, started)
     _let_go(robot, drive, judge, turning)
     if robot.actuated(0):
         _ahead_from_rest(robot, drive, judge)
-
-
-def _refused(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
-    """What is beyond any limit, or not to be actuated, leaves the robot turning as it did."""
-    for bad in (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4)):
-        drive.refresh(turning)
-        robot.put_velocity(bad)
-        robot.put_linear(Velocity(linear_x=1e3))
-        drive.look()
-    drive.keep(min(_SHOWS_S, drive.holds_until - time.monotonic()))
-    keeps, found = drive.sees(turning, 2, until=drive.holds_until)
-    if keeps is None:
-        return  # a slow robot: its velocity may have ended by itself
-    judge.check(
-        "safety/refused-keeps",
-        keeps,
-        drive.trace.turns[-1].velocity_exchange,
-        f"the velocity that was there before the refused ones, {turning}",
-        found=found,
-        cause="changed",
-    )
-
-
-def _arc(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
-    """A linear part beside the angular one, ahead and then back."""
-    ahead, back = (Velocity(linear_x=share * robot.limits.linear_m_s) for share in (0.3, -0.3))
-    drive.refresh(turning)
-    if not drive.command_linear(ahead):
-        return
-    for _ in range(_TRIES):
-        # Whether a PUT of the linear part renews the angular one too is the robot's affair: so again, and in time.
-        drive.refresh(turning)
-        drive.command_linear(back)
-        drive.keep(min(_SHOWS_S, drive.holds_until - time.monotonic()))
-        keeps, found = drive.sees(turning, 1.5, part=_ANGULAR, until=drive.holds_until)
-        if keeps is not None:
-            break
-    else:
-        judge.note("rest-resources/linear-keeps-angular", "answers came too late to see it within the hold time")
-        return
-    judge.check(
-        "rest-resources/linear-keeps-angular",
-        keeps,
-        drive.trace.turns[-1].velocity_exchange,
-        f"the angular part as it was before the linear PUT, {turning}",
-        found=found,
-        cause="changed",
-    )
 
 
 def _ahead_from_rest(robot: Robot, drive: Drive, judge: Judge) -> None:
@@ -134,7 +80,7 @@ def _ahead_from_rest(robot: Robot, drive: Drive, judge: Judge) -> None:
     if not drive.command_linear(ahead):
         return
     drive.reach(ahead, "rest-resources/linear-put", part=_LINEAR)
-    keeps, found = drive.sees(ahead, 1.5, part=_ANGULAR)
+    keeps, found = drive.sees(ahead, 1.5, part=ANGULAR)
     robot.put_velocity(STILL)
     if keeps is not None:
         judge.check(
