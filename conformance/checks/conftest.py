@@ -14,6 +14,7 @@ from conformance.robot.clock import Clock
 from conformance.robot.goal_observer import GoalObserver
 from conformance.robot.interfaces import Interfaces
 from conformance.robot.observer import Observer as RobotObserver
+from conformance.robot.plan_observer import PlanObserver
 from conformance.robot.probe.client import RosProbe
 from conformance.robot.robot import Robot
 from conformance.robot.standstill import Standstill
@@ -42,6 +43,7 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection, clock: Cl
         connection.listeners.append(RestObserver(interfaces.rest, [service.endpoint for service in services]))
         connection.listeners.append(RobotObserver(interfaces.rest, clock))
         connection.listeners.append(GoalObserver(interfaces.rest))
+        connection.listeners.append(PlanObserver(interfaces.rest))
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(service) for service in services}
         connection.listeners.append(SoapObserver(run.judge, answers))
