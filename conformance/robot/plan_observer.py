@@ -17,11 +17,11 @@ from conformance.transport.exchange import Exchange, Listener
 
 # Shorter than this, m, or than so many of the path's own steps, is no leap.
 _LEAP_M: Final = 1.0
-_STEPS: Final = 10.0
+_STEPS: Final = 4.0
 # Whoever leaps aside and back is about where it was: of the leap.
 _BACK: Final = 0.5
 # Of fewer poses nobody knows the usual step.
-_FEWEST: Final = 8
+_FEWEST: Final = 6
 
 
 class PlanObserver(Listener):

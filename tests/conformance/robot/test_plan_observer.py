@@ -41,8 +41,8 @@ def test_one_pose_aside_is_a_leap(by):
 
 @pytest.mark.parametrize(
     "poses",
-    [_straight(0.1), _straight(3.0), _leaping(0.9), _leaping(2.0, step=0.3), _leaping(2.0)[8:13], _corner(), []],
-    ids=["short steps", "long steps", "short leap", "as long as ten steps", "few poses", "corner", "nothing"],
+    [_straight(0.1), _straight(3.0), _leaping(0.9), _leaping(2.0, step=0.6), _leaping(2.0)[8:13], _corner(), []],
+    ids=["short steps", "long steps", "short leap", "no longer than four steps", "few poses", "corner", "nothing"],
 )
 def test_what_is_no_leap(poses):
     assert longest_leap(tuple(poses)) == 0
