@@ -58,13 +58,16 @@ def probe(run: Run) -> Iterator[RosProbe]:
     started.close()
 
 
-@pytest.fixture(scope="session")
-def _prepared(interfaces: Interfaces) -> None:
+@pytest.fixture
+def _prepared(interfaces: Interfaces) -> Iterator[None]:
     """For a check that mostly waits for the robot: meanwhile is imported and compiled what later ones need."""
     services = tuple(interfaces.soap.there.values())
     for service in services:
         _ = service.own  # for which the robot may have to be asked: here, and not at any moment of the drive
-    threading.Thread(target=_prepare, args=(services,), name="preparing").start()
+    thread = threading.Thread(target=_prepare, args=(services,), name="preparing")
+    thread.start()
+    yield
+    thread.join()
 
 
 def _prepare(services: Iterable[SoapService]) -> None:
