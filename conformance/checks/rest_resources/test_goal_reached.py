@@ -21,6 +21,8 @@ pytestmark = [pytest.mark.phase("drive"), pytest.mark.needs("rest"), pytest.mark
 _NO_PROGRESS_S: Final = 5.0
 # A robot may take a goal for reached a quarter of a metre before it (Nav2 does, unless told otherwise), m.
 _REACHED_M: Final = 0.3
+# Twice as far away is a goal, so that one that is given up on the way is not taken for reached, m.
+_AWAY_M: Final = 0.6
 _LOOKED_S: Final = 1.0
 _LONGEST_S: Final = {"quick": 12.0}
 _LONGEST_DEFAULT_S: Final = 30.0
@@ -41,7 +43,7 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface
     here = robot.map_pose()
     if here is None:
         pytest.skip("the robot's pose cannot be read")
-    (there,) = choose_goals(robot, 0.6 if robot.watchfulness == 1 else 0.4, 1)
+    (there,) = choose_goals(robot, _AWAY_M, 1)
     body, exchange = _put(robot, there)
     status = exchange.response.status
     if not judge.check("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal"):
