@@ -110,9 +110,15 @@ def _list(judge: Judge, subscribers: SoapService, operation: str) -> None:
     id_ = _IDS[operation]
     answer = call_valid(subscribers, Node(clark(delivery_messages.NAMESPACE, operation)))
     judge_answer(judge, id_, answer.accepted, answer, f"{operation}Response")
-    wrapper = _wrapper(judge, subscribers, operation, answer) if answer.succeeded else None
+    if answer.succeeded:
+        _items(judge, id_, subscribers, operation, answer)
+
+
+def _items(judge: Judge, id_: str, service: SoapService, operation: str, answer: SoapResponse) -> None:
+    """Judge that an answer lists complete items."""
+    wrapper = _wrapper(judge, service, operation, answer)
     if wrapper is not None:
-        problem = _list_problem(wrapper, declared_return(subscribers, operation))
+        problem = _list_problem(wrapper, declared_return(service, operation))
         judge.check(id_, not problem, answer.exchange, "a list of complete items", found=problem)
 
 
@@ -196,5 +202,6 @@ def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Ef
                 expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
                 if answer.accepted:  # whose a fault is does not show
                     judge_answer(judge, _OWN, answer.payload == expected, answer, f"the answer to {operation}")
-                if answer.succeeded and operation in _ONE:
-                    _content(judge, _OWN, subscribers, operation, answer)
+                if answer.succeeded:
+                    judge_content = _content if operation in _ONE else _items
+                    judge_content(judge, _OWN, subscribers, operation, answer)
