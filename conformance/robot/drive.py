@@ -21,6 +21,9 @@ _PACE_S: Final = 0.02
 _COUNTED_ON_S: Final = 0.5
 # A velocity of which too few samples are seen is looked at for so much longer, s.
 _LONGER_S: Final = 1.0
+# So many requests are a look.
+_LOOK: Final = 3
+_OUTLASTED: Final = "an answer takes so long that a velocity ends before it is read"
 # How often it is begun anew to reach a velocity that was renewed too late, so that it may have ended before.
 _LAPSES: Final = 2
 
@@ -92,6 +95,12 @@ class Drive:
         """Until when the last command of all components certainly holds, s of the monotonic clock."""
         hold_s = self.robot.limits.hold_s
         return self.trace.full_sent + (_COUNTED_ON_S if hold_s is None else _certain_s(hold_s))
+
+    @property
+    def _outlasts_hold(self) -> bool:
+        """Whether one look takes longer than a velocity holds, so that what is read need not be what was commanded."""
+        hold_s = self.robot.limits.hold_s
+        return hold_s is not None and _LOOK * self.robot.usual_s > hold_s
 
     def refresh(self, velocity: Velocity) -> None:
         """Command a velocity again, and let it be reached where it had ended meanwhile."""
@@ -166,6 +175,9 @@ class Drive:
             if there or (asked > until and decided) or asked > until + _LONGER_S:
                 break
         for id_ in ids:
+            if not there and wanted != STILL and self._outlasts_hold:
+                self.robot.judge.skip(id_, _OUTLASTED)
+                continue
             since = settled if not there and windows.newest(late) else begun
             self._judge(drive_rules.arrival(id_, self.trace, wanted, limits, part, since))
         return bool(there)
@@ -204,6 +216,10 @@ class Drive:
 
     def judge_motion(self) -> None:
         """Judge whether the pose moved by what the velocity said."""
+        if self._outlasts_hold:
+            for id_ in ("rest-resources/pose-motion", "rest-resources/pose-rotation"):
+                self.robot.judge.skip(id_, _OUTLASTED)
+            return
         judge_path(self.robot.judge, self.trace.odometry, self.trace.measured, self.robot.limits.noise)
 
 

@@ -61,12 +61,14 @@ class _Body:
 class _Drive(drive.Drive):
     """Looks for as long as it is told to, which may be longer than anybody wants."""
 
-    def __init__(self, body: _Body, looks: dict[int, float], hold_s: float) -> None:
+    def __init__(self, body: _Body, looks: dict[int, float], hold_s: float, usual_s: float = 0.001) -> None:
         declared = {"settle_s": _SETTLE_S, "hold_s": hold_s, "tolerance_abs": 0.02}
         limits = DeclaredLimits(**declared).resolved()
         self.judged: list[bool] = []
-        judge = SimpleNamespace(check=self._take)
+        self.skipped: list[str] = []
+        judge = SimpleNamespace(check=self._take, skip=lambda id_, _: self.skipped.append(id_))
         given = {"limits": limits, "judge": judge, "settle_s": 1.25 * _SETTLE_S + 0.25, "sample_s": 0.2}
+        given["usual_s"] = usual_s
         super().__init__(SimpleNamespace(**given))
         self.body, self.looks = body, looks
 
@@ -137,3 +139,14 @@ def test_rest_that_no_velocity_brings_about_is_waited_for_as_long(monkeypatch):
     driven.reach(STILL, "safety/cancel", since=clock.now)
     assert driven.judged == [False]
     assert driven.trace.commands == ()
+
+
+@pytest.mark.parametrize(("usual_s", "judged"), [(0.3, [False]), (0.4, [])])
+def test_what_ends_before_it_can_be_read_is_not_held_against_the_robot(monkeypatch, usual_s, judged):
+    clock = _Clock()
+    monkeypatch.setattr(drive, "time", clock)
+    driven = _Drive(_Body(clock, 20 * _SETTLE_S, 1.0), dict.fromkeys(range(100), 3 * usual_s), 1.0, usual_s)
+    driven.tell()
+    assert not driven.reach(_WANTED, _CONVERGES)
+    assert driven.judged == judged
+    assert driven.skipped == ([] if judged else [_CONVERGES])
