@@ -10,7 +10,7 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 # A robot whose odometry is slow, or that has just been started, gets so long, s.
 _PATIENCE_S = 5.0
 

@@ -26,12 +26,12 @@ def clock(rate: float, seconds: float, seed: int, hz: float = 5.0, *, jump: floa
     return told
 
 
-@given(seeds, st.floats(5.4, 60.0), st.sampled_from((5.0, 20.0, 50.0)))
+@given(seeds, st.floats(6.0, 60.0), st.sampled_from((5.0, 20.0, 50.0)))
 def test_a_clock_that_goes_right_is_not_blamed(seed, seconds, hz):
     assert clock(1.0, seconds, seed, hz).is_right(1.0)
 
 
-@given(seeds, st.floats(5.4, 60.0), st.sampled_from((0.9, 1.1, 2.0, 0.0, -1.0)))
+@given(seeds, st.floats(6.0, 60.0), st.sampled_from((0.9, 1.1, 2.0, 0.0, -1.0)))
 def test_a_clock_that_goes_wrong_is_seen(seed, seconds, rate):
     told = clock(rate, seconds, seed)
     assert not told.is_right(1.0)
@@ -48,7 +48,7 @@ def test_too_short_a_time_says_nothing():
     assert clock(1.0, 4.5, 1).rate is None
 
 
-@given(seeds, st.floats(5.4, 60.0), st.sampled_from((1.0, 2.0, 5.0, 20.0, 50.0)), st.sampled_from((0.0, 3600.0, -40.0)))
+@given(seeds, st.floats(6.0, 60.0), st.sampled_from((1.0, 2.0, 5.0, 20.0, 50.0)), st.sampled_from((0.0, 3600.0, -40.0)))
 def test_a_right_clock_does_not_stand_within_a_second(seed, seconds, hz, jump):
     assert not clock(1.0, seconds, seed, hz, jump=jump).stands_between(1.0)
 
