@@ -61,6 +61,17 @@ def incomplete(element: etree._Element, expected: Element, where: str = "") -> I
             yield from incomplete(item, child, path)
 
 
+def strings(element: etree._Element, expected: Element, where: str = "") -> Iterator[tuple[str, str]]:
+    """The path and the text of each string in an element."""
+    if isinstance(expected.type, Simple):
+        if expected.type.builtin == "string":
+            yield where, text_of(element)
+        return
+    for child in expected.children:
+        for item in _repeated(element, child):
+            yield from strings(item, child, f"{where}.{local(child.tag)}".removeprefix("."))
+
+
 def _repeated(element: etree._Element, child: Element) -> list[etree._Element]:
     """The elements for a particle: beside each other, or within one of its name, as other writers lay out a list."""
     found = children_of(element, local(child.tag))

@@ -195,6 +195,7 @@ def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Ef
     """Clients that ask for different states at one moment are each told the one that they asked for, and all of it."""
     asked = [_READ[client % len(_READ)] for client in range(MOST_CLIENTS)]
     questions = [outgoing(subscribers, Node(clark(delivery_messages.NAMESPACE, name))) for name in asked]
+    alone = {operation: _strings(judge, subscribers, operation) for operation in _ONE}
     for came in send_together([questions] * effort.cases(30)):
         for operation, attempt in zip(asked, came, strict=True):
             if isinstance(attempt, Exchange) and not is_busy(attempt):
@@ -202,6 +203,25 @@ def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Ef
                 expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
                 if answer.accepted:  # whose a fault is does not show
                     judge_answer(judge, _OWN, answer.payload == expected, answer, f"the answer to {operation}")
-                if answer.succeeded:
-                    judge_content = _content if operation in _ONE else _items
-                    judge_content(judge, _OWN, subscribers, operation, answer)
+                if answer.succeeded and operation in _LISTS:
+                    _items(judge, _OWN, subscribers, operation, answer)
+                elif answer.succeeded:
+                    _judge_strings(judge, subscribers, operation, answer, alone[operation])
+
+
+def _strings(judge: Judge, service: SoapService, operation: str) -> list[tuple[str, str]]:
+    """The strings of a state, such as the names of its frames; none where it is not told."""
+    answer = call_valid(service, Node(clark(delivery_messages.NAMESPACE, operation)))
+    returned = _content(judge, _OWN, service, operation, answer) if answer.succeeded else None
+    return [] if returned is None else list(content.strings(returned, declared_return(service, operation)))
+
+
+def _judge_strings(
+    judge: Judge, service: SoapService, operation: str, answer: SoapResponse, alone: list[tuple[str, str]]
+) -> None:
+    """Judge that an answer is complete, and names the same frames as when nobody else asked."""
+    returned = _content(judge, _OWN, service, operation, answer)
+    if returned is not None and alone:
+        found = list(content.strings(returned, declared_return(service, operation)))
+        expected = f"the strings of {operation} as they are when nobody else asks, {dict(alone)}"
+        judge.check(_OWN, found == alone, answer.exchange, expected, found=str(dict(found)), cause="other strings")
