@@ -94,13 +94,18 @@ class Drive:
     def holds_until(self) -> float:
         """Until when the last command of all components certainly holds, s of the monotonic clock."""
         hold_s = self.robot.limits.hold_s
-        return self.trace.full_sent + (_COUNTED_ON_S if hold_s is None else _certain_s(hold_s))
+        return self.trace.full_sent + (_COUNTED_ON_S if hold_s is None else certain_s(hold_s))
+
+    @property
+    def look_s(self) -> float:
+        """How long a look usually takes, s."""
+        return _LOOK * self.robot.usual_s
 
     @property
     def _outlasts_hold(self) -> bool:
         """Whether one look takes longer than a velocity holds, so that what is read need not be what was commanded."""
         hold_s = self.robot.limits.hold_s
-        return hold_s is not None and _LOOK * self.robot.usual_s > hold_s
+        return hold_s is not None and self.look_s > hold_s
 
     def refresh(self, velocity: Velocity) -> None:
         """Command a velocity again, and let it be reached where it had ended meanwhile."""
@@ -158,7 +163,7 @@ class Drive:
         while True:
             asked = time.monotonic()
             if renews and self.trace.commands and asked > self.trace.sent + every:
-                lapsed = limits.hold_s is not None and asked > self.trace.sent + _certain_s(limits.hold_s)
+                lapsed = limits.hold_s is not None and asked > self.trace.sent + certain_s(limits.hold_s)
                 self._renew()
                 if lapsed and lapses < _LAPSES:
                     # Whoever looks was late, not the robot: that one may have slowed down meanwhile.
@@ -223,6 +228,6 @@ class Drive:
         judge_path(self.robot.judge, self.trace.odometry, self.trace.measured, self.robot.limits.noise)
 
 
-def _certain_s(hold_s: float) -> float:
+def certain_s(hold_s: float) -> float:
     """How long a velocity that holds for so long is certainly there after its command was sent, s."""
     return 0.9 * hold_s - 0.02

@@ -84,9 +84,14 @@ class Trace:
         return self.commands[-1].sent if self.commands else self.begun
 
     @property
+    def last_full(self) -> Command | None:
+        """The last command of all components."""
+        return next((one for one in reversed(self.commands) if not one.linear_only), None)
+
+    @property
     def full_sent(self) -> float:
         """When the last command of all components was sent."""
-        return next((one.sent for one in reversed(self.commands) if not one.linear_only), self.begun)
+        return self.last_full.sent if self.last_full else self.begun
 
     @property
     def last_command(self) -> Command | None:

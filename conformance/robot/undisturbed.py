@@ -1,9 +1,11 @@
-"""A velocity that has to stay as it is, whatever is refused meanwhile; and its angular part beside a linear PUT."""
+"""A velocity that has to last: renewed, whatever is refused meanwhile; and its angular part beside a linear PUT."""
 
+import itertools
 import time
 from typing import Final
 
-from conformance.robot.drive import Drive
+from conformance.robot.drive import Drive, certain_s
+from conformance.robot.drive_trace import Turn
 from conformance.robot.robot import Robot, Velocity
 from conformance.verdict.evidence import Judge
 
@@ -16,47 +18,72 @@ _QUICK_S: Final = 0.02
 _SHOWS_S: Final = 0.2
 # What could not be seen in time is tried so often.
 _TRIES: Final = 3
+# Where no hold time is declared: a velocity is renewed so often, for so long, s.
+_RENEW_S: Final = 0.2
+_KEEP_S: Final = 1.3
+# Of the hold time: so often a velocity is renewed.
+_RENEW: Final = 0.4
+_TOO_LATE: Final = "answers came too late to renew a velocity within its hold time"
 ANGULAR: Final = slice(3, 6)
 
 
-def judge_undisturbed(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
-    """Judge a robot that turns: what it refuses disturbs nothing, and a PUT of the linear part leaves the angular one.
+def judge_renewed(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
+    """Judge a robot that turns: its velocity lasts as long as it is renewed, and what is refused disturbs nothing.
 
     Args:
         robot: with its limits.
-        drive: that turns.
-        judge: is told of safety/refused-keeps and rest-resources/linear-keeps-angular.
+        drive: whose last command was this velocity, and which has reached it.
+        judge: is told of safety/renewal and safety/refused-keeps.
         turning: the velocity that was commanded.
     """
-    if not _undisturbed(robot, drive, judge, turning):
-        _refused(robot, drive, judge, turning)
-        if robot.actuated(0):
-            _arc(robot, drive, judge, turning)
+    expected = f"{turning} as long as it is renewed"
+    if robot.usual_s <= _QUICK_S:
+        # One look shows that neither ends it.
+        lasts, found, turn = _renew(robot, drive, turning, _BAD)
+        if lasts:
+            for id_ in ("safety/renewal", "safety/refused-keeps"):
+                judge.check(id_, holds=True, exchange=turn.velocity_exchange, expected=expected)
+            return
+    _refused(robot, drive, judge, turning)
+    drive.refresh(turning)
+    lasts, found, turn = _renew(robot, drive, turning, ())
+    if lasts is None:
+        judge.skip("safety/renewal", _TOO_LATE)
+    else:
+        judge.check("safety/renewal", lasts, turn.velocity_exchange, expected, found=found, cause="ended")
 
 
-def _undisturbed(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> bool:
-    """What is refused on an arc: one look shows that the arc has both its parts, and keeps them.
+def _renew(
+    robot: Robot, drive: Drive, turning: Velocity, refused: tuple[Velocity, ...]
+) -> tuple[bool | None, str, Turn]:
+    """Command the same again and again, until the first command has certainly ended.
 
     Returns:
-        Whether it does. Else each is tried by itself, to learn what ends it.
+        Whether the velocity is still there (None: it was not renewed in time), what was seen, and where.
     """
-    if not robot.actuated(0) or robot.usual_s > _QUICK_S:
-        return False
-    ahead, back = (Velocity(linear_x=share * robot.limits.linear_m_s) for share in (0.3, -0.3))
-    drive.refresh(turning)
-    if not drive.command_linear(ahead) or not drive.command_linear(back):
-        return False
-    for bad in _BAD:
+    hold_s, settle_s = robot.limits.hold_s, robot.limits.settle_s
+    first = len(drive.trace.commands) - 1
+    lasts_s = _KEEP_S if hold_s is None else 1.05 * hold_s + 0.25 * settle_s
+    every = _RENEW_S if hold_s is None else _RENEW * hold_s
+    for bad in refused:
         robot.put_velocity(bad)
         robot.put_linear(_BAD_LINEAR)
-    drive.keep(min(_SHOWS_S, drive.holds_until - time.monotonic()))
-    arc = turning._replace(linear_x=back.linear_x)
-    if not drive.sees(arc, 1.5, until=drive.holds_until)[0]:
-        return False
-    for id_ in ("rest-resources/linear-keeps-angular", "safety/refused-keeps"):
-        exchange = drive.trace.turns[-1].velocity_exchange
-        judge.check(id_, holds=True, exchange=exchange, expected=f"{arc}, as it was commanded")
-    return True
+    until = drive.trace.commands[first].sent + lasts_s
+    while time.monotonic() < until:
+        due = drive.trace.sent + every
+        if time.monotonic() > due:
+            drive.command(turning)
+        elif drive.look_s < every:
+            drive.look()
+        else:
+            time.sleep(max(0.0, min(due, until) - time.monotonic()))
+    drive.command(turning)
+    lasts, found = drive.sees(turning, 2, until=drive.holds_until)
+    commands = drive.trace.commands[first:]
+    lapse_s = 0.5 if hold_s is None else certain_s(hold_s)
+    if any(later.answered > one.sent + lapse_s for one, later in itertools.pairwise(commands)):
+        lasts = None
+    return lasts, found, drive.trace.turns[-1]
 
 
 def _refused(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
@@ -80,18 +107,26 @@ def _refused(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> Non
     )
 
 
-def _arc(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
-    """A linear part beside the angular one, ahead and then back."""
-    ahead, back = (Velocity(linear_x=share * robot.limits.linear_m_s) for share in (0.3, -0.3))
-    drive.refresh(turning)
-    if not drive.command_linear(ahead):
+def judge_arc(robot: Robot, drive: Drive, judge: Judge, arc: Velocity) -> None:
+    """Judge that a PUT of the linear part, ahead and then back, leaves the angular one.
+
+    Args:
+        robot: with its limits.
+        drive: of that robot.
+        judge: is told of rest-resources/linear-keeps-angular.
+        arc: the velocity that all of it ends with.
+    """
+    back = arc._replace(angular_z=0.0)
+    drive.refresh(arc)
+    if not drive.command_linear(Velocity(linear_x=-back.linear_x)):
         return
-    for _ in range(_TRIES):
-        # Whether a PUT of the linear part renews the angular one too is the robot's affair: so again, and in time.
-        drive.refresh(turning)
+    for attempt in range(_TRIES):
+        if attempt or robot.usual_s > _QUICK_S:
+            # Whether a PUT of the linear part renews the angular one too is the robot's affair: so again, and in time.
+            drive.refresh(arc)
         drive.command_linear(back)
         drive.keep(min(_SHOWS_S, drive.holds_until - time.monotonic()))
-        keeps, found = drive.sees(turning, 1.5, part=ANGULAR, until=drive.holds_until)
+        keeps, found = drive.sees(arc, 1.5, part=ANGULAR, until=drive.holds_until)
         if keeps is not None:
             break
     else:
@@ -101,7 +136,7 @@ def _arc(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
         "rest-resources/linear-keeps-angular",
         keeps,
         drive.trace.turns[-1].velocity_exchange,
-        f"the angular part as it was before the linear PUT, {turning}",
+        f"the angular part as it was before the linear PUT, {arc}",
         found=found,
         cause="changed",
     )

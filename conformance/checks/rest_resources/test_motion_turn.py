@@ -1,4 +1,4 @@
-"""Turning on the spot: renewed, bent into an arc, disturbed by what is refused, and at last left to itself."""
+"""Turning: as fast as the robot can, renewed whatever is refused, bent into an arc, and at last left to itself."""
 
 import math
 import time
@@ -9,20 +9,17 @@ import pytest
 from conformance.contract.limits import Limits
 from conformance.robot.drive import Drive
 from conformance.robot.drive_trace import Turn
+from conformance.robot.full_speed import direction, fastest, reach
 from conformance.robot.goals import make_room
 from conformance.robot.letting_go import LetGo
 from conformance.robot.robot import STILL, Robot, Velocity
-from conformance.robot.undisturbed import ANGULAR, judge_undisturbed
-from conformance.robot.windows import LONGEST_SAMPLE_S, SEVERAL, middle, newest, velocities
+from conformance.robot.undisturbed import ANGULAR, judge_arc, judge_renewed
+from conformance.robot.windows import LONGEST_SAMPLE_S, SEVERAL
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
-# Where no hold time is declared: a velocity is renewed so often, for so long, and has to end within so long, s.
-_RENEW_S: Final = 0.2
-_KEEP_S: Final = 1.3
+# Where no hold time is declared a velocity has to end within so long, s.
 _ENDS_S: Final = 10.0
-# By its arcs a robot gets at most as far as in this time at its greatest speed, s.
-_LONGEST_ARC_S: Final = 0.5
 _LINEAR: Final = slice(0, 3)
 # Of the hold time: so long after a command it is given again, and holds from then on.
 _AGAIN: Final = 0.25
@@ -35,6 +32,7 @@ _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
 @pytest.mark.requirement(
     "rest-resources/velocity-integers",
     "rest-resources/velocity-converges",
+    "rest-resources/velocity-range",
     "rest-resources/linear-put",
     "rest-resources/linear-keeps-angular",
     "rest-resources/pose-rotation",
@@ -46,10 +44,10 @@ _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
     "safety/limits-hold",
 )
 def test_turn(robot: Robot, judge: Judge) -> None:
-    """One turn of about three seconds; the robot ends it by itself."""
+    """Turns of about four seconds; the robot ends the last one by itself."""
     if not robot.actuated(5):
         pytest.skip("the statement says that the robot cannot turn on the spot")
-    make_room(robot, _LONGEST_ARC_S * robot.limits.linear_m_s)
+    make_room(robot)
     drive = Drive(robot)
     _turn(robot, drive, judge)
     drive.judge_motion()
@@ -57,21 +55,36 @@ def test_turn(robot: Robot, judge: Judge) -> None:
 
 def _turn(robot: Robot, drive: Drive, judge: Judge) -> None:
     limit = robot.limits.angular_rad_s
-    # 1 rad/s is the only whole number below the limits of most robots.
-    turning = Velocity(angular_z=1.0 if limit > 1.1 else 0.0)
-    started = time.monotonic()
     drive.look()
-    if drive.command(turning, integers=True):
-        drive.reach(turning, "rest-resources/velocity-integers", "rest-resources/velocity-converges")
-    if not turning.angular_z:
-        turning = Velocity(angular_z=0.6 * limit)
-        drive.command(turning)
-        drive.reach(turning, "rest-resources/velocity-converges")
-    judge_undisturbed(robot, drive, judge, turning)
-    _renew(robot, drive, judge, turning, started)
-    _let_go(robot, drive, judge, turning)
+    # 1 rad/s is the only whole number below the limits of most robots.
+    left = Velocity(angular_z=1.0 if limit > 1.1 else 0.0)
+    if drive.command(left, integers=True):
+        drive.reach(left, "rest-resources/velocity-integers", "rest-resources/velocity-converges")
+    if not left.angular_z:
+        left = Velocity(angular_z=0.6 * limit)
+        drive.command(left)
+        drive.reach(left, "rest-resources/velocity-converges")
+    renewed = _fast(robot, drive)
+    if renewed is None:
+        drive.refresh(left)
+    judge_renewed(robot, drive, judge, renewed or left)
+    _let_go(robot, drive, judge, Velocity(angular_z=-left.angular_z))
     if robot.actuated(0):
         _ahead_from_rest(robot, drive, judge)
+
+
+def _fast(robot: Robot, drive: Drive) -> Velocity | None:
+    """Turn left, as fast ahead at the same time as the limits say; and right on the spot, with which it goes on.
+
+    Returns:
+        That velocity, where it is reached.
+    """
+    ahead = 0.0
+    if robot.actuated(0) and robot.limit_declared(0) and robot.limit_declared(5):
+        ahead = direction(robot) * fastest(robot, 0)
+    right = Velocity(angular_z=-fastest(robot, 5))
+    reached = reach(drive, Velocity(linear_x=ahead, angular_z=fastest(robot, 5))) and reach(drive, right)
+    return right if reached else None
 
 
 def _ahead_from_rest(robot: Robot, drive: Drive, judge: Judge) -> None:
@@ -93,36 +106,6 @@ def _ahead_from_rest(robot: Robot, drive: Drive, judge: Judge) -> None:
         )
 
 
-def _renew(robot: Robot, drive: Drive, judge: Judge, turning: Velocity, started: float) -> None:
-    """Keep turning; where the hold time is known, for so long that the first command ends before the last one does."""
-    hold = robot.limits.hold_s
-    until = started + (_KEEP_S if hold is None else robot.limits.settle_s + 0.2)
-    drive.command(turning)
-    drive.reach(turning)
-    while True:
-        if time.monotonic() > drive.trace.answered + (_RENEW_S if hold is None else 0.4 * hold):
-            drive.command(turning)
-        drive.look()
-        _judge_renewed(robot, drive, judge, turning)
-        if time.monotonic() > until:
-            return
-
-
-def _judge_renewed(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
-    window = newest(drive.trace.turns)
-    if len(window) < SEVERAL:
-        return
-    measured = middle(velocities(window))
-    judge.check(
-        "safety/renewal",
-        abs(measured.angular_z) > 0.5 * abs(turning.angular_z) - robot.limits.noise.angular_rad_s,
-        window[-1].velocity_exchange,
-        f"{turning} as long as it is renewed",
-        found=str(measured),
-        cause="ended",
-    )
-
-
 def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
     """No more renewal: the velocity holds for its time, begins to stop, and ends by itself.
 
@@ -131,7 +114,8 @@ def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None
     limits = robot.limits
     if robot.actuated(0):
         # A small circle: either part has to end. The linear part is commanded last, and ends as well.
-        turning = turning._replace(linear_x=0.2 * limits.linear_m_s)
+        turning = turning._replace(linear_x=-0.3 * limits.linear_m_s)
+        judge_arc(robot, drive, judge, turning)
     if limits.hold_s is None:
         judge.note("safety/hold", "no hold time is declared: judged is only that a velocity lasts until it is reached")
         judge.note("safety/hold-ends", "no hold time is declared")
@@ -199,11 +183,12 @@ def _watch(robot: Robot, drive: Drive, turning: Velocity) -> LetGo | None:
     Where the hold time is declared nobody asks around its end: what ends a velocity is time, not a question, and what
     is refused does not renew it.
     """
-    drive.refresh(turning)
-    limits = robot.limits
+    limits, last = robot.limits, drive.trace.last_full
+    if last is None or last.velocity != turning or time.monotonic() > drive.holds_until:
+        drive.refresh(turning)
     if limits.hold_s is not None:
         # So long that a robot which takes the next command for a repetition of this one ends it clearly too early.
-        drive.keep(drive.trace.sent + _AGAIN * limits.hold_s - time.monotonic())
+        drive.keep(drive.trace.full_sent + _AGAIN * limits.hold_s - time.monotonic())
     if not drive.command(turning):
         return None
     full = drive.trace.sent
