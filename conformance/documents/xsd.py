@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import xmlschema
 from lxml import etree
 
 from conformance.documents.xml_names import XSD, clark
@@ -59,9 +58,13 @@ class Types:
     """
 
     def __init__(self, documents: Sequence[SchemaDocument]) -> None:
+        # Imported late: it takes a sixth of a second, and nothing is compiled before the robot is on its way to a goal.
+        import xmlschema  # noqa: PLC0415
+
         self.libxml: etree.XMLSchema | None = None
         self.python: Any = None
         self.problems: list[str] = []
+        self._errors = xmlschema.XMLSchemaException
         self._shapes: dict[str, Element | None] = {}
         with tempfile.TemporaryDirectory(prefix="roaas-xsd-") as folder:
             entry = _assemble(documents, Path(folder))
@@ -110,7 +113,7 @@ class Types:
         etree.strip_tags(alone, etree.Comment, etree.PI)
         try:
             error = next(iter(self.python.iter_errors(alone)), None)
-        except (xmlschema.XMLSchemaException, ValueError, ArithmeticError, RecursionError) as problem:
+        except (self._errors, ValueError, ArithmeticError, RecursionError) as problem:
             return f"{type(problem).__name__}: {problem}"[:_SHOWN]
         return "" if error is None else str(getattr(error, "reason", "") or "invalid")
 

@@ -1,13 +1,19 @@
 """A velocity that has to last: renewed, whatever is refused meanwhile; and its angular part beside a linear PUT."""
 
+from __future__ import annotations
+
 import itertools
 import time
-from typing import Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
 
 from conformance.robot.drive import Drive, certain_s
-from conformance.robot.drive_trace import Turn
-from conformance.robot.robot import Robot, Velocity
-from conformance.verdict.evidence import Judge
+from conformance.robot.robot import STILL, Robot, Velocity
+
+if TYPE_CHECKING:
+    from conformance.contract.limits import Limits
+    from conformance.robot.drive_trace import Turn
+    from conformance.verdict.evidence import Judge
 
 # Beyond any limit, or not to be actuated; and by the linear part alone.
 _BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))
@@ -18,12 +24,7 @@ _QUICK_S: Final = 0.02
 _SHOWS_S: Final = 0.2
 # What could not be seen in time is tried so often.
 _TRIES: Final = 3
-# Where no hold time is declared: a velocity is renewed so often, for so long, s.
-_RENEW_S: Final = 0.2
-_KEEP_S: Final = 1.3
-# Of the hold time: so often a velocity is renewed.
-_RENEW: Final = 0.4
-_TOO_LATE: Final = "answers came too late to renew a velocity within its hold time"
+_STEP_S: Final = 0.01
 ANGULAR: Final = slice(3, 6)
 
 
@@ -32,56 +33,79 @@ def judge_renewed(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -
 
     Args:
         robot: with its limits.
-        drive: whose last command was this velocity, and which has reached it.
+        drive: whose last command was this velocity, after another one, and which has reached it.
         judge: is told of safety/renewal and safety/refused-keeps.
         turning: the velocity that was commanded.
     """
-    expected = f"{turning} as long as it is renewed"
-    if robot.usual_s <= _QUICK_S:
+    expected, times = f"{turning} as long as it is renewed", _Times.of(robot.limits)
+    if robot.usual_s <= _QUICK_S and times.seen_s - times.renewed_s >= _SHOWS_S:
         # One look shows that neither ends it.
-        lasts, found, turn = _renew(robot, drive, turning, _BAD)
+        lasts, found, turn = _renew(robot, drive, turning, times, _BAD)
         if lasts:
             for id_ in ("safety/renewal", "safety/refused-keeps"):
                 judge.check(id_, holds=True, exchange=turn.velocity_exchange, expected=expected)
             return
-    _refused(robot, drive, judge, turning)
+    drive.command(STILL)
     drive.refresh(turning)
-    lasts, found, turn = _renew(robot, drive, turning, ())
+    lasts, found, turn = _renew(robot, drive, turning, times, ())
     if lasts is None:
-        judge.skip("safety/renewal", _TOO_LATE)
+        judge.skip("safety/renewal", "answers came too late to renew a velocity within its hold time")
     else:
         judge.check("safety/renewal", lasts, turn.velocity_exchange, expected, found=found, cause="ended")
+    if lasts is not False:
+        _refused(robot, drive, judge, turning)
+
+
+@dataclass(frozen=True)
+class _Times:
+    """When a velocity is renewed, s after its first command.
+
+    Attributes:
+        every: so often; holds_s: for so long it certainly holds each time.
+        renewed_s: no more from then on. Not when the first command ends: a robot might take the next one for a new one.
+        seen_s: it is looked at when a robot that renews nothing has begun to stop.
+    """
+
+    every: float = 0.2
+    holds_s: float = 0.5
+    renewed_s: float = 1.0
+    seen_s: float = 1.3
+
+    @classmethod
+    def of(cls, limits: Limits) -> _Times:
+        """For a robot; where it declares no hold time, for what a velocity is counted on to hold."""
+        hold_s = limits.hold_s
+        if hold_s is None:
+            return cls()
+        seen_s = min(1.05 * hold_s + 0.25 * limits.settle_s, 1.3 * hold_s)
+        return cls(0.4 * hold_s, certain_s(hold_s), 0.9 * hold_s, seen_s)
 
 
 def _renew(
-    robot: Robot, drive: Drive, turning: Velocity, refused: tuple[Velocity, ...]
+    robot: Robot, drive: Drive, turning: Velocity, times: _Times, refused: tuple[Velocity, ...]
 ) -> tuple[bool | None, str, Turn]:
-    """Command the same again and again, until the first command has certainly ended.
+    """Command the same again and again, until the first command has certainly ended; in the end, what is refused.
 
     Returns:
         Whether the velocity is still there (None: it was not renewed in time), what was seen, and where.
     """
-    hold_s, settle_s = robot.limits.hold_s, robot.limits.settle_s
     first = len(drive.trace.commands) - 1
-    lasts_s = _KEEP_S if hold_s is None else 1.05 * hold_s + 0.25 * settle_s
-    every = _RENEW_S if hold_s is None else _RENEW * hold_s
+    begun = drive.trace.sent
+    while time.monotonic() < begun + times.renewed_s:
+        due = drive.trace.sent + times.every
+        if time.monotonic() >= due:
+            drive.command(turning)
+        elif drive.look_s < times.every:
+            drive.look()
+        else:
+            time.sleep(max(_STEP_S, min(due, begun + times.renewed_s) - time.monotonic()))
     for bad in refused:
         robot.put_velocity(bad)
         robot.put_linear(_BAD_LINEAR)
-    until = drive.trace.commands[first].sent + lasts_s
-    while time.monotonic() < until:
-        due = drive.trace.sent + every
-        if time.monotonic() > due:
-            drive.command(turning)
-        elif drive.look_s < every:
-            drive.look()
-        else:
-            time.sleep(max(0.0, min(due, until) - time.monotonic()))
-    drive.command(turning)
-    lasts, found = drive.sees(turning, 2, until=drive.holds_until)
+    time.sleep(max(0.0, begun + times.seen_s - time.monotonic()))
+    lasts, found = drive.sees(turning, 2, until=drive.trace.sent + times.holds_s)
     commands = drive.trace.commands[first:]
-    lapse_s = 0.5 if hold_s is None else certain_s(hold_s)
-    if any(later.answered > one.sent + lapse_s for one, later in itertools.pairwise(commands)):
+    if any(later.answered > one.sent + times.holds_s for one, later in itertools.pairwise(commands)):
         lasts = None
     return lasts, found, drive.trace.turns[-1]
 

@@ -45,7 +45,7 @@ _ROUNDS = 3
 # The ways of writing a number in XML come first among the styles of a batch.
 _STYLES = len(TEXTS)
 # How long what comes too late is waited for, s: at any effort, and at quick.
-_LATER_S = (2.0, 0.6)
+_LATER_S = (2.0, 0.45)
 
 
 @pytest.fixture(scope="session")
