@@ -77,7 +77,7 @@ def certify(
                     progress.writelines(f"{note}\n" for note in notes)
                 run.interrupted |= _run_checks(robot, progress, remarks)
                 if not (run.interrupted or run.aborted):
-                    look_again(run, robot.connection)
+                    look_again(run, robot.connection, robot.rest)
             else:
                 run.aborted = "the robot could not be reached: " + "; ".join(
                     f"{name}: {why}" for name, why in run.unreachable.items()

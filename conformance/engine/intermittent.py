@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import TYPE_CHECKING
 
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import is_json
+from conformance.documents.xml import NotXmlError, parse
 from conformance.engine.sending_again import is_same, send_again
+from conformance.robot.stopping import leave_at_rest
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Again
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from conformance.rest.interface import RestInterface
     from conformance.transport.client import Connection
+    from conformance.transport.exchange import Attempt, Request, Response
     from conformance.verdict.evidence import Finding
     from conformance.verdict.run import Run
 
@@ -21,29 +28,68 @@ _TIMES = 5
 _MOST = 20
 
 
-def look_again(run: Run, connection: Connection) -> None:
-    """Send the request of each finding again, where that is safe, and put down how often the failure came back.
+def look_again(run: Run, connection: Connection, rest: RestInterface | None = None) -> None:
+    """Send the request of each finding again, and put down how often the failure came back.
 
-    Where an observer judges the requirement by every answer, its word counts; else an answer of the same kind.
+    Where an observer judges the requirement by every answer, its word counts; else an answer of the same kind. What is
+    not safe is sent again where the robot may be moved and an error of the server came: that is wrong in any state of
+    the robot, and of what else came it may be the first time that makes the difference.
+
+    Args:
+        run: with its findings.
+        connection: of the run.
+        rest: the robot's REST interface, by which it is left at rest.
     """
-    for id_, finding in list(_safe(run))[:_MOST]:
-        if finding.exchange is None or not isinstance(finding.exchange, Exchange):
-            continue
-        evidence = run.judge.evidence[id_]
-        came_back = 0
-        for _ in range(_TIMES):
-            cases, seen = evidence.cases, evidence.failures
-            answer = send_again(finding.exchange.request, connection)
-            judged = evidence.cases > cases
-            came_back += evidence.failures > seen if judged else is_same(finding.exchange.response, answer)
-        finding.again = Again(came_back, _TIMES)
+    moves = False
+    try:
+        for id_, finding, exchange in list(_again(run))[:_MOST]:
+            moves |= exchange.request.method not in _SAFE
+            evidence = run.judge.evidence[id_]
+            came_back = 0
+            for _ in range(_TIMES):
+                cases, seen = evidence.cases, evidence.failures
+                answer = send_again(exchange.request, connection)
+                judged = evidence.cases > cases
+                came_back += evidence.failures > seen if judged else _comes_back(exchange.response, answer)
+            finding.again = Again(came_back, _TIMES)
+    finally:
+        if moves and rest is not None:
+            leave_at_rest(rest)
 
 
-def _safe(run: Run) -> Iterator[tuple[str, Finding]]:
+def _again(run: Run) -> Iterator[tuple[str, Finding, Exchange]]:
+    """The findings whose request may be sent again."""
     for id_, evidence in run.judge.evidence.items():
         if run.contract.ledger[id_].class_ not in run.claims:
             continue
         for finding in list(evidence.findings.values()):
-            request = finding.exchange.request if finding.exchange else None
-            if request is not None and request.raw is None and request.method in _SAFE and not request.body:
-                yield id_, finding
+            exchange = finding.exchange
+            if isinstance(exchange, Exchange) and exchange.request.raw is None and _may(run, exchange):
+                yield id_, finding, exchange
+
+
+def _may(run: Run, exchange: Exchange) -> bool:
+    request: Request = exchange.request
+    if request.method in _SAFE:
+        return not request.body
+    return run.allow_motion and exchange.response.status >= HTTPStatus.INTERNAL_SERVER_ERROR
+
+
+def _comes_back(before: Response, answer: Attempt) -> bool:
+    """Whether an answer is of the same kind, and its content as readable: a fault is no error page with its status."""
+    if not isinstance(answer, Exchange) or not is_same(before, answer):
+        return False
+    return _is_readable(before) == _is_readable(answer.response)
+
+
+def _is_readable(response: Response) -> bool:
+    """Whether content is of its media type, as far as that is JSON or XML."""
+    if is_json(response.media_type):
+        return not read_json(response.body).unreadable
+    if not response.media_type.endswith("xml"):
+        return True
+    try:
+        parse(response.body)
+    except NotXmlError:
+        return False
+    return True

@@ -12,9 +12,9 @@ from conformance.verdict.verdicts import verdict_of
 _BAD, _GOOD = Response(500, (), b"", 1.0), Response(200, (), b"x", 1.0)
 
 
-def _run(method="GET"):
+def _run(method="GET", answer=_BAD):
     run = Run(claims=("http",))
-    run.judge.check("http/head", False, Exchange(Request(method, "http://r2/"), _BAD), "status 200")
+    run.judge.check("http/head", False, Exchange(Request(method, "http://r2/"), answer), "status 200")
     return run
 
 
@@ -44,8 +44,34 @@ def test_an_observer_s_word_counts_more_than_the_status(monkeypatch):
     assert next(iter(run.judge.evidence["http/head"].findings.values())).again == (1, 5)
 
 
-def test_what_is_not_safe_is_not_sent_again(monkeypatch):
-    monkeypatch.setattr(intermittent, "send_again", lambda *_: pytest.fail("sent again"))
+def _sent_again(monkeypatch, run, answer=_GOOD):
+    """What is put down of a finding, and whether the robot was left at rest."""
+    stopped = []
+    monkeypatch.setattr(intermittent, "send_again", lambda request, _: Exchange(request, answer))
+    monkeypatch.setattr(intermittent, "leave_at_rest", stopped.append)
+    look_again(run, Connection(), "the interface")
+    return next(iter(run.judge.evidence["http/head"].findings.values())).again, bool(stopped)
+
+
+def test_what_is_not_safe_is_not_sent_again_to_a_robot_that_may_not_be_moved(monkeypatch):
+    assert _sent_again(monkeypatch, _run("PUT")) == (None, False)
+
+
+def test_an_error_of_the_server_is_asked_for_again_where_the_robot_may_be_moved(monkeypatch):
     run = _run("PUT")
-    look_again(run, Connection())
-    assert next(iter(run.judge.evidence["http/head"].findings.values())).again is None
+    run.allow_motion = True
+    assert _sent_again(monkeypatch, run) == ((0, 5), True)
+
+
+def test_what_may_be_right_in_another_state_of_the_robot_is_not_sent_again(monkeypatch):
+    run = _run("PUT", _GOOD)
+    run.allow_motion = True
+    assert _sent_again(monkeypatch, run) == (None, False)
+
+
+def test_a_fault_is_no_error_page_with_its_status(monkeypatch):
+    page, fault = (Response(500, (("Content-Type", "text/xml"),), body, 1.0) for body in (b"oops", b"<fault/>"))
+    run = _run("POST", page)
+    run.allow_motion = True
+    assert _sent_again(monkeypatch, run, fault) == ((0, 5), True)
+    assert _sent_again(monkeypatch, run, page) == ((5, 5), True)
