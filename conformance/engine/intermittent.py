@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from http import HTTPStatus
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from conformance.documents.json_text import read_json
@@ -25,7 +27,8 @@ if TYPE_CHECKING:
 # Methods that may be sent again without leave (RFC 9110 9.2.1).
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 _TIMES = 5
-_MOST = 20
+# For so long findings are looked at, the first of each requirement before others, s.
+_LONGEST_S = 8.0
 
 
 def look_again(run: Run, connection: Connection, rest: RestInterface | None = None) -> None:
@@ -40,9 +43,11 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
         connection: of the run.
         rest: the robot's REST interface, by which it is left at rest.
     """
-    moves = False
+    moves, until = False, time.monotonic() + _LONGEST_S
     try:
-        for id_, finding, exchange in list(_again(run))[:_MOST]:
+        for _, id_, finding, exchange in sorted(_again(run), key=itemgetter(0)):
+            if time.monotonic() > until:
+                break
             moves |= exchange.request.method not in _SAFE
             evidence = run.judge.evidence[id_]
             came_back = 0
@@ -57,15 +62,15 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
             leave_at_rest(rest)
 
 
-def _again(run: Run) -> Iterator[tuple[str, Finding, Exchange]]:
-    """The findings whose request may be sent again."""
+def _again(run: Run) -> Iterator[tuple[int, str, Finding, Exchange]]:
+    """The findings whose request may be sent again, each with its number among those of its requirement."""
     for id_, evidence in run.judge.evidence.items():
         if run.contract.ledger[id_].class_ not in run.claims:
             continue
-        for finding in list(evidence.findings.values()):
+        for number, finding in enumerate(list(evidence.findings.values())):
             exchange = finding.exchange
             if isinstance(exchange, Exchange) and exchange.request.raw is None and _may(run, exchange):
-                yield id_, finding, exchange
+                yield number, id_, finding, exchange
 
 
 def _may(run: Run, exchange: Exchange) -> bool:
