@@ -34,6 +34,8 @@ _FEWEST: Final = 3
 _SHARE: Final = 0.1
 _OFF: Final = 0.03
 _OFF_TURN: Final = 0.06
+# Of the greatest speed: with less a robot does not count as driving in a direction.
+_MOVES: Final = 0.25
 # A window's share of the way, and what the noise at its ends comes to on the whole way.
 _WINDOW: Final = 0.25
 _NOISES: Final = 8.0
@@ -54,6 +56,8 @@ class _Sum(NamedTuple):
         off, off_turn: by how much the sum may be wrong because the velocity changed between two samples.
         x_error, y_error, turn_error: what was made less what was summed up, step by step, so that whole turns do not
             matter.
+        along_error, turned_error: the same along the way and the turn that the velocity says, whatever its direction: a
+            robot that drives ahead and back, or turns left and right, makes up for no error of its scale.
     """
 
     x: float = 0.0
@@ -66,11 +70,14 @@ class _Sum(NamedTuple):
     x_error: float = 0.0
     y_error: float = 0.0
     turn_error: float = 0.0
+    along_error: float = 0.0
+    turned_error: float = 0.0
 
     def miss(self, earlier: _Sum) -> _Miss:
         """By how much pose and heading miss what was summed up since an earlier reading."""
         way = math.hypot(self.x_error - earlier.x_error, self.y_error - earlier.y_error)
-        turn = abs(self.turn_error - earlier.turn_error)
+        way = max(way, abs(self.along_error - earlier.along_error))
+        turn = max(abs(self.turn_error - earlier.turn_error), abs(self.turned_error - earlier.turned_error))
         # A heading that is no number is nowhere.
         return _Miss(way, math.inf if math.isnan(turn) else turn)
 
@@ -120,6 +127,7 @@ class _Sums(NamedTuple):
 def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sums:
     steps = [_Sum()]
     skipped = _longest_lapse(trace)
+    linear, angular = (max(abs(one[part]) for one in velocities) for part in (0, 5))
     for (one, first), (two, last) in itertools.pairwise(zip(trace, velocities, strict=True)):
         if two.stamp - one.stamp > skipped:
             steps.append(_Sum())
@@ -131,6 +139,8 @@ def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_sta
         made = two.pose.yaw - one.pose.yaw - turn
         x = ahead * math.cos(heading) - aside * math.sin(heading)
         y = ahead * math.sin(heading) + aside * math.cos(heading)
+        x_error, y_error = two.pose.x - one.pose.x - x, two.pose.y - one.pose.y - y
+        turn_error = wrapped(made) if math.isfinite(made) else math.inf
         steps.append(
             _Sum(
                 x=x,
@@ -140,12 +150,19 @@ def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_sta
                 turned=abs(turn),
                 off=math.hypot(last.linear_x - first.linear_x, last.linear_y - first.linear_y) * abs(lapse) / 2,
                 off_turn=abs(last.angular_z - first.angular_z) * abs(lapse) / 2,
-                x_error=two.pose.x - one.pose.x - x,
-                y_error=two.pose.y - one.pose.y - y,
-                turn_error=wrapped(made) if math.isfinite(made) else math.inf,
+                x_error=x_error,
+                y_error=y_error,
+                turn_error=turn_error,
+                along_error=_signed(x_error * math.cos(heading) + y_error * math.sin(heading), first.linear_x, linear),
+                turned_error=_signed(turn_error, first.angular_z, angular),
             )
         )
     return _Sums(trace, list(itertools.accumulate(steps, lambda total, step: _Sum(*map(operator.add, total, step)))))
+
+
+def _signed(error: float, speed: float, fastest: float) -> float:
+    """An error in the direction of a speed; none where that is little, and its direction perhaps noise."""
+    return math.copysign(error, error * speed) if error and abs(speed) > _MOVES * fastest else 0.0
 
 
 def _longest_lapse(trace: Sequence[Odometry]) -> float:

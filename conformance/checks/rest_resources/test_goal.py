@@ -227,12 +227,15 @@ def _contradict(robot: Robot, judge: Judge, body: dict[str, Any], other: dict[st
 
 
 def _velocity_meanwhile(robot: Robot, judge: Judge) -> None:
-    """A velocity while a goal is active is taken, or refused with 409."""
-    exchange = robot.put_velocity(_slow_turn(robot))
-    status = exchange.response.status
+    """A velocity while a goal is active is taken, and driven, or refused with 409."""
+    slow = _slow_turn(robot)
+    exchange = robot.put_velocity(slow)
+    answered, status = time.monotonic(), exchange.response.status
     judge.check(
         "rest-resources/velocity-goal", status in {200, 204, 409}, exchange, "200, 204 or 409 while a goal is active"
     )
+    if exchange.response.ok:
+        Drive(robot).reach(slow, "rest-resources/velocity-goal", since=answered)
 
 
 def _slow_turn(robot: Robot) -> Velocity:

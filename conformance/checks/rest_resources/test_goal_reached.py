@@ -43,7 +43,9 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface
     here = robot.map_pose()
     if here is None:
         pytest.skip("the robot's pose cannot be read")
-    (there,) = choose_goals(robot, _AWAY_M, 1)
+    there, other = choose_goals(robot, _AWAY_M, 2)
+    # Displaced at once: it is not taken up again when the robot has arrived where it was sent last.
+    put_goal(robot, goal_body(other, robot.statement.motion.frame, "displaced"))
     body, exchange = _put(robot, there)
     status = exchange.response.status
     if not judge.check("rest-resources/goal-put", status in NEW, exchange, "201 or 202 for a new goal"):

@@ -1,11 +1,11 @@
-"""Driving straight ahead and back, as fast as the robot says that it can."""
+"""Driving straight ahead and back: hardly at all, and as fast as the robot says that it can."""
 
 import pytest
 
 from conformance.robot.drive import Drive
-from conformance.robot.full_speed import direction, fastest, reach
 from conformance.robot.goals import make_room
 from conformance.robot.robot import Robot, Velocity
+from conformance.robot.velocity_range import direction, fastest, reach, slowest
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 
@@ -27,6 +27,7 @@ def test_straight_drive(robot: Robot) -> None:
     make_room(robot)
     drive = Drive(robot)
     drive.look()
+    reach(drive, slowest(robot))
     ahead = Velocity(linear_x=direction(robot) * fastest(robot, 0))
     reached = reach(drive, ahead)
     drive.keep(0.2 if reached else 0.0)

@@ -1,6 +1,7 @@
 """Turning: as fast as the robot can, renewed whatever is refused, bent into an arc, and at last left to itself."""
 
 import math
+import random
 import time
 from typing import Final
 
@@ -9,13 +10,14 @@ import pytest
 from conformance.contract.limits import Limits
 from conformance.robot.drive import Drive
 from conformance.robot.drive_trace import Turn
-from conformance.robot.full_speed import direction, fastest, reach
 from conformance.robot.goals import make_room
 from conformance.robot.letting_go import LetGo
-from conformance.robot.robot import STILL, Robot, Velocity
+from conformance.robot.robot import FARTHEST, STILL, Robot, Velocity
 from conformance.robot.undisturbed import ANGULAR, judge_arc, judge_renewed
+from conformance.robot.velocity_range import direction, fastest, reach
 from conformance.robot.windows import LONGEST_SAMPLE_S, SEVERAL
 from conformance.verdict.evidence import Judge
+from conformance.verdict.run import Run
 
 pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 # Where no hold time is declared a velocity has to end within so long, s.
@@ -43,14 +45,26 @@ _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
     "safety/watchdog",
     "safety/limits-hold",
 )
-def test_turn(robot: Robot, judge: Judge) -> None:
-    """Turns of about four seconds; the robot ends the last one by itself."""
+def test_turn(robot: Robot, judge: Judge, run: Run) -> None:
+    """Turns of about four seconds, of which the robot ends one by itself; another one too, where there is time."""
     if not robot.actuated(5):
         pytest.skip("the statement says that the robot cannot turn on the spot")
     make_room(robot)
     drive = Drive(robot)
     _turn(robot, drive, judge)
+    for velocity in _further(robot, run):
+        _let_go(robot, drive, judge, velocity)
     drive.judge_motion()
+
+
+def _further(robot: Robot, run: Run) -> list[Velocity]:
+    """Velocities at the ends of the range, which hold as long as others: one of them, by the seed, or both."""
+    limits = robot.limits
+    told_from_rest = 4 * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
+    slow = Velocity(angular_z=min(max(0.2 * limits.angular_rad_s, told_from_rest), 0.6 * limits.angular_rad_s))
+    choices = [slow, _fast_left(robot)]
+    number = {"quick": 0, "standard": 1}.get(run.effort.name, len(choices))
+    return random.Random(f"{run.seed}/let go").sample(choices, number)  # noqa: S311 - no secret
 
 
 def _turn(robot: Robot, drive: Drive, judge: Judge) -> None:
@@ -68,23 +82,32 @@ def _turn(robot: Robot, drive: Drive, judge: Judge) -> None:
     if renewed is None:
         drive.refresh(left)
     judge_renewed(robot, drive, judge, renewed or left)
-    _let_go(robot, drive, judge, Velocity(angular_z=-left.angular_z))
+    arc = Velocity(angular_z=-left.angular_z)
+    if robot.actuated(0):
+        # A small circle: either part has to end. The linear part is commanded last, and ends as well.
+        arc = arc._replace(linear_x=-0.3 * robot.limits.linear_m_s)
+        judge_arc(robot, drive, judge, arc)
+    _let_go(robot, drive, judge, arc)
     if robot.actuated(0):
         _ahead_from_rest(robot, drive, judge)
 
 
 def _fast(robot: Robot, drive: Drive) -> Velocity | None:
-    """Turn left, as fast ahead at the same time as the limits say; and right on the spot, with which it goes on.
+    """Turn left, and right on the spot, with which it goes on; both as fast as the robot can.
 
     Returns:
         That velocity, where it is reached.
     """
+    right = Velocity(angular_z=-fastest(robot, 5))
+    return right if reach(drive, _fast_left(robot)) and reach(drive, right) else None
+
+
+def _fast_left(robot: Robot) -> Velocity:
+    """As fast as the robot can: also ahead, or back where there is no room, where the limits say so."""
     ahead = 0.0
     if robot.actuated(0) and robot.limit_declared(0) and robot.limit_declared(5):
         ahead = direction(robot) * fastest(robot, 0)
-    right = Velocity(angular_z=-fastest(robot, 5))
-    reached = reach(drive, Velocity(linear_x=ahead, angular_z=fastest(robot, 5))) and reach(drive, right)
-    return right if reached else None
+    return Velocity(linear_x=ahead, angular_z=fastest(robot, 5))
 
 
 def _ahead_from_rest(robot: Robot, drive: Drive, judge: Judge) -> None:
@@ -112,10 +135,6 @@ def _let_go(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None
     What fails is tried again: an answer that came late, or a robot whose machine was busy, is no failure.
     """
     limits = robot.limits
-    if robot.actuated(0):
-        # A small circle: either part has to end. The linear part is commanded last, and ends as well.
-        turning = turning._replace(linear_x=-0.3 * limits.linear_m_s)
-        judge_arc(robot, drive, judge, turning)
     if limits.hold_s is None:
         judge.note("safety/hold", "no hold time is declared: judged is only that a velocity lasts until it is reached")
         judge.note("safety/hold-ends", "no hold time is declared")
@@ -192,7 +211,7 @@ def _watch(robot: Robot, drive: Drive, turning: Velocity) -> LetGo | None:
     if not drive.command(turning):
         return None
     full = drive.trace.sent
-    if robot.actuated(0) and limits.hold_s is not None:
+    if turning.linear_x and limits.hold_s is not None:
         drive.command_linear(turning)
     answered = drive.trace.answered
     first, resumed = len(drive.trace.turns), None

@@ -30,6 +30,7 @@ from conformance.selftest.mutants.goal_memory import (
     Lingering,
     OnlyOnce,
     Previous,
+    Resumed,
     Unreachable,
     active,
     identity,
@@ -158,6 +159,7 @@ MUTANTS = (
         "goal-get",
         _told(lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2")),
     ),
+    _mutant("goal-resumed", "A displaced goal is driven to after the one in its place.", "goal-drives", Resumed),
     _mutant("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", Previous),
     _mutant(
         "goal-get-other-id",

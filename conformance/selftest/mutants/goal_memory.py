@@ -81,6 +81,32 @@ class Previous:
         return response
 
 
+class Resumed:
+    """A goal that was displaced is driven to when the one in its place has been reached."""
+
+    def __init__(self) -> None:
+        self._last: Request | None = None
+        self._displaced: Request | None = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if _PUT(request):
+            there = forward(request.copy(method="GET", body=b"")).status == 200
+            response = forward(request)
+            if success(response):
+                self._displaced = self._last if there else None
+                self._last = request.copy()
+            return response
+        response = forward(request)
+        if not _GET(request):
+            self._displaced = None if request.method == "DELETE" else self._displaced
+        elif response.status == 404 and self._displaced is not None:
+            resumed, self._displaced = self._displaced, None
+            forward(resumed.copy())
+            return forward(request)
+        return response
+
+
 class OnlyOnce:
     """An id that was used before is refused for ever."""
 

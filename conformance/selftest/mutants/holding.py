@@ -16,6 +16,7 @@ _DELETE, _PUT_GOAL = rest("DELETE", GOAL), rest("PUT", GOAL)
 # Nobody asks: nothing has come for so long; and how often is looked, s.
 _SILENT_S, _LOOK_S = 0.12, 0.04
 _LIMITS = (0.7, 2.5)
+_SMALL = 0.05
 
 
 class _Remembering:
@@ -139,6 +140,25 @@ def _one_at_once(request: Request, forward: Forward) -> Response:
     return plain(204)(request) if success(response) else response
 
 
+def _deadband(request: Request, forward: Forward) -> Response:
+    """A part of a velocity that is small is taken for zero."""
+    value: Any = parsed(request.body) if _PUT(request) else None
+    if not any(0.0 < part < _SMALL for part in _parts(value)):
+        return forward(request)
+    for side, axis in (("linear", "x"), ("angular", "z")):
+        if abs(value[side][axis]) < _SMALL:
+            value[side][axis] = 0.0
+    response = forward(request.copy(body=json.dumps(value).encode()))
+    return plain(204)(request) if success(response) else response
+
+
+def _forgotten(request: Request, forward: Forward) -> Response:
+    """A velocity while a goal is active is answered 204, and the robot drives on to its goal."""
+    if _PUT(request) and forward(request.copy(method="GET", target=GOAL, body=b"")).status == 200:
+        return plain(204)(request)
+    return forward(request)
+
+
 def _deleted_later(request: Request, forward: Forward) -> Response:
     """DELETE of a goal is answered before anything is done."""
     if not _DELETE(request) or forward(request.copy(method="GET")).status != 200:
@@ -167,6 +187,18 @@ MUTANTS = (
         "Near both of its limits at once the robot drives at half the speed.",
         "rest-resources/velocity-range",
         lambda: _one_at_once,
+    ),
+    _mutant(
+        "velocity-deadband",
+        "A velocity below 0.05 m/s or rad/s is taken, and the robot stands still.",
+        "rest-resources/velocity-range",
+        lambda: _deadband,
+    ),
+    _mutant(
+        "velocity-forgotten-for-goal",
+        "While a goal is active, a velocity is answered 204 and forgotten.",
+        "rest-resources/velocity-goal",
+        lambda: _forgotten,
     ),
     _mutant(
         "goal-deleted-later",

@@ -1,4 +1,5 @@
 import math
+import random
 from dataclasses import replace
 
 import pytest
@@ -154,3 +155,44 @@ def test_a_quaternion_of_any_length_has_its_heading(yaw, length):
 def test_a_pose_is_seen_from_a_frame():
     assert Pose(1.0, 0.0, 0.0).seen_from(Pose(2.0, -1.0, math.pi / 2)) == pytest.approx((2.0, 0.0, math.pi / 2))
     assert Pose(0, 0, 0).ahead(2.0, math.pi / 2) == pytest.approx((0.0, 2.0, math.pi / 2))
+
+
+def _to_and_fro(v: float, w: float, scale: float, noise: float = 0.0) -> tuple[list, list]:
+    """One second one way, one second at rest, one second the other way; poses are ``scale`` times as far as driven."""
+    by = random.Random(7)  # noqa: S311 - no secret
+    trace, measured, pose, shown = [], [], _START, _START
+    for second, sign in enumerate((1, 0, -1)):
+        part, velocities = drive(sign * v, sign * w, pose)
+        for one in part:
+            turned = wrapped(one.pose.yaw - pose.yaw)
+            there = Pose(
+                shown.x + scale * (one.pose.x - pose.x) + by.gauss(0, noise),
+                shown.y + scale * (one.pose.y - pose.y) + by.gauss(0, noise),
+                wrapped(shown.yaw + scale * turned + by.gauss(0, noise)),
+            )
+            velocity = one.velocity._replace(
+                linear_x=one.velocity.linear_x + by.gauss(0, noise),
+                angular_z=one.velocity.angular_z + by.gauss(0, noise),
+            )
+            trace.append(replace(one, sent=one.sent + second, received=one.received + second, stamp=one.stamp + second))
+            trace[-1] = replace(trace[-1], pose=there, velocity=velocity)
+            measured.append(velocity)
+        ends = velocities[0]
+        shown = shown.ahead(scale * ends.linear_x)._replace(yaw=wrapped(shown.yaw + scale * ends.angular_z))
+        pose = pose.ahead(ends.linear_x)._replace(yaw=wrapped(pose.yaw + ends.angular_z))
+    return trace, measured
+
+
+@pytest.mark.parametrize(("v", "w"), [(0.7, 0.0), (0.0, 1.5)])
+def test_driving_back_makes_up_for_no_scale(v, w):
+    judge = Judge(_IDS)
+    judge_path(judge, *_to_and_fro(v, w, 1.3), Noise())
+    assert judge.refuted()
+
+
+@pytest.mark.parametrize(("v", "w"), [(0.7, 0.0), (0.0, 1.5)])
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.05])
+def test_noise_on_the_way_there_at_rest_and_back_fails_nobody(v, w, noise):
+    judge = Judge(_IDS)
+    judge_path(judge, *_to_and_fro(v, w, 1.0, noise), Noise(noise, noise, noise, noise))
+    assert not judge.refuted()

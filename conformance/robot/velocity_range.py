@@ -1,12 +1,27 @@
-"""The greatest velocities that a robot declares, which it has to take and to reach."""
+"""The ends of the range of velocities that a robot declares, all of which it has to take and to reach."""
 
 from typing import Final
 
 from conformance.robot.drive import Drive
-from conformance.robot.robot import Robot, Velocity
+from conformance.robot.robot import FARTHEST, Robot, Velocity
 
 # Where no limits are declared the robot may be slower than the figures that it is judged by.
 _UNDECLARED: Final = 0.6
+
+
+# So many times as fast as what may still be rest, a robot does not rest: its tolerance and its noise.
+_MOVES: Final = 1.6
+
+
+def slowest(robot: Robot) -> Velocity:
+    """A velocity ahead, and to the left, that can just be told from rest; at most half as fast as the robot can be."""
+    limits = robot.limits
+    linear = _MOVES * (limits.tolerance_linear_m_s + FARTHEST * limits.noise.linear_m_s)
+    angular = _MOVES * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
+    return Velocity(
+        linear_x=min(linear, 0.5 * fastest(robot, 0)) if robot.actuated(0) else 0.0,
+        angular_z=min(angular, 0.5 * fastest(robot, 5)) if robot.actuated(5) else 0.0,
+    )
 
 
 def fastest(robot: Robot, component: int) -> float:
