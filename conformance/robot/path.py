@@ -36,6 +36,8 @@ _OFF: Final = 0.03
 _OFF_TURN: Final = 0.06
 # Of the greatest speed: with less a robot does not count as driving in a direction.
 _MOVES: Final = 0.25
+# Between readings that are farther apart a velocity may have ended and begun again: its sum is a guess, s.
+_FINE_S: Final = 0.25
 # A window's share of the way, and what the noise at its ends comes to on the whole way.
 _WINDOW: Final = 0.25
 _NOISES: Final = 8.0
@@ -57,7 +59,8 @@ class _Sum(NamedTuple):
         x_error, y_error, turn_error: what was made less what was summed up, step by step, so that whole turns do not
             matter.
         along_error, turned_error: the same along the way and the turn that the velocity says, whatever its direction: a
-            robot that drives ahead and back, or turns left and right, makes up for no error of its scale.
+            robot that drives ahead and back, or turns left and right, makes up for no error of its scale. Of readings
+            that are close together only.
     """
 
     x: float = 0.0
@@ -140,7 +143,9 @@ def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_sta
         x = ahead * math.cos(heading) - aside * math.sin(heading)
         y = ahead * math.sin(heading) + aside * math.cos(heading)
         x_error, y_error = two.pose.x - one.pose.x - x, two.pose.y - one.pose.y - y
+        along = x_error * math.cos(heading) + y_error * math.sin(heading)
         turn_error = wrapped(made) if math.isfinite(made) else math.inf
+        fine = two.sent - one.sent <= _FINE_S
         steps.append(
             _Sum(
                 x=x,
@@ -153,8 +158,8 @@ def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_sta
                 x_error=x_error,
                 y_error=y_error,
                 turn_error=turn_error,
-                along_error=_signed(x_error * math.cos(heading) + y_error * math.sin(heading), first.linear_x, linear),
-                turned_error=_signed(turn_error, first.angular_z, angular),
+                along_error=_signed(along, first.linear_x, linear) if fine else 0.0,
+                turned_error=_signed(turn_error, first.angular_z, angular) if fine else 0.0,
             )
         )
     return _Sums(trace, list(itertools.accumulate(steps, lambda total, step: _Sum(*map(operator.add, total, step)))))

@@ -7,9 +7,7 @@ from conformance.robot.robot import FARTHEST, Robot, Velocity
 
 # Where no limits are declared the robot may be slower than the figures that it is judged by.
 _UNDECLARED: Final = 0.6
-
-
-# So many times as fast as what may still be rest, a robot does not rest: its tolerance and its noise.
+# So many times as fast as what may still be rest, by its tolerance and its noise, a robot does not rest.
 _MOVES: Final = 1.6
 
 

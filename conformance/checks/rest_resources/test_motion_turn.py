@@ -60,6 +60,8 @@ def test_turn(robot: Robot, judge: Judge, run: Run) -> None:
 def _further(robot: Robot, run: Run) -> list[Velocity]:
     """Velocities at the ends of the range, which hold as long as others: one of them, by the seed, or both."""
     limits = robot.limits
+    if limits.hold_s is None:
+        return []
     told_from_rest = 4 * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
     slow = Velocity(angular_z=min(max(0.2 * limits.angular_rad_s, told_from_rest), 0.6 * limits.angular_rad_s))
     choices = [slow, _fast_left(robot)]

@@ -196,3 +196,12 @@ def test_noise_on_the_way_there_at_rest_and_back_fails_nobody(v, w, noise):
     judge = Judge(_IDS)
     judge_path(judge, *_to_and_fro(v, w, 1.0, noise), Noise(noise, noise, noise, noise))
     assert not judge.refuted()
+
+
+@pytest.mark.parametrize(("v", "w"), [(0.7, 0.0), (0.0, 1.5)])
+def test_what_readings_far_apart_do_not_show_is_held_against_nobody(v, w):
+    # Over a slow link: the velocity had ended in between for half of the time, there and back.
+    trace, measured = _to_and_fro(v, w, 0.5)
+    judge = Judge(_IDS)
+    judge_path(judge, trace[::20], measured[::20], Noise())
+    assert not judge.refuted()
