@@ -68,6 +68,10 @@ class Drive:
         exchange = self.robot.put_linear(velocity)
         return self._commanded(Command(velocity, sent, time.monotonic(), exchange, linear_only=True))
 
+    def commanded(self, velocity: Velocity, sent: float, exchange: Exchange) -> None:
+        """Take down a command that somebody else gave, at a moment of the monotonic clock, as the last one."""
+        self.trace = self.trace.commanded(Command(velocity, sent, time.monotonic(), exchange))
+
     def _commanded(self, command: Command) -> bool:
         self.trace = self.trace.commanded(command)
         if command.exchange.response.status == HTTPStatus.CONFLICT and self.robot.goal()[0] is not None:
