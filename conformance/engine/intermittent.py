@@ -12,7 +12,7 @@ from conformance.documents.openapi import is_json
 from conformance.documents.xml import NotXmlError, parse
 from conformance.engine.sending_again import is_same, send_again
 from conformance.robot.stopping import leave_at_rest
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import SAFE_METHODS, Exchange
 from conformance.verdict.evidence import Again
 
 if TYPE_CHECKING:
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from conformance.verdict.evidence import Finding
     from conformance.verdict.run import Run
 
-# Methods that may be sent again without leave (RFC 9110 9.2.1).
-_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 _TIMES = 5
 # For so long findings are looked at, the first of each requirement before others, s.
 _LONGEST_S = 8.0
@@ -48,7 +46,7 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
         for _, id_, finding, exchange in sorted(_again(run), key=itemgetter(0)):
             if time.monotonic() > until:
                 break
-            moves |= exchange.request.method not in _SAFE
+            moves |= exchange.request.method not in SAFE_METHODS
             evidence = run.judge.evidence[id_]
             came_back = 0
             for _ in range(_TIMES):
@@ -75,7 +73,7 @@ def _again(run: Run) -> Iterator[tuple[int, str, Finding, Exchange]]:
 
 def _may(run: Run, exchange: Exchange) -> bool:
     request: Request = exchange.request
-    if request.method in _SAFE:
+    if request.method in SAFE_METHODS:
         return not request.body
     return run.allow_motion and exchange.response.status >= HTTPStatus.INTERNAL_SERVER_ERROR
 

@@ -13,13 +13,13 @@ from urllib.parse import urlsplit
 
 from conformance.contract.files import CONTRACT_DIR
 from conformance.engine.sequence import read_request
+from conformance.transport.exchange import SAFE_METHODS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from conformance.transport.exchange import Request
 
-_SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 # Servers differ in where they see one request end and the next one begin, so a method that writes counts wherever it
 # stands; and some take the method from a field (X-HTTP-Method-Override).
 _WRITES: Final = re.compile(rb"(?:PUT|POST|DELETE|PATCH)[ \t]|method", re.IGNORECASE)
@@ -66,7 +66,7 @@ def _only_reads(request: Request) -> bool:
         return not _WRITES.search(request.raw)
     if any(_WRITES.search(f"{name}: {value}".encode()) for name, value in request.headers):
         return False
-    return request.method in _SAFE or (request.method == "POST" and _asks(request.body))
+    return request.method in SAFE_METHODS or (request.method == "POST" and _asks(request.body))
 
 
 def _asks(body: bytes) -> bool:

@@ -78,6 +78,8 @@ class Batch:
         # What was sent in earlier batches, by its key, and how many batches had messages that nobody asked for.
         self._earlier: dict[bytes, _Sent] = {}
         self._strange = 0
+        # What was not accepted, by its key.
+        self._refused: dict[bytes, Exchange] = {}
         # Of what was sent without an answer, by its key: it may arrive, whenever.
         self._maybe: set[bytes] = set()
         # However its XML is written, a message has the same values; one that is refused for it is for others to judge.
@@ -92,7 +94,7 @@ class Batch:
         Orders must differ in their values, also from those of earlier batches: by them they are known again.
         """
         sent = [one for order in orders for one in self._send(order)]
-        accepted = [one for one in sent if one.exchange.response.ok]
+        accepted = self._accepted(sent)
         seen = self._collect(accepted)
         well = self._judge_each(accepted, seen) & self._judge_order(accepted, seen)
         return self._judge_only(accepted, seen) and well
@@ -106,11 +108,12 @@ class Batch:
             if not isinstance(attempt, Exchange):
                 # Nobody knows what became of it: a robot that closes a connection may have read the request.
                 self._maybe.add(self._key(delivery))
-            elif attempt.response.ok:
+            else:
                 sent.append(_Sent(_TOGETHER, "rest" if how == "rest" else "soap", delivery, attempt))
-        seen = self._collect(sent)
-        well = self._judge_each(sent, seen)
-        return self._judge_only(sent, seen) and well
+        accepted = self._accepted(sent)
+        seen = self._collect(accepted)
+        well = self._judge_each(accepted, seen)
+        return self._judge_only(accepted, seen) and well
 
     def finish(self, watched_s: float) -> None:
         """Judge what arrived later than it should, in so many seconds since the last batch, which may have passed."""
@@ -121,6 +124,10 @@ class Batch:
         """Judge whether an earlier delivery has come again since, whatever else was sent meanwhile."""
         seen = self._observer.collect(0, 0.0)
         self._judge_again([one.delivery for one in seen if self._key(one.delivery) in self._earlier])
+
+    def _accepted(self, sent: Sequence[_Sent]) -> list[_Sent]:
+        self._refused |= {self._key(one.delivery): one.exchange for one in sent if not one.exchange.response.ok}
+        return [one for one in sent if one.exchange.response.ok]
 
     def _collect(self, sent: Sequence[_Sent]) -> list[Seen]:
         """What arrived since this was asked last; what is not just what was sent is looked at for a little longer."""
@@ -182,25 +189,28 @@ class Batch:
         return well
 
     def _judge_only(self, sent: list[_Sent], seen: list[Seen]) -> bool:
-        """Judge what arrived beside that which was just sent: an earlier delivery again, or one of nobody's.
+        """Judge what arrived beside that which was just sent: an earlier delivery again, a refused one, or nobody's.
 
         A robot may have other clients: what nobody here asked for is held against it only when it comes repeatedly.
         """
         known = {self._key(one.delivery): one for one in sent}
         others = [one.delivery for one in seen if self._key(one.delivery) not in known.keys() | self._maybe]
         again = [delivery for delivery in others if self._key(delivery) in self._earlier]
-        self._strange += len(again) < len(others)
+        refused = [delivery for delivery in others if self._key(delivery) in self._refused]
+        self._strange += len(again) + len(refused) < len(others)
         self._earlier |= known
         self._judge_again(again)
-        blamed = again or (others if self._strange >= _OFTEN else [])
-        one = self._earlier.get(self._key(blamed[0])) if blamed else next(iter(known.values()), None)
+        exchange, found, cause = next((one.exchange for one in known.values()), None), "", ""
+        if again:
+            exchange = self._earlier[self._key(again[0])].exchange
+            found, cause = f"once more, and later: {again[0]}", "later"
+        elif refused:
+            exchange = self._refused[self._key(refused[0])]
+            found, cause = f"answered {exchange.response.status}, and there all the same: {refused[0]}", "not accepted"
+        elif others and self._strange >= _OFTEN:
+            exchange, found, cause = None, f"from nobody: {others[0]}", "from nobody"
         return self._judge.check(
-            _ONLY,
-            not blamed,
-            one.exchange if one else None,
-            "no message beside the one for each accepted request",
-            found=f"{'once more, and later' if again else 'from nobody'}: {blamed[0]}" if blamed else "",
-            cause="later" if again else "from nobody",
+            _ONLY, not found, exchange, "no message beside the one for each accepted request", found=found, cause=cause
         )
 
     def _judge_again(self, again: list[Delivery]) -> None:

@@ -14,7 +14,16 @@ import httpcore
 
 from conformance.transport.connections import Connections
 from conformance.transport.deadlines import MAX_ANSWER, has_connected, set_deadline, tls_context
-from conformance.transport.exchange import Exchange, Listener, NoAnswer, NoAnswerError, Request, Response, Unanswered
+from conformance.transport.exchange import (
+    SAFE_METHODS,
+    Exchange,
+    Listener,
+    NoAnswer,
+    NoAnswerError,
+    Request,
+    Response,
+    Unanswered,
+)
 from conformance.transport.pace import Pace, time_to_arrive
 
 Headers = tuple[tuple[str, str], ...]
@@ -26,8 +35,6 @@ _HANGS_WITHIN_S = 60.0
 # From a server that has kept connections open this often, so many closed ones are dropped requests, and told as such.
 _KEPT = 10
 _DROPS = 3
-# By these nothing is done (RFC 9110 9.2.1).
-_SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 @dataclass
@@ -71,7 +78,7 @@ class Connection:
 
     def note(self, method: str) -> None:
         """Take down that a request is on its way, or has been answered or given up."""
-        if method not in _SAFE:
+        if method not in SAFE_METHODS:
             self.acted_at = time.monotonic()
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
+# By these nothing is done (RFC 9110 9.2.1), so they may be sent again without leave.
+SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _CURL_PLAIN_LIMIT = 4000
 
 

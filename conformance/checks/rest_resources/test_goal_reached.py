@@ -1,6 +1,7 @@
 """A goal that is driven to: it ends there, is then no longer current, and its id can be used again."""
 
 import time
+from http import HTTPStatus
 from typing import Any, Final
 
 import pytest
@@ -84,6 +85,9 @@ def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: f
     while True:
         drive.look()
         goal, exchange = robot.goal()
+        if goal is None and exchange.response.status != HTTPStatus.NOT_FOUND:
+            # One answer that is neither the goal nor that there is none does not end it.
+            goal, exchange = robot.goal()
         if drive.trace.odometry:
             here = robot.in_map(drive.trace.odometry[-1].pose)
         now = time.monotonic()
@@ -114,7 +118,7 @@ def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: f
     )
     judge.check(
         "rest-resources/goal-ended",
-        ended and exchange.response.status == 404,
+        ended and exchange.response.status == HTTPStatus.NOT_FOUND,
         exchange,
         "404 when the goal has been reached",
         found="" if ended else "the goal is still current",

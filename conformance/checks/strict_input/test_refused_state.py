@@ -27,13 +27,12 @@ from conformance.robot.stopping import bring_to_rest
 from conformance.soap.callable_services import SoapServices
 from conformance.soap.calls import call
 from conformance.soap.service import SoapService
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import SAFE_METHODS, Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.needs("rest"), pytest.mark.motion]
 _OTHER_METHODS: Final = ("GET", "HEAD", "OPTIONS", "POST", "DELETE", "PATCH")
-_SAFE: Final = {"GET", "HEAD", "OPTIONS"}
 _UNDONE: Final = "http/not-acceptable-undone"
 _DONE: Final = "equivalence/delivery-rest"
 _VELOCITY: Final = "strict-input/velocity-refused"
@@ -222,7 +221,7 @@ def test_an_invalid_delivery_reaches_nobody(
     for method, exchange in by_method.items():
         judge.check(
             "strict-input/delivery-refused",
-            others[method] not in seen or (exchange.response.ok and method not in _SAFE),
+            others[method] not in seen or (exchange.response.ok and method not in SAFE_METHODS),
             exchange,
             f"no message for {method} of what PUT orders",
             cause=method,

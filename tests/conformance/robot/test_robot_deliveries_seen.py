@@ -57,13 +57,13 @@ class Robot:
     exact = True
     contract = read_file(CONTRACT_DIR / "publishers.wsdl")
 
-    def __init__(self, fault):
-        self._fault, self._numbers, self._seen = fault, count(1), deque()
+    def __init__(self, fault, status=204):
+        self._fault, self._numbers, self._seen, self._status = fault, count(1), deque(), status
 
     def send(self, method, path, **_):
         parts = path.split("/")
         self._arrive("rest", Delivery(int(parts[4]), *map(float, parts[6::2])))
-        return Exchange(Request(method, "http://robot" + path), Response(204, (), b"", 1.0))
+        return Exchange(Request(method, "http://robot" + path), Response(self._status, (), b"", 1.0))
 
     def post(self, body, **_):
         # In whatever style it is written: comments, CDATA and white space say nothing.
@@ -149,6 +149,18 @@ def test_a_second_message_is_found_whenever_it_comes(late):
         batch.run([order(number, "soap") for number in (2 * turn, 2 * turn + 1)])
     batch.finish(0.0)
     assert set(judge.refuted()) == {"equivalence/delivery-rest", "equivalence/delivery-only"}
+
+
+@pytest.mark.parametrize(("status", "arrives", "cause"), [(500, True, "not accepted"), (500, False, None)])
+def test_a_delivery_that_is_not_accepted_and_arrives_is_told_as_that(status, arrives, cause):
+    robot, judge = Robot(lambda _, seen: [seen] if arrives else [], status), Judge(_IDS)
+    Batch(robot, robot, robot, judge).run([order(1, "rest"), order(2, "rest")])
+    findings = judge.evidence["equivalence/delivery-only"].findings
+    assert list(findings) == ([cause] if cause else [])
+    if cause:
+        finding = findings[cause]
+        assert "answered 500, and there all the same: " in finding.message
+        assert finding.exchange.request.url.endswith(order(1, "rest").delivery.rest_path)
 
 
 @settings(max_examples=50, deadline=None, database=None)
