@@ -33,7 +33,7 @@ RESULT_FORMAT = "roaas-result/1"
 # As much of a body as a reader looks at; its length is always told.
 _SHOWN_BODY = 4096
 _SHOWN_CURL = 20_000
-_LIBRARIES = ("schemathesis", "hypothesis", "zeep", "lxml", "xmlschema", "httpcore", "h11")
+_LIBRARIES = ("schemathesis", "hypothesis", "zeep", "lxml", "xmlschema", "h11")
 
 
 def result_document(

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlsplit
 
-import httpcore
+import h11
 
-from conformance.transport.connections import Connections
-from conformance.transport.deadlines import MAX_ANSWER, has_connected, set_deadline, tls_context
+from conformance.transport.connections import ClosedError, Connections, NoConnectionError, tls_context
+from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import (
     SAFE_METHODS,
     Exchange,
@@ -63,7 +63,7 @@ class Connection:
     _next_slot: float = 0.0
 
     def tls(self) -> ssl.SSLContext:
-        """See transport.tls_context."""
+        """See connections.tls_context."""
         return tls_context(self.ca_file)
 
     def take_slot(self, method: str) -> None:
@@ -99,12 +99,11 @@ class HttpClient:
         self.port = parts.port or (443 if parts.scheme == "https" else 80)
         self.prefix = parts.path
         self.authority = parts.netloc.rsplit("@", 1)[-1]
-        self._origin = (parts.scheme.encode(), self.host.encode("idna"))
         self._hangs: defaultdict[str, list[float]] = defaultdict(list)
         self._kept = 0
         self._dropped = 0
-        tls = connection.tls() if parts.scheme == "https" else None
-        self._connections = Connections(*self._origin, self.port, tls)
+        self.tls = connection.tls() if parts.scheme == "https" else None
+        self._connections = Connections(self.host.encode("idna").decode("ascii"), self.port, self.tls)
 
     def close(self) -> None:
         """Close the connections that are open."""
@@ -181,61 +180,34 @@ class HttpClient:
         return tuple(pair for pair in fields if pair != ("Accept", ""))
 
     def _exchange(
-        self, method: str, path: str, fields: list[tuple[str, str]], body: bytes, deadline: float, *, fresh: bool
+        self, method: str, path: str, fields: list[tuple[str, str]], body: bytes, seconds: float, *, fresh: bool
     ) -> Response:
-        scheme, host = self._origin
         target = (self.prefix + path).encode("utf-8", "surrogateescape") or b"/"
-        url = httpcore.URL(scheme=scheme, host=host, port=self.port, target=target)
-        request_headers = [(name.encode("latin-1"), value.encode("utf-8")) for name, value in fields]
-        # A read ends at the deadline of the exchange.
-        extensions = {"timeout": dict.fromkeys(("connect", "write"), deadline)}
+        headers = [(name.encode("latin-1"), value.encode("utf-8")) for name, value in fields]
+        request = h11.Request(method=method, target=target, headers=headers)
         for attempt in (1, 2):
             self.connection.take_slot(method)
-            set_deadline(deadline, len(body))
-            started = time.perf_counter()
-            kept = not fresh and attempt == 1
-            connection = self._connections.take() if kept else self._connections.new()
+            deadline = Deadline(seconds, len(body))
+            keep = not fresh and attempt == 1
+            connection = self._connections.take() if keep else self._connections.new()
+            kept = connection.is_open
             try:
-                answer = connection.handle_request(
-                    httpcore.Request(method, url, headers=request_headers, content=body, extensions=extensions)
-                )
-                content = _read(answer)
-                self._kept += not has_connected()
-                return Response(
-                    answer.status,
-                    tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in answer.headers),
-                    content,
-                    (time.perf_counter() - started) * 1000,
-                    answer.extensions.get("http_version", b"HTTP/1.1").decode("latin-1"),
-                    time.monotonic(),
-                )
+                response = connection.exchange(request, body, deadline)
             except Exception as error:
-                none = _no_answer(error, deadline + time_to_arrive(len(body)))
-                if none.kind is NoAnswer.CLOSED and not has_connected() and attempt == 1 and not self._drops_requests():
+                none = _no_answer(error, seconds + time_to_arrive(len(body)))
+                if none.kind is NoAnswer.CLOSED and kept and attempt == 1 and not self._drops_requests():
                     continue
                 raise none from error
             finally:
-                self._connections.give_back(connection, keep=kept)
+                self._connections.give_back(connection, keep=keep)
+            self._kept += kept
+            return response
         raise AssertionError("unreachable: the second attempt returns or raises")
 
     def _drops_requests(self) -> bool:
         """Count a connection that ended with a request on it, and say whether that is this server's habit."""
         self._dropped += 1
         return self._kept >= _KEPT and self._dropped >= _DROPS
-
-
-def _read(answer: httpcore.Response) -> bytes:
-    chunks: list[bytes] = []
-    size = 0
-    try:
-        for chunk in answer.iter_stream():
-            size += len(chunk)
-            if size > MAX_ANSWER:
-                raise httpcore.RemoteProtocolError(f"an answer of more than {MAX_ANSWER} octets")
-            chunks.append(chunk)
-    finally:
-        answer.close()
-    return b"".join(chunks)
 
 
 class _SilenceError(Exception):
@@ -246,21 +218,19 @@ class _SilenceError(Exception):
         self.kind = kind
 
 
-def _no_answer(error: Exception, deadline: float) -> _SilenceError:
+def _no_answer(error: Exception, seconds: float) -> _SilenceError:
     """Sort what went wrong on the wire; anything that is no network error is the suite's own and is raised again."""
     text = str(error) or type(error).__name__
-    if isinstance(error, httpcore.TimeoutException):
-        return _SilenceError(f"no answer within {deadline:.3g} s", NoAnswer.TIMEOUT)
-    if isinstance(error, httpcore.RemoteProtocolError):
-        if "disconnected" in text:
-            return _SilenceError("connection closed without an answer", NoAnswer.CLOSED)
+    if isinstance(error, TimeoutError):
+        return _SilenceError(f"no answer within {seconds:.3g} s", NoAnswer.TIMEOUT)
+    if isinstance(error, ClosedError):
+        return _SilenceError("connection closed without an answer", NoAnswer.CLOSED)
+    if isinstance(error, h11.RemoteProtocolError):
         return _SilenceError(f"the answer is no HTTP: {text}", NoAnswer.MALFORMED)
-    if isinstance(error, httpcore.ConnectError):
+    if isinstance(error, NoConnectionError):
         kind = NoAnswer.TLS if "SSL" in text or "certificate" in text.lower() else NoAnswer.REFUSED
         return _SilenceError(f"no connection: {text}", kind)
-    if isinstance(error, ssl.SSLError):
-        return _SilenceError(f"no connection: {text}", NoAnswer.TLS)
-    if isinstance(error, httpcore.NetworkError | OSError):
+    if isinstance(error, OSError):
         return _SilenceError(f"connection broken: {text}", NoAnswer.CLOSED)
     raise error
 

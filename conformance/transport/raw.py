@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from conformance.transport.client import HttpClient
+from conformance.transport.connections import open_link
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
 from conformance.transport.pace import time_for
 
@@ -20,6 +21,8 @@ _FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*([^\r\n]*?)[ \t]*")
 _CHUNK = re.compile(rb"([0-9A-Fa-f]{1,15})[ \t]*(?:;[^\r\n]*)?")
 _MOST = 4 * 1024 * 1024
 _BODILESS = frozenset({204, 304})
+# The least that a connection is waited for, s.
+_TO_CONNECT_S = 0.05
 
 
 class FramingError(Exception):
@@ -97,7 +100,8 @@ def talk(
     client.connection.take_slot(request.method)
     started = time.perf_counter()
     try:
-        link = _connect(client, deadline)
+        left = max(_TO_CONNECT_S, deadline - time.monotonic())
+        link = open_link(client.host, client.port, client.tls, left)
     except OSError as error:
         raise NoAnswerError(Unanswered(request, f"no connection: {error}", NoAnswer.REFUSED)) from error
     received = bytearray()
@@ -122,15 +126,6 @@ def talk(
                 break
     client.connection.note(request.method)
     return RawAnswer(bytes(received), closed, sent_all, (time.perf_counter() - started) * 1000, early)
-
-
-def _connect(client: HttpClient, deadline: float) -> socket.socket:
-    left = max(0.05, deadline - time.monotonic())
-    link = socket.create_connection((client.host, client.port), timeout=left)
-    link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    if client.scheme != "https":
-        return link
-    return client.connection.tls().wrap_socket(link, server_hostname=client.host)
 
 
 def _sent(
