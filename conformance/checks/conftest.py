@@ -26,7 +26,7 @@ from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run
 
 # What is imported late because few commands need it, and is needed later in a run.
-_NEEDED_LATER: Final = ("conformance.soap.zeep_client", "schemathesis.specs.openapi")
+_NEEDED_LATER: Final = ("conformance.soap.zeep_client", "schemathesis.specs.openapi", "jsonschema")
 
 
 @pytest.fixture(scope="session")

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final, cast
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any, cast
 
 import jsonschema_rs
-from jsonschema import Draft202012Validator
-from jsonschema.exceptions import best_match
-from jsonschema.validators import extend
 
 from conformance.documents.json_text import shown
 
@@ -116,9 +114,16 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(as_double(value))
 
 
-_TYPES: Final = Draft202012Validator.TYPE_CHECKER.redefine("number", lambda _, value: is_number(value))
-# jsonschema gives extend() no types.
-_Validator: Final = cast("Any", extend)(Draft202012Validator, type_checker=_TYPES)
+@cache
+def _naming() -> Any:
+    """The class of validators that name what is wrong."""
+    # Imported late: it costs a tenth of a second, and is needed when something is wrong.
+    from jsonschema import Draft202012Validator  # noqa: PLC0415
+    from jsonschema.validators import extend  # noqa: PLC0415
+
+    types = Draft202012Validator.TYPE_CHECKER.redefine("number", lambda _, value: is_number(value))
+    # jsonschema gives extend() no types.
+    return cast("Any", extend)(Draft202012Validator, type_checker=types)
 
 
 class Shape:
@@ -126,7 +131,6 @@ class Shape:
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
-        self._validator = _Validator(schema)
         self._quick = jsonschema_rs.validator_for(schema)
 
     def problem(self, value: Any, where: str = "") -> str:
@@ -134,15 +138,25 @@ class Shape:
         try:
             if self._passes(value):
                 return ""
-            error = best_match(self._validator.iter_errors(value))
+            error = self._first_error(value)
         except RecursionError:
             return "the value is nested too deeply"
         return _described(error, where) if error is not None else ""
 
     def broken_rule(self, value: Any) -> tuple[str, bool]:
         """The keyword that ``value`` breaks first, and whether it is the value itself that breaks it (or a part)."""
-        error = best_match(self._validator.iter_errors(value))
+        error = self._first_error(value)
         return ("", False) if error is None else (str(error.validator), not error.absolute_path)
+
+    @cached_property
+    def _validator(self) -> Any:
+        return _naming()(self.schema)
+
+    def _first_error(self, value: Any) -> ValidationError | None:
+        from jsonschema.exceptions import best_match  # noqa: PLC0415 - as above
+
+        error: ValidationError | None = best_match(self._validator.iter_errors(value))
+        return error
 
     def _passes(self, value: Any) -> bool:
         try:
