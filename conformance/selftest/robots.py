@@ -74,13 +74,14 @@ def check_available(kind: str) -> None:
 
 
 @contextlib.contextmanager
-def running(kind: str, domain_id: int, seed: int = 0) -> Iterator[Robot]:
+def running(kind: str, domain_id: int = 0, seed: int = 0, fault: str = "") -> Iterator[Robot]:
     """Start a robot on free ports, and stop it in the end.
 
     Args:
         kind: "reference", "realistic" or an independent robot's name.
         domain_id: first ROS domain to try for a robot on ROS.
         seed: which realistic robot.
+        fault: which fault in the body of the robot "baroque".
 
     Raises:
         RobotError: it does not start.
@@ -88,10 +89,11 @@ def running(kind: str, domain_id: int, seed: int = 0) -> Iterator[Robot]:
     """
     check_available(kind)
     if kind in ON_ROS:
-        with _own_domain(domain_id) as own, _started(kind, own, seed) as robot:
+        with _own_domain(domain_id) as own, _started(kind, own, _command(kind, own, seed)) as robot:
             yield robot
     else:
-        with _started(kind, domain_id, seed) as robot:
+        faulty = ["--fault", fault] if fault else []
+        with _started(kind, None, [*_command(kind, domain_id, seed), *faulty]) as robot:
             yield robot
 
 
@@ -117,8 +119,7 @@ def _own_domain(first: int) -> Iterator[int]:
 
 
 @contextlib.contextmanager
-def _started(kind: str, domain_id: int, seed: int) -> Iterator[Robot]:
-    command = _command(kind, domain_id, seed)
+def _started(kind: str, domain_id: int | None, command: list[str]) -> Iterator[Robot]:
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     # The command is this interpreter with arguments made above.
     process = subprocess.Popen(  # noqa: S603
@@ -126,7 +127,7 @@ def _started(kind: str, domain_id: int, seed: int) -> Iterator[Robot]:
     )
     try:
         rest, soap = _ready(process, kind)
-        yield Robot(kind, rest, soap, domain_id if kind in ON_ROS else None)
+        yield Robot(kind, rest, soap, domain_id)
     finally:
         process.terminate()
         try:

@@ -6,7 +6,10 @@ import sys
 import threading
 from importlib import import_module
 
+from conformance.selftest.faulty_bodies import FAULTY_BODIES
+
 NAMES = ("plain", "baroque", "legacy", "flask", "aiohttp", "hypercorn")
+_WITH_FAULTS = "baroque"
 
 
 def main() -> int:
@@ -15,12 +18,16 @@ def main() -> int:
     parser.add_argument("name", choices=NAMES)
     parser.add_argument("--rest-port", type=int, default=0, help="0: a free one")
     parser.add_argument("--soap-port", type=int, default=0, help="0: a free one")
+    parser.add_argument("--fault", choices=FAULTY_BODIES, help="in its body; of the robot baroque only")
     given = parser.parse_args()
+    if given.fault and given.name != _WITH_FAULTS:
+        parser.error(f"--fault {given.fault}: only {_WITH_FAULTS} has bodies with faults")
     ended = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: ended.set())
+    kind = (FAULTY_BODIES[given.fault],) if given.fault else ()
     rest, soap, stop = import_module(f"conformance.selftest.independent_robots.{given.name}").serve(
-        given.rest_port, given.soap_port
+        given.rest_port, given.soap_port, *kind
     )
     sys.stdout.write(f"ready rest={rest} soap={soap}\n")
     sys.stdout.flush()

@@ -7,7 +7,7 @@ import uuid
 from dataclasses import dataclass, field
 from typing import Any
 
-_TICK_S = 0.01
+TICK_S = 0.01
 _ARRIVED_M = 0.03
 _ARRIVED_RAD = 0.03
 _STEP_M = 0.1
@@ -102,7 +102,7 @@ class Body:
     def __post_init__(self) -> None:
         self._lock = threading.RLock()
         self._state = _State(*self.build.start)
-        self._tick = int(time.time() / _TICK_S)
+        self._tick = int(time.time() / TICK_S)
         self._command = (0.0, 0.0)
         self._until = 0
 
@@ -112,17 +112,17 @@ class Body:
             self._advance()
             state = self._state
             return {
-                "header": {"stamp": stamp(self._tick * _TICK_S), "frame_id": "odom"},
+                "header": {"stamp": stamp(self._tick * TICK_S), "frame_id": "odom"},
                 "child_frame_id": "base_link",
                 "pose": {"pose": pose(*self.in_odom(state.x, state.y, state.yaw)), "covariance": _covariance(0.001)},
-                "twist": {"twist": _twist(state.v, state.w), "covariance": _covariance(0.0001)},
+                "twist": {"twist": twist(state.v, state.w), "covariance": _covariance(0.0001)},
             }
 
     def velocity(self) -> dict[str, Any]:
         """The measured velocity as geometry_msgs/Twist."""
         with self._lock:
             self._advance()
-            return _twist(self._state.v, self._state.w)
+            return twist(self._state.v, self._state.w)
 
     def drive(self, v: float, w: float | None) -> float:
         """Command a velocity; without ``w`` the turning rate that was commanded last is kept. Returns ``w``.
@@ -139,7 +139,7 @@ class Body:
             if w is None:
                 w = self._command[1] if self._until > self._tick else 0.0
             self._command = (v, w)
-            self._until = self._tick + round(self.build.hold_s / _TICK_S)
+            self._until = self._tick + round(self.build.hold_s / TICK_S)
             return w
 
     def send(self, id_: str | None, target: dict[str, Any], frame: str) -> tuple[Goal, bool]:
@@ -222,7 +222,7 @@ class Body:
             del self.deliveries[_KEPT:]
 
     def _advance(self) -> None:
-        now = int(time.time() / _TICK_S)
+        now = int(time.time() / TICK_S)
         state = self._state
         while self._tick < now:
             still = not state.v and not state.w and self.goal is None and self._until <= self._tick
@@ -231,12 +231,12 @@ class Body:
                 continue
             self._tick += 1
             v, w = self._aim()
-            state.v += _bounded(v - state.v, self.build.acceleration * _TICK_S)
-            state.w += _bounded(w - state.w, self.build.spin * _TICK_S)
-            middle = state.yaw + state.w * _TICK_S / 2
-            state.x += state.v * math.cos(middle) * _TICK_S
-            state.y += state.v * math.sin(middle) * _TICK_S
-            state.yaw = wrapped(state.yaw + state.w * _TICK_S)
+            state.v += _bounded(v - state.v, self.build.acceleration * TICK_S)
+            state.w += _bounded(w - state.w, self.build.spin * TICK_S)
+            middle = state.yaw + state.w * TICK_S / 2
+            state.x += state.v * math.cos(middle) * TICK_S
+            state.y += state.v * math.sin(middle) * TICK_S
+            state.yaw = wrapped(state.yaw + state.w * TICK_S)
 
     def _aim(self) -> tuple[float, float]:
         """The velocity that the robot wants to have now."""
@@ -287,7 +287,8 @@ def stamp(seconds: float) -> dict[str, int]:
     return {"sec": int(seconds), "nanosec": min(999_999_999, int(seconds % 1 * 1e9))}
 
 
-def _twist(v: float, w: float) -> dict[str, Any]:
+def twist(v: float, w: float) -> dict[str, Any]:
+    """A geometry_msgs/Twist of a robot on wheels."""
     return {"linear": {"x": v, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": w}}
 
 

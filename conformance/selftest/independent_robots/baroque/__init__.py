@@ -38,9 +38,13 @@ BUILD = Build(
 )
 
 
-def serve(rest_port: int, soap_port: int) -> tuple[str, str, Callable[[], None]]:
-    """Start the robot. Returns REST's base URL, the publishers' WSDL and what stops it."""
-    body = Body(BUILD, yields=True)
+def serve(rest_port: int, soap_port: int, kind: type[Body] = Body) -> tuple[str, str, Callable[[], None]]:
+    """Start the robot, of which another kind of body may have a fault.
+
+    Returns:
+        REST's base URL, the publishers' WSDL and what stops it.
+    """
+    body = kind(BUILD, yields=True)
     loop = Loop()
     rest_at = loop.listen(Rest(body).answer, rest_port)
     soap = Soap(body)

@@ -1,0 +1,62 @@
+"""Which faults inside a robot the suite notices: in what it does, not in what is said of it on the way to a client.
+
+``python benchmarks/inside.py`` certifies the independent robot ``baroque`` with each of its faulty bodies, and once
+without a fault, and prints a line for each and how many were caught; ``python benchmarks/inside.py 'goal-*'`` takes
+some. No ROS is needed. ``python -m conformance.selftest.independent_robots baroque --fault deadband`` starts one to
+look at. The exit code is 1 when the robot without a fault is not found conformant, or no fault has such a name.
+"""
+
+import argparse
+import signal
+import sys
+from fnmatch import fnmatch
+
+from conformance.contract.exit_codes import ExitCode
+from conformance.selftest.at_once import each_at_once
+from conformance.selftest.certifying import Job, Outcome, run_job
+from conformance.selftest.faulty_bodies import FAULTY_BODIES
+from conformance.selftest.robots import running, statement_of
+from conformance.verdict.effort import EFFORTS
+
+_ROBOT = "baroque"
+_NO_FAULT = ""
+_TIMEOUT_S = 300.0
+
+
+def main() -> int:
+    """Certify, print, and return the exit code."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("patterns", nargs="*", default=["*"], metavar="PATTERN", help="names of faults; default: all")
+    parser.add_argument("--effort", choices=EFFORTS, default="quick")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--parallel", type=int, default=2, help="robots at once")
+    options = parser.parse_args()
+    names = [name for name in FAULTY_BODIES if any(fnmatch(name, pattern) for pattern in options.patterns)]
+    if not names:
+        print(f"no fault is named {' or '.join(options.patterns)}; there are {', '.join(FAULTY_BODIES)}")
+        return 1
+
+    def certify(fault: str) -> tuple[str, Outcome]:
+        with running(_ROBOT, fault=fault) as robot:
+            publishers, subscribers = robot.soap, robot.soap.replace("publisher", "subscriber")
+            where = (statement_of(_ROBOT), robot.rest, publishers, subscribers)
+            return fault, run_job(Job(*where, effort=options.effort, seed=options.seed, timeout_s=_TIMEOUT_S))
+
+    try:
+        found = dict(each_at_once(certify, [_NO_FAULT, *names], options.parallel, _tell))
+    except KeyboardInterrupt:
+        return 130
+    caught = sum(bool(found[name].fails) for name in names if name in found)
+    print(f"caught {caught} of {len(names)} at {options.effort}, seed {options.seed}")
+    return int(found[_NO_FAULT].exit_code != ExitCode.PASSED)
+
+
+def _tell(result: tuple[str, Outcome]) -> None:
+    fault, outcome = result
+    said = f"caught by {', '.join(sorted(outcome.fails)[:3])}" if outcome.fails else f"exit code {outcome.exit_code}"
+    print(f"{fault or 'no fault'}: {said} ({outcome.seconds:.0f} s)", flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

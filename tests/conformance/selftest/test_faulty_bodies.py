@@ -1,0 +1,38 @@
+"""Faults in the body of a robot: each can be started, and the suite sees them over real HTTP."""
+
+import pytest
+
+from conformance.robot.message_shapes import ODOMETRY
+from conformance.selftest.certifying import Job, run_job
+from conformance.selftest.faulty_bodies import FAULTY_BODIES
+from conformance.selftest.independent_robots.baroque import BUILD
+from conformance.selftest.independent_robots.body import Body, pose
+from conformance.selftest.robots import running, statement_of
+
+
+@pytest.mark.parametrize("name", FAULTY_BODIES)
+def test_a_faulty_body_is_asked_like_a_good_one(name):
+    kind = FAULTY_BODIES[name]
+    body = kind(BUILD, yields=True)
+    assert isinstance(body, Body)
+    assert kind is not Body
+    assert body.drive(0.1, 0.2) == 0.2
+    assert set(body.velocity()) == {"linear", "angular"}
+    assert not ODOMETRY.problem(body.odometry())
+    x, y, yaw = BUILD.start
+    goal, new = body.send("one", pose(x + 1, y, yaw), "map")
+    assert new
+    assert goal.id == "one"
+    assert body.path((x, y, yaw), x + 1, y, yaw)
+    assert body.cancel()
+    body.deliver("rest", message_code=3, depot_x=1.5)
+    assert body.deliveries[0].interface == "rest"
+
+
+@pytest.mark.parametrize(("fault", "fails"), [("delivery-single-precision", True), ("", False)])
+def test_a_fault_inside_a_robot_is_seen_from_outside(fault, fails):
+    requirement = "equivalence/delivery-rest"
+    with running("baroque", fault=fault) as robot:
+        where = (statement_of("baroque"), robot.rest, robot.soap, robot.soap.replace("publisher", "subscriber"))
+        outcome = run_job(Job(*where, requirements=(requirement,), timeout_s=60.0))
+    assert outcome.verdicts[requirement] == ("fail" if fails else "pass"), outcome.reasons
