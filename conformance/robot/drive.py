@@ -162,12 +162,15 @@ class Drive:
         count = SEVERAL if ids else 1
         lapses = 0
         # A velocity may end before it is reached, where it does not hold for as long as the robot takes to settle.
-        every = _COUNTED_ON_S if limits.hold_s is None else 0.6 * limits.hold_s
+        every = _COUNTED_ON_S if limits.hold_s is None else _renewed_s(limits.hold_s, limits.settle_s)
         renews = limits.hold_s is None or limits.hold_s < patience
         while True:
             asked = time.monotonic()
+            lapsed = limits.hold_s is not None and asked > self.trace.sent + certain_s(limits.hold_s)
+            # A command that has had no effect when the robot has had its time is not given again: that would hide it.
+            if not lapsed and asked > begun + limits.settle_s:
+                renews = renews and not windows.is_stuck(self.trace.turns[first:], wanted, part)
             if renews and self.trace.commands and asked > self.trace.sent + every:
-                lapsed = limits.hold_s is not None and asked > self.trace.sent + certain_s(limits.hold_s)
                 self._renew()
                 if lapsed and lapses < _LAPSES:
                     # Whoever looks was late, not the robot: that one may have slowed down meanwhile.
@@ -230,6 +233,14 @@ class Drive:
                 self.robot.judge.skip(id_, _OUTLASTED)
             return
         judge_path(self.robot.judge, self.trace.odometry, self.trace.measured, self.robot.limits.noise)
+
+
+def _renewed_s(hold_s: float, settle_s: float) -> float:
+    """When a velocity that is not reached yet is given again, s after its command.
+
+    Not before the robot has had its time, where the velocity lasts for that long and a while more.
+    """
+    return max(0.6 * hold_s, settle_s + _PACE_S) if settle_s + _PACE_S < 0.75 * hold_s else 0.6 * hold_s
 
 
 def certain_s(hold_s: float) -> float:

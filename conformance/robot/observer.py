@@ -15,7 +15,8 @@ from conformance.rest.interface import RestInterface
 from conformance.robot.clock import Clock
 from conformance.robot.geometry import length_of
 from conformance.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
-from conformance.robot.robot import FARTHEST, LINEAR, POSE, VELOCITY
+from conformance.robot.robot import FARTHEST, LINEAR, POSE, VELOCITY, Velocity
+from conformance.robot.single_readings import BesideOdometry, OneSample
 from conformance.robot.windows import LONGEST_SAMPLE_S, SEVERAL
 from conformance.transport.exchange import Exchange, Listener
 
@@ -71,6 +72,10 @@ class Observer(Listener):
         self._fresh_at = math.inf
         self._none: bool = False
         self._velocity_of_none: Exchange | None = None
+        # Single readings, one after another.
+        self._sample = OneSample(api.run.judge)
+        self._beside = BesideOdometry(api.run.judge, api.run.statement.limits)
+        self._read_until = 0.0
         self._fast = {path: _Samples() for path in _READINGS}
 
     def answered(self, exchange: Exchange) -> None:
@@ -89,6 +94,7 @@ class Observer(Listener):
         value, problem = read_as(response, shape)
         if not judge.check(id_, not problem, exchange, expected, found=problem):
             return
+        self._single(path, value, exchange)
         if path == POSE:
             self._none = False
             self._odometry(value, exchange, response.elapsed_ms)
@@ -98,6 +104,20 @@ class Observer(Listener):
             self._velocity_of_none = exchange if self._none else None
             value = {"linear": value} if path == LINEAR else value
         self._limits(self._fast[path], value, exchange)
+
+    def _single(self, path: str, value: Any, exchange: Exchange) -> None:
+        """Compare single readings that came one after another: of several clients' answers, some may have crossed."""
+        judge, limits = self._api.run.judge, self._api.run.statement.limits
+        received = exchange.response.received_s or time.monotonic()
+        if received - exchange.response.elapsed_ms / 1000 < self._read_until:
+            self._sample, self._beside = OneSample(judge), BesideOdometry(judge, limits, self._beside.out)
+        self._read_until = max(self._read_until, received)
+        if path == POSE:
+            stamp = value["header"]["stamp"]["sec"], value["header"]["stamp"]["nanosec"]
+            self._sample.odometry(stamp, value, exchange)
+            self._beside.odometry(stamp[0] + stamp[1] / 1e9, Velocity.of(value["twist"]["twist"]), received)
+        elif path == VELOCITY:
+            self._beside.velocity(Velocity.of(value), exchange, received)
 
     def _unavailable(self, path: str, exchange: Exchange) -> None:
         """There is no odometry (any more): the answer says when to ask again, and there is no velocity either."""

@@ -47,7 +47,9 @@ def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float
     after, _ = robot.read(path, shape)
     if before is None or after is None:
         return None, exchange
-    broken = "" if problem else shape.problem(between) or restamped(between, before, after)
+    broken = ""
+    if not problem:
+        broken = shape.problem(between) or restamped(between, before, after) or retold(between, before, after)
     if broken:  # which is none that will be right a moment later
         judge_difference(robot, name, broken, exchange)
     problem = problem or disagreement(before, between, after, _slack(robot))
@@ -64,6 +66,14 @@ def restamped(message: Any, *others: Any) -> str:
         if 0 < abs(apart_ns) < _SAMPLES_APART_NS:
             return f"stamp {(sec, nanosec)}, {apart_ns:+g} ns from that of the same message, {other}"
     return ""
+
+
+def retold(message: Any, before: Any, after: Any) -> str:
+    """How a message contradicts another of its stamp that REST told alike before and after it."""
+    of_one_sample = stamp_of(before) == stamp_of(message) == stamp_of(after) != (0.0, 0.0)
+    if not of_one_sample or disagreement(before, after, before, _SLACK):
+        return ""
+    return disagreement(before, message, after, _SLACK)
 
 
 def _slack(robot: Robot) -> Slack:

@@ -18,6 +18,8 @@ SEVERAL: Final = 3
 # Where stamps do not tell: no robot's odometry is slower than this, so that a later reading is another sample, s.
 LONGEST_SAMPLE_S: Final = 0.25
 ALL: Final = slice(None)
+# What is still so far away, of what it was at first, has not come nearer.
+_NO_NEARER: Final = 0.8
 
 
 def newest(turns: Sequence[Turn], count: int = SEVERAL) -> list[Turn]:
@@ -53,6 +55,18 @@ def part_of(velocity: Velocity, part: slice) -> Velocity:
     """A velocity with zeros in the components that do not count."""
     chosen = set(range(len(velocity))[part])
     return Velocity(*(value if index in chosen else 0.0 for index, value in enumerate(velocity)))
+
+
+def is_stuck(turns: Sequence[Turn], wanted: Velocity, part: slice = ALL) -> bool:
+    """Whether several readings show a velocity that comes no nearer to another one."""
+    seen = velocities(turns)
+    if len(seen) < SEVERAL:
+        return False
+    return _apart(seen[-1], wanted, part) > _NO_NEARER * _apart(seen[0], wanted, part)
+
+
+def _apart(one: Velocity, other: Velocity, part: slice) -> float:
+    return max(abs(a - b) for a, b in zip(part_of(one, part), part_of(other, part), strict=True))
 
 
 def verdict(

@@ -13,6 +13,8 @@ from conformance.verdict.evidence import Judge
 pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 # A robot whose odometry is slow, or that has just been started, gets so long, s.
 _PATIENCE_S = 5.0
+# At standard effort: what is out once in sixty readings is read several times.
+_TURNS = 250
 
 
 @pytest.mark.requirement(
@@ -51,6 +53,16 @@ def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
         f"a stamp that advances within {_PATIENCE_S:g} s",
         found=f"the same stamp in {readings} readings",
     )
+
+
+@pytest.mark.requirement("rest-resources/pose-sample", "rest-resources/velocity-odometry")
+def test_single_readings(robot: Robot, effort: Effort) -> None:
+    """Odometry and velocity in turns, many of one sample: the observer judges each by those around it."""
+    for _ in range(effort.cases(_TURNS)):
+        robot.odometry()
+        robot.velocity()
+    robot.odometry()
+    robot.odometry()
 
 
 @pytest.mark.requirement(

@@ -199,6 +199,20 @@ MUTANTS = (
         ("pose-motion", "pose-rotation"),
         lambda: _Frozen("pose", "twist"),
     ),
+    _mutant(
+        "pose-aside-sometimes",
+        "One pose in 60 is a metre aside.",
+        "pose-sample",
+        _told(lambda value: _position(value).update(x=_position(value)["x"] + 1.0), nth=60),
+    ),
+    _mutant(
+        "velocity-off-sometimes",
+        "One measured velocity in 60 is 0.1 m/s more than that of the odometry.",
+        "velocity-odometry",
+        altered(
+            rest("GET", VELOCITY), values(lambda twist: twist["linear"].update(x=twist["linear"]["x"] + 0.1)), nth=60
+        ),
+    ),
     _mutant("pose-in-centimetres", "The position is in centimetres.", "pose-motion", _told(_scaled(100))),
     _mutant("pose-mirrored", "The position's x and y are swapped.", "pose-motion", _told(_swapped)),
     _mutant("pose-clockwise", "The heading counts clockwise.", "pose-rotation", _told(_turned(lambda yaw: -yaw))),

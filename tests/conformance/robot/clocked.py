@@ -33,19 +33,29 @@ class Clock:
 class Body:
     """Reaches what it is told so long after it was told, and stops where it is not told again within its hold time.
 
-    It has an odometry five times a second. What it is told again does not ``renew`` it in one that is faulty, and what
-    it refuses ``stops`` another one.
+    It has an odometry five times a second. What it is told again does not ``renew`` it in one that is faulty, what it
+    refuses ``stops`` another one, and another one ``loses`` the first that it is told.
     """
 
     def __init__(
-        self, clock: Clock, takes_s: float, hold_s: float, *, renews: bool = True, stops: bool = False
+        self,
+        clock: Clock,
+        takes_s: float,
+        hold_s: float,
+        *,
+        renews: bool = True,
+        stops: bool = False,
+        loses: bool = False,
     ) -> None:
         self.clock, self.takes_s, self.hold_s = clock, takes_s, hold_s
-        self.renews, self.stops = renews, stops
+        self.renews, self.stops, self.loses = renews, stops, loses
         self.told: list[float] = []
 
     def tell(self) -> None:
         """Take up the velocity, or go on with it."""
+        if self.loses:
+            self.loses = False
+            return
         if self.told and self.clock.now > self.told[-1] + self.hold_s:
             self.told = []
         if self.renews or not self.told:

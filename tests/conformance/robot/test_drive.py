@@ -10,12 +10,17 @@ _CONVERGES = "rest-resources/velocity-converges"
 
 
 def _judged(
-    monkeypatch: pytest.MonkeyPatch, takes_s: float, looks: dict[int, float] | None = None, hold_s: float = 10.0
+    monkeypatch: pytest.MonkeyPatch,
+    takes_s: float,
+    looks: dict[int, float] | None = None,
+    hold_s: float = 10.0,
+    *,
+    loses: bool = False,
 ) -> bool:
     """Whether a robot that takes so long is said to have reached the velocity."""
     clock = Clock()
     monkeypatch.setattr(drive, "time", clock)
-    driven = Drive(Body(clock, takes_s, hold_s), looks or {}, hold_s)
+    driven = Drive(Body(clock, takes_s, hold_s, loses=loses), looks or {}, hold_s)
     driven.tell()
     driven.reach(WANTED, _CONVERGES)
     return driven.judge.judged[_CONVERGES]
@@ -34,6 +39,11 @@ def test_samples_from_within_the_settle_time_say_nothing_of_a_robot_that_was_loo
 
 def test_a_velocity_that_ended_because_it_was_renewed_too_late_has_its_settle_time_again(monkeypatch):
     assert _judged(monkeypatch, SETTLE_S, {5: 1.6}, hold_s=1.0)
+
+
+@pytest.mark.parametrize("hold_s", [1.65, 10.0])
+def test_a_command_that_was_lost_is_not_made_up_for_by_its_renewal(monkeypatch, hold_s):
+    assert not _judged(monkeypatch, 0.1 * SETTLE_S, hold_s=hold_s, loses=True)
 
 
 @pytest.mark.parametrize("looks", [{}, {50: 0.6}, {5: 1.6}, dict.fromkeys(range(100), 0.7)])
