@@ -1,10 +1,10 @@
-"""Judges what every GET of the goal in a run shows: one goal, and not a part of the one before.
+"""Judges what every GET of the goal in a run shows: one goal, each time, and not a part of the one before.
 
 A client that waits for its goal sees the right one in the end. What it was shown at first may have been a mixture: the
-id of the new goal, and a stamp or a pose of the old one.
+id of the new goal, and a stamp or a pose of the old one. And what nobody changed is shown in one way.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from typing import Any, Final
 
 from conformance.documents.representation import flattened, projected
@@ -18,6 +18,10 @@ _OFTEN: Final = 3
 _MOST: Final = 0.5
 # By what the first of these readings shows, and the second, a change is judged; by further ones, what lives.
 _AT_FIRST: Final = 2
+# A goal is shown one way, another way, and the first way again.
+_SHOWN: Final = 3
+# What a goal's own progress changes.
+_PROGRESS: Final = "status."
 Shown = dict[str, Any]
 
 
@@ -37,6 +41,7 @@ class GoalObserver(Listener):
         self._before: Shown | None = None
         self._since: list[Shown] = []
         self._first: Exchange | None = None
+        self._newest: deque[tuple[Shown, Exchange]] = deque(maxlen=_SHOWN)
         # How often a value has changed with the goal, and was the old one first; what changes by itself.
         self._changed: Counter[str] = Counter()
         self._stale: Counter[str] = Counter()
@@ -49,6 +54,7 @@ class GoalObserver(Listener):
         if exchange.request.method != "GET":
             self._before = self._since[-1] if self._since else self._before
             self._since = []
+            self._newest.clear()
             return
         if exchange.response.media_type != "application/json":
             return
@@ -56,6 +62,8 @@ class GoalObserver(Listener):
         if problem:
             return
         shown = flattened(projected(value, GOAL.schema))
+        self._newest.append((shown, exchange))
+        self._compare()
         if self._before == shown and not self._since:
             return  # a robot may take a while to show another goal
         self._since = [*self._since[-2:], shown]
@@ -66,6 +74,24 @@ class GoalObserver(Listener):
             self._living |= {_whole(place) for place, value in one.items() if other.get(place) != value}
         elif self._before is not None and self._first is not None:
             self._look(self._before, self._since[0], self._since[1], self._first)
+
+    def _compare(self) -> None:
+        """Judge what was shown between two readings that are alike, where nothing was asked of the goal."""
+        if len(self._newest) < _SHOWN:
+            return
+        (first, _), (between, exchange), (last, _) = self._newest
+        if first != last:
+            return
+        odd = [place for place, value in first.items() if between.get(place) != value]
+        odd = [place for place in odd if not place.startswith(_PROGRESS)]
+        self._judge.check(
+            "rest-resources/goal-get",
+            not odd,
+            exchange,
+            "the goal as it is shown just before and just after",
+            found=f"{odd[0]} is {between.get(odd[0])!r} for {first[odd[0]]!r}" if odd else "",
+            cause=f"{odd[0]} now and then" if odd else "",
+        )
 
     def _look(self, before: Shown, first: Shown, later: Shown, exchange: Exchange) -> None:
         """Judge what was shown first after a change, by what was shown before and later."""

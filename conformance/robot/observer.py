@@ -73,7 +73,7 @@ class Observer(Listener):
         self._none: bool = False
         self._velocity_of_none: Exchange | None = None
         # Single readings, one after another.
-        self._sample = OneSample(api.run.judge)
+        self._sample = OneSample(api.run.judge, api.run.statement.limits)
         self._beside = BesideOdometry(api.run.judge, api.run.statement.limits)
         self._read_until = 0.0
         self._fast = {path: _Samples() for path in _READINGS}
@@ -110,7 +110,7 @@ class Observer(Listener):
         judge, limits = self._api.run.judge, self._api.run.statement.limits
         received = exchange.response.received_s or time.monotonic()
         if received - exchange.response.elapsed_ms / 1000 < self._read_until:
-            self._sample, self._beside = OneSample(judge), BesideOdometry(judge, limits, self._beside.out)
+            self._sample, self._beside = OneSample(judge, limits), BesideOdometry(judge, limits, self._beside.out)
         self._read_until = max(self._read_until, received)
         if path == POSE:
             stamp = value["header"]["stamp"]["sec"], value["header"]["stamp"]["nanosec"]

@@ -68,3 +68,20 @@ def test_a_stamp_that_goes_on_by_itself(api):
     rounds = [[goal(str(n), n, n, header) for header in (n, n, n + 1)] for n in range(1, 3)]
     rounds += [[goal(str(n), n, n, header) for header in (n, n + 1)] for n in range(3, 9)]
     assert not refuted(api, *rounds)
+
+
+@pytest.mark.parametrize(
+    ("between", "expected"),
+    [
+        (goal("1", 1, 1.5), {"rest-resources/goal-get"}),
+        (goal("2", 1, 1), {"rest-resources/goal-get"}),
+        (goal("1", 1, 1), set()),
+        (goal("1", 1, 1) | {"status": {"code": 1, "text": "on its way"}}, set()),
+    ],
+)
+def test_a_goal_that_nobody_changed_is_shown_in_one_way(api, between, expected):
+    assert refuted(api, [goal("1", 1, 1), goal("1", 1, 1), between, goal("1", 1, 1)]) == expected
+
+
+def test_another_goal_may_follow_and_that_before_it_be_put_again(api):
+    assert not refuted(api, [goal("1", 1, 1)], [goal("2", 2, 2)], [goal("1", 3, 1)])
