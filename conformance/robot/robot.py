@@ -70,7 +70,7 @@ FARTHEST: Final = 4.0
 _SELDOM_HZ: Final = 5.0
 
 
-def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float = 1.0, samples: int = 1) -> bool:
+def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float = 1.0, samples: float = 1) -> bool:
     """Whether each component is what was wanted, within ``factor`` times the declared tolerance, and the noise.
 
     Args:
