@@ -58,6 +58,13 @@ def test_where_answers_take_long_three_turns_without_a_command_are_judged():
     assert agreement(trace.commanded(command(at=0.2)), _LIMITS) == []
 
 
+def test_a_robot_that_moves_between_two_readings_is_not_judged_by_what_else_was_read():
+    trace, straight = Trace(0.0), Velocity(*_AHEAD[:3])
+    for index, turning in enumerate((0.5, 0.9, 0.9)):
+        trace = trace.looked(turn(0.2 * index, _AHEAD, _AHEAD._replace(angular_z=turning), straight))
+    assert agreement(trace, _LIMITS) == []
+
+
 @pytest.mark.parametrize(
     ("velocity", "linear", "found"),
     [
