@@ -44,12 +44,14 @@ def drive(request: Request, forward: Forward, speed: float) -> None:
 
 
 def goal_ahead(request: Request, forward: Forward, distance: float) -> None:
-    """Send a goal beside where the robot stands, in the odometry's frame."""
+    """Send a goal beside where the robot stands, in the odometry's frame, on the side on which it takes one."""
     odometry = parsed(sent(request, forward, "GET", POSE).body)
     at = odometry["pose"]["pose"]["position"]
-    pose = {"position": {"x": at["x"] + distance, "y": at["y"], "z": 0.0}, "orientation": {**_ZERO, "w": 1.0}}
-    target = {"header": {"frame_id": odometry["header"]["frame_id"]}, "pose": pose}
-    sent(request, forward, "PUT", GOAL, {"goal": {"target_pose": target}})
+    for away in (distance, -distance):
+        pose = {"position": {"x": at["x"] + away, "y": at["y"], "z": 0.0}, "orientation": {**_ZERO, "w": 1.0}}
+        target = {"header": {"frame_id": odometry["header"]["frame_id"]}, "pose": pose}
+        if sent(request, forward, "PUT", GOAL, {"goal": {"target_pose": target}}).status in {200, 201, 202}:
+            return
 
 
 def _give_up(request: Request, forward: Forward) -> None:

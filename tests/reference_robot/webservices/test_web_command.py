@@ -168,8 +168,9 @@ def test_the_simulated_robot_behind_the_web(domain_id):
         mission = eventually(
             lambda: (a := served.call("GET", "/robot/navigation/action/goal/")).is_success and a.json()
         )
-        assert mission["goal"]["target_pose"]["pose"]["position"]["x"] == 76.02
-        assert served.call("PUT", "/robot/velocity/", json=twist()).status_code == 409
+        # To the source; or, so much faster than time, to the destination already.
+        assert mission["goal"]["target_pose"]["pose"]["position"]["x"] in {76.02, 60.633}
+        eventually(lambda: served.call("PUT", "/robot/velocity/", json=twist()).status_code == 409)
         states = eventually(lambda: [entry["state"] for entry in served.call("GET", "/robot/app/delivery/").json()])
         assert states in (["queued", "active"], ["queued", "queued"])
         eventually(lambda: served.call("GET", "/robot/app/delivery/").json()[1]["state"] == "done")
