@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from http import HTTPStatus
 from itertools import chain, cycle
 from typing import Final
 
@@ -31,6 +32,8 @@ REQUIREMENT: Final = {
     "together": "equivalence/delivery-concurrent",
 }
 _TOGETHER: Final = "together"
+# A gateway before the robot says so of what the robot may have taken (RFC 9110 15.6.3, 15.6.5).
+_UNKNOWN: Final = frozenset({HTTPStatus.BAD_GATEWAY, HTTPStatus.GATEWAY_TIMEOUT})
 _ONLY: Final = "equivalence/delivery-only"
 # Orders of which each makes two messages.
 _TWO: Final = {"same": ["rest", "soap"], "twice": ["rest", "rest"]}
@@ -126,7 +129,12 @@ class Batch:
         self._judge_again([one.delivery for one in seen if self._key(one.delivery) in self._earlier])
 
     def _accepted(self, sent: Sequence[_Sent]) -> list[_Sent]:
-        self._refused |= {self._key(one.delivery): one.exchange for one in sent if not one.exchange.response.ok}
+        """Those that were answered as done; the others are kept in mind."""
+        for one in sent:
+            if one.exchange.response.status in _UNKNOWN:
+                self._maybe.add(self._key(one.delivery))
+            elif not one.exchange.response.ok:
+                self._refused[self._key(one.delivery)] = one.exchange
         return [one for one in sent if one.exchange.response.ok]
 
     def _collect(self, sent: Sequence[_Sent]) -> list[Seen]:

@@ -151,7 +151,9 @@ def test_a_second_message_is_found_whenever_it_comes(late):
     assert set(judge.refuted()) == {"equivalence/delivery-rest", "equivalence/delivery-only"}
 
 
-@pytest.mark.parametrize(("status", "arrives", "cause"), [(500, True, "not accepted"), (500, False, None)])
+@pytest.mark.parametrize(
+    ("status", "arrives", "cause"), [(500, True, "not accepted"), (500, False, None), (504, True, None)]
+)
 def test_a_delivery_that_is_not_accepted_and_arrives_is_told_as_that(status, arrives, cause):
     robot, judge = Robot(lambda _, seen: [seen] if arrives else [], status), Judge(_IDS)
     Batch(robot, robot, robot, judge).run([order(1, "rest"), order(2, "rest")])
