@@ -12,9 +12,8 @@ NAMES = ("robot", "a", ".example")  # by which tests ask for the robot
 # Not for the session: they compute all the time, and each process that shares the tests would have them to its end.
 @pytest.fixture(scope="module")
 def foreign_of_module(module_domain_id: int) -> Iterator[ForeignRobot]:
-    robot = ForeignRobot(module_domain_id, "Twist")
-    yield robot
-    robot.close()
+    with ForeignRobot(module_domain_id, "Twist") as robot:
+        yield robot
 
 
 @pytest.fixture(scope="module")

@@ -19,10 +19,8 @@ def navigator(domain_id: int) -> Iterator[RosProcess]:
 
 @pytest.fixture
 def attached(domain_id: int) -> Iterator[Served]:
-    base = RosProcess("nav2_nodes.py", str(domain_id), "base")
-    with running_robot(domain_id, "--attach") as served:
+    with RosProcess("nav2_nodes.py", str(domain_id), "base"), running_robot(domain_id, "--attach") as served:
         yield served
-    base.close()
 
 
 def test_an_action_server_that_goes_is_503_and_one_that_comes_back_is_found(attached, navigator):

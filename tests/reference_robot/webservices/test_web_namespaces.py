@@ -21,23 +21,25 @@ def test_ros_s_words_are_told_from_ours(words, own, ros):
 
 
 def test_each_robot_is_served_in_its_namespace_by_its_clock_and_enclave(domain_id):
-    one, two = (
-        RosProcess("nav2_nodes.py", str(domain_id), "base", "TwistStamped", "--ros-args", "-r", f"__ns:=/{name}")
-        for name in ("one", "two")
-    )
-    one.do(odometry=1.0, clock=1234)
-    two.do(odometry=2.0)
     local = ["-r", "/DeliveryRequestMsg/from_json:=DeliveryRequestMsg/from_json"]
     clock = ["-p", "use_sim_time:=true", "--enclave", "/fleet/one"]
     with (
+        _base(domain_id, "one") as one,
+        _base(domain_id, "two") as two,
         running_robot(domain_id, "--attach", "--ros-args", "-r", "__ns:=/one", *local, *clock) as served,
         running_robot(domain_id, "--time-scale=5", "--ros-args", "-r", "__ns:=/three", *local) as simulated,
         RosRuntime(domain_id) as ros,
     ):
-        pose = eventually(lambda: (a := served.call("GET", "/robot/pose/")).is_success and a.json())
-        assert pose["pose"]["pose"]["position"]["x"] == 1.0
-        eventually(lambda: served.call("PUT", "/robot/velocity/", json=twist(x=0.2)).is_success)
-        assert one.next("velocity") == {"x": 0.2, "frame": "base_link", "sec": 1234}
+        one.do(odometry=1.0, clock=1234)
+        two.do(odometry=2.0)
+        eventually(lambda: _x(served.call("GET", "/robot/pose/")) == 1.0)
+        # Until the clock is heard it is zero, which is what a stamp says then.
+        eventually(
+            lambda: (
+                served.call("PUT", "/robot/velocity/", json=twist(x=0.2)).is_success
+                and one.next("velocity") == {"x": 0.2, "frame": "base_link", "sec": 1234}
+            )
+        )
         assert two.heard_nothing()
         graph = ros.create_node("observer")
         eventually(lambda: ("robot_publishers", "/one", "/fleet/one") in _nodes(graph))
@@ -49,8 +51,14 @@ def test_each_robot_is_served_in_its_namespace_by_its_clock_and_enclave(domain_i
         assert served.call("GET", "/robot/sensors/").json() == []
         services = simulated.call("GET", "/robot/navigation/services/").json()
         assert services == [{"name": "/three/get_plan", "type": "nav_msgs/srv/GetPlan"}]
-    one.close()
-    two.close()
+
+
+def _base(domain_id, name):
+    return RosProcess("nav2_nodes.py", str(domain_id), "base", "TwistStamped", "--ros-args", "-r", f"__ns:=/{name}")
+
+
+def _x(pose):
+    return pose.json()["pose"]["pose"]["position"]["x"] if pose.is_success else None
 
 
 def _nodes(graph):

@@ -11,8 +11,7 @@ PATH = "/robot/navigation/service/plan"
 
 
 def test_a_planner_of_nav2_is_asked(domain_id):
-    robot = ForeignRobot(domain_id, "Twist", "planner")
-    with running_robot(domain_id, "--attach") as served:
+    with ForeignRobot(domain_id, "Twist", "planner") as robot, running_robot(domain_id, "--attach") as served:
         robot.do(odometry={"x": 2.5, "covariance": 0.0})
         eventually(
             lambda: (
@@ -65,4 +64,3 @@ def test_a_planner_of_nav2_is_asked(domain_id):
         for pose, (x, y) in zip(turned["poses"], [(2.5, 0.0), (7.0, 8.0)], strict=True):
             assert pose["header"]["frame_id"] == "odom"
             assert pose["pose"]["position"] == {"x": pytest.approx(x), "y": pytest.approx(y, abs=1e-9), "z": 0.0}
-    robot.close()

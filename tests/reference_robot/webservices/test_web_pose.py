@@ -59,8 +59,7 @@ def test_velocity_is_the_odometry_s(served, foreign):
 
 
 def test_before_the_first_odometry_there_is_503(domain_id):
-    silent = ForeignRobot(domain_id, "Twist", "silent")
-    with running_robot(domain_id, "--attach") as served:
+    with ForeignRobot(domain_id, "Twist", "silent") as silent, running_robot(domain_id, "--attach") as served:
         for path in (PATH, "/robot/velocity/", "/robot/velocity/linear/"):
             answer = served.call("GET", path)
             assert answer.status_code == 503
@@ -79,4 +78,3 @@ def test_before_the_first_odometry_there_is_503(domain_id):
         silent.do(odometry={"x": float("inf"), "covariance": 0.0})
         refused = eventually(lambda: (a := served.call("GET", "/robot/velocity/")).status_code == 503 and a)
         assert "linear.x is inf" in refused.json()["detail"]
-    silent.close()

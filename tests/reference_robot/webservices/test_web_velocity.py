@@ -69,11 +69,9 @@ def test_while_a_goal_is_active_velocity_is_refused(served, foreign):
 
 
 def test_a_robot_that_takes_stamped_twists_gets_them(domain_id):
-    stamped = ForeignRobot(domain_id, "TwistStamped")
-    with running_robot(domain_id, "--attach") as served:
+    with ForeignRobot(domain_id, "TwistStamped") as stamped, running_robot(domain_id, "--attach") as served:
         eventually(lambda: served.call("PUT", VELOCITY, json=twist(x=0.3, z=0.2)).status_code == 200)
         assert stamped.next("velocity") == {"type": "TwistStamped", "x": 0.3, "z": 0.2}
-    stamped.close()
 
 
 def test_without_a_robot_commands_are_not_accepted(domain_id):
