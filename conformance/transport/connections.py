@@ -31,6 +31,7 @@ _READ: Final = 64 * 1024
 _KEPT: Final = 2
 _EXPIRY_S: Final = 3.0
 _SWITCHING_PROTOCOLS: Final = 101
+_QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)  # Linux alone has it
 
 
 class NoConnectionError(OSError):
@@ -82,6 +83,7 @@ class HttpConnection:
         self._link: socket.socket | None = None
         self._state = h11.Connection(h11.CLIENT, max_incomplete_event_size=_MAX_HEAD)
         self._idle_since = 0.0
+        self._begun = False
         self.is_idle = False
 
     @property
@@ -99,7 +101,7 @@ class HttpConnection:
             h11.RemoteProtocolError: what came is no HTTP, or too much.
             OSError: the connection broke.
         """
-        started, self.is_idle = time.perf_counter(), False
+        started, self.is_idle, self._begun = time.perf_counter(), False, False
         if self._link is None:
             self._link = open_link(*self._server, deadline.to_send_s())
         self._send(self._link, request, content, deadline)
@@ -158,7 +160,11 @@ class HttpConnection:
     def _event(self, link: socket.socket, deadline: Deadline) -> h11.Event | type[h11.NEED_DATA | h11.PAUSED]:
         while (event := self._state.next_event()) is h11.NEED_DATA:
             link.settimeout(deadline.left_s())
+            if self._begun and _QUICKACK is not None:
+                # Many a server keeps the rest back until its first piece is acknowledged: a kernel takes 40 ms.
+                link.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
             octets = link.recv(_READ)
+            self._begun = True
             if not octets and self._state.their_state is h11.SEND_RESPONSE:
                 raise ClosedError
             deadline.came(len(octets))
