@@ -5,7 +5,8 @@ Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent] [planner]``.
 ``{"odometry": {"x": …, "covariance": …, "stopped_clock": …}}`` publishes that odometry over and over,
 ``{"transform": [x, y, yaw]}`` tells how its odometry lies in the map, ``{"finish": true}`` ends the goal,
 ``{"current_goal": …}`` tells of one that another client sent, ``{"tell_next_goal_as": …}`` tells of the next one that
-comes, and of no later one. With ``planner`` it tells ``plan`` of each one that it is asked for.
+comes, and of no later one. After each it tells ``obeyed``. With ``planner`` it tells ``plan`` of each one that it is
+asked for.
 """
 
 import json
@@ -178,6 +179,7 @@ def main() -> None:
     tell(ready=True)
     for line in sys.stdin:
         robot.obey(json.loads(line))
+        tell(obeyed=True)
     robot.finished.set()
     time.sleep(0.05)
     executor.shutdown()

@@ -185,6 +185,7 @@ def main() -> None:
     tell(ready=True)
     for line in sys.stdin:
         node.obey(json.loads(line))
+        tell(obeyed=True)
     context.try_shutdown()
     spinner.join(2)
 

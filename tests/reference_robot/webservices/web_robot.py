@@ -76,12 +76,17 @@ class RosProcess:
             env=ros_environment() | environment,
         )
         self._events: queue.Queue[dict[str, Any]] = queue.Queue()
+        self._obeyed = threading.Semaphore(0)
         threading.Thread(target=self._read, daemon=True).start()
         self.next("ready")
 
     def _read(self) -> None:
         for line in self.process.stdout:
-            self._events.put(json.loads(line))
+            event = json.loads(line)
+            if "obeyed" in event:
+                self._obeyed.release()
+            else:
+                self._events.put(event)
 
     def next(self, kind: str) -> Any:
         """Return what comes next, which must be of this kind."""
@@ -108,8 +113,10 @@ class RosProcess:
         return False
 
     def do(self, **command: Any) -> None:
+        """Let it obey, and wait until it has."""
         self.process.stdin.write(json.dumps(command) + "\n")
         self.process.stdin.flush()
+        assert self._obeyed.acquire(timeout=_PATIENCE), command
 
     def __enter__(self) -> Self:
         return self
