@@ -31,11 +31,11 @@ def change(result, interface, quantile="p50"):
 
 def test_a_robot_that_is_slower_than_another_is_told_from_it(toy, load):
     quick, slow = toy(), toy("--delay", DELAY_S)
-    for _ in range(3):
+    for _ in range(8):
         run = load(*slow.both(), *against(quick), FAST, "--tolerance 50%")
         result = run.result
         if result["against"]["verdict"] != "unclear":
-            break  # a machine that stands still for seconds leaves one run in the dark, and not three
+            break  # a machine that stands still for seconds leaves some runs in the dark, and not all
     assert run.code == (ExitCode.FAILED if result["valid"] else ExitCode.INCONCLUSIVE), run.out + run.err
     assert result["against"]["verdict"] == "slower"
     for interface in ("rest", "soap"):

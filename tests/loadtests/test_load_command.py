@@ -68,8 +68,8 @@ def test_a_slow_robot_is_seen_to_be_slow_and_misses_its_threshold(toy, load, tmp
 
 def test_a_quick_robot_is_asked_in_shorter_blocks(toy, load):
     robot = toy()
-    runs = (load(*robot.both(), "--rate 400 --duration 1 --warmup 0 --client wire") for _ in range(5))
-    assert any(run.result["plan"]["block_s"] < 0.03 for run in runs), "a busy machine may delay the first answer once"
+    runs = (load(*robot.both(), "--rate 400 --duration 1 --warmup 0 --client wire") for _ in range(20))
+    assert any(run.result["plan"]["block_s"] < 0.03 for run in runs), "a busy machine may delay the first answers"
 
 
 def test_a_stall_is_seen_by_every_request_that_it_meets(toy, load):
