@@ -136,6 +136,7 @@ FAULTS: dict[str, tuple[Where, Make]] = {
     "plan-aside": (rest("GET", PLAN), _edited(values(_plan_aside))),
     "sensors-short": (rest("GET", SENSORS), _edited(values(lambda told: told[:-1]))),
     "delivery-lost": (deliveries, instead(_any, plain(204))),
+    "soap-velocity-off": (soap("GetVelocity"), _edited(text(r"(<(?:\w+:)?x>)[^<]+", r"\g<1>0.1", count=1))),
     "soap-pose-aside": (soap("GetPose"), _edited(text(r"(<(?:\w+:)?x>)[^<]+", r"\g<1>77.7", count=1))),
 }
 

@@ -119,18 +119,22 @@ class BesideOdometry:
         judge: is told.
         limits: of the robot.
         out: how many readings were out before.
+        requirement: of which the readings are.
 
     Attributes:
         out: how many have been out.
+        judged: how many could be told from what was read around them.
     """
 
-    def __init__(self, judge: Judge, limits: Limits, out: int = 0) -> None:
+    def __init__(self, judge: Judge, limits: Limits, out: int = 0, *, requirement: str = _VELOCITY) -> None:
         self._judge = judge
         self._limits = limits
+        self._requirement = requirement
         self._samples: deque[_Sample] = deque()
         self._lapses: deque[float] = deque(maxlen=_LAPSES)
         self._readings: deque[_Reading] = deque()
         self.out = out
+        self.judged = 0
 
     def odometry(self, stamp: float, velocity: Velocity, received: float) -> None:
         """Take a reading of the odometry; ``stamp`` by the robot's clock, s."""
@@ -157,10 +161,11 @@ class BesideOdometry:
             return
         nearest = _between(reading.velocity, [one.velocity for one in all_])
         fits = is_near(self._limits, reading.velocity, nearest, _OUT)
+        self.judged += 1
         self.out += not fits
         if fits or self.out >= _SEVERAL:
             self._judge.check(
-                _VELOCITY,
+                self._requirement,
                 fits,
                 reading.exchange,
                 f"a velocity that the odometry had before or after; the nearest is {nearest}",

@@ -11,11 +11,12 @@ from conformance.robot.agreement import Slack, disagreement, entries_of, unstamp
 from conformance.robot.geometry import Pose, pose_of
 from conformance.robot.goal import await_goal, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals
-from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY
+from conformance.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY, TWIST
 from conformance.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.robot.plan import plan_of, query, reachable
-from conformance.robot.robot import POSE, SENSORS, SERVICES, Robot
+from conformance.robot.robot import POSE, SENSORS, SERVICES, Robot, Velocity
+from conformance.robot.single_readings import BesideOdometry
 from conformance.robot.soap_services import ask, returned
 from conformance.robot.state_over_soap import STATES, answered, compare
 from conformance.soap.service import SoapService
@@ -30,8 +31,11 @@ _SAME: Final = Slack(0.0, 0.0)
 _END_OFF: Final = 0.3
 # Goals that displaced another one, of which each has to be out in the first answer after it.
 _GOALS: Final = 3
-# At standard effort: of a pose that is out once in sixty answers, several are compared.
+# At standard effort: of a state that is out once in sixty answers, one pose is compared, and two velocities, for which
+# at most so many times as many are read.
 _POSES: Final = 200
+_VELOCITIES: Final = 320
+_READ: Final = 4
 # How far ahead a plan in the odometry's frame leads, m.
 _AHEAD: Final = 0.3
 
@@ -43,6 +47,25 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, effort: Effor
     for turn in range(effort.cases(_POSES)):
         for name in STATES if turn < effort.cases(50) else ("pose",):
             compare(robot, subscribers, name)
+
+
+@pytest.mark.phase("resting")
+@pytest.mark.requirement("equivalence/velocity")
+def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """Velocities over SOAP, each beside what the odometry had around it: what is out now and then fails too."""
+    if effort.name == "quick":
+        return  # too few to notice it
+    beside = BesideOdometry(judge, robot.limits, requirement="equivalence/velocity")
+    for _ in range(_READ * effort.cases(_VELOCITIES)):
+        odometry = robot.odometry()
+        exchange = ask(subscribers, "GetVelocity")
+        twist, problem = answered(exchange, TWIST)
+        if odometry is None or problem or TWIST.problem(twist):
+            return  # judged by those who compare all of it
+        beside.odometry(odometry.stamp, odometry.velocity, odometry.received)
+        beside.velocity(Velocity.of(twist), exchange, exchange.response.received_s)
+        if beside.judged == effort.cases(_VELOCITIES):
+            return
 
 
 @pytest.mark.phase("resting")

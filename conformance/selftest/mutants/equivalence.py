@@ -259,6 +259,12 @@ MUTANTS = (
         altered(soap("GetVelocity"), tree(_shift("linear", 0.1))),
     ),
     _soap_state(
+        "same-velocity-sometimes",
+        "One velocity in 60 is over SOAP 0.1 m/s more than that of the odometry.",
+        "velocity",
+        altered(soap("GetVelocity"), tree(_shift("linear", 0.1)), nth=60),
+    ),
+    _soap_state(
         "same-sensors",
         "SOAP lacks the last sensor.",
         "sensors",

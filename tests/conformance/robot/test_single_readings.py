@@ -19,9 +19,10 @@ _TURN_S = 0.02
 class _Run:
     """Odometry and velocity read in turns, each turn a sample of the odometry, unless it has fewer."""
 
-    def __init__(self, sample_s: float = _TURN_S, **declared: object) -> None:
+    def __init__(self, sample_s: float = _TURN_S, *, requirement: str = _ID, **declared: object) -> None:
         self.judge: Judge = Run().judge
-        self.beside = BesideOdometry(self.judge, DeclaredLimits(tolerance_abs=0.02, **declared).resolved())
+        limits = DeclaredLimits(tolerance_abs=0.02, **declared).resolved()
+        self.beside = BesideOdometry(self.judge, limits, requirement=requirement)
         self.sample_s, self.now = sample_s, 100.0
 
     def turns(self, count: int, odometry: Velocity = STILL, velocity: Velocity | None = None) -> None:
@@ -48,6 +49,14 @@ def test_a_reading_that_is_out_again_is_judged_from_the_second_on():
         assert run.refuted == max(0, number - 1)
     run.turns(2)
     assert run.refuted == 3
+
+
+def test_readings_over_soap_are_judged_by_a_requirement_of_their_own():
+    run = _Run(requirement="equivalence/velocity")
+    run.turns(60)
+    run.turns(3, velocity=_FAST)
+    run.turns(2)
+    assert run.judge.refuted() == {"equivalence/velocity": 2}
 
 
 @pytest.mark.parametrize("sample_s", [0.02, 0.05, 0.2])
