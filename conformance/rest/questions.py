@@ -32,11 +32,13 @@ class Question:
         path: target below the base URL.
         accept: media type.
         stranger: tells why an answer cannot be the one to this request; empty where it can.
+        comes_and_goes: whether what is asked for may cease to be there, as a goal that ends.
     """
 
     path: str
     accept: str
     stranger: Callable[[Response], str]
+    comes_and_goes: bool = False
 
     def outgoing(self, api: RestInterface) -> Outgoing:
         """The request."""
@@ -55,6 +57,18 @@ def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Questio
     return [_of_status(item, answer.status) for item, answer in alone if not item.stranger(answer)]
 
 
+def misplaced(api: RestInterface, question: Question, answer: Response) -> str:
+    """Why an answer cannot be the one to this question; empty where it can.
+
+    Also where the robot answers so to whoever asks alone: its state has changed meanwhile, as when a goal ends.
+    """
+    stranger = question.stranger(answer)
+    if not stranger:
+        return ""
+    alone = api.client.send("GET", question.path, headers=(("Accept", question.accept),)).response
+    return "" if question.stranger(alone) and alone.status == answer.status else stranger
+
+
 def rounds(asked: Sequence[Question], clients: int, count: int) -> list[list[Question]]:
     """So many rounds in which the clients ask different things, each of them everything in time."""
     step = max(1, len(asked) // clients)
@@ -63,9 +77,10 @@ def rounds(asked: Sequence[Question], clients: int, count: int) -> list[list[Que
 
 def _of_status(question: Question, status: int) -> Question:
     """The same question, whose answer has this status as well."""
+    usual = {status, HTTPStatus.NOT_FOUND} if question.comes_and_goes else {status}
 
     def stranger(answer: Response) -> str:
-        return question.stranger(answer) or ("" if answer.status == status else f"status {answer.status} for {status}")
+        return question.stranger(answer) or ("" if answer.status in usual else f"status {answer.status} for {status}")
 
     return Question(question.path, question.accept, stranger)
 
@@ -73,7 +88,12 @@ def _of_status(question: Question, status: int) -> Question:
 def _reads(api: RestInterface) -> list[Question]:
     """Each resource in each format."""
     return [
-        Question(call.path, media_type, _shape_of(call, media_type, _names(call.send(api, ("Accept", media_type)))))
+        Question(
+            call.path,
+            media_type,
+            _shape_of(call, media_type, _names(call.send(api, ("Accept", media_type)))),
+            comes_and_goes=call.operation.declared(HTTPStatus.NOT_FOUND) is not None,
+        )
         for call in answered(api)
         for media_type in call.operation.formats
     ]

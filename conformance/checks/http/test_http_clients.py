@@ -6,7 +6,7 @@ import pytest
 
 from conformance.rest import by_hand
 from conformance.rest.interface import RestInterface
-from conformance.rest.questions import Question, questions, rounds
+from conformance.rest.questions import Question, misplaced, questions, rounds
 from conformance.rest.validity import require_valid
 from conformance.robot.delivery import path_of
 from conformance.robot.plan_questions import plan_questions
@@ -48,7 +48,7 @@ def test_answers_do_not_cross(api: RestInterface, judge: Judge, asked: list[Ques
     for question, attempt in zip(itertools.chain(*turns), itertools.chain(*attempts), strict=True):
         if isinstance(attempt, Unanswered) or is_busy(attempt):
             continue  # one that serves few at a time is not blamed
-        stranger = question.stranger(attempt.response)
+        stranger = misplaced(api, question, attempt.response)
         judge.check(
             "http/concurrent-answers",
             not stranger,
@@ -102,7 +102,7 @@ def test_answers_come_in_order(api: RestInterface, rest: HttpClient, judge: Judg
                     _judge_forgotten(api, judge, octets, attempt)
                     return
                 break
-            stranger = question.stranger(attempt.response)
+            stranger = misplaced(api, question, attempt.response)
             judge.check(
                 "http/pipelining",
                 not stranger,
