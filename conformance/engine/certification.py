@@ -69,7 +69,7 @@ def certify(
     remarks = list(notes)
     try:
         with remembered(run):
-            robot.connect()
+            robot.connect(progress)
             reached = robot.reached
             if reached:
                 # Of a robot that is not there, they would only hide that.

@@ -14,6 +14,8 @@ from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
 
 if TYPE_CHECKING:
+    from typing import TextIO
+
     from conformance.robot.interfaces import Interfaces
     from conformance.soap.callable_services import SoapServices
     from conformance.verdict.run import Run
@@ -42,6 +44,7 @@ class RobotUnderTest:
     connection: Connection = field(default_factory=Connection)
     rest: RestInterface | None = None
     _services: SoapServices | None = None
+    _progress: TextIO | None = None
 
     @property
     def soap(self) -> SoapServices:
@@ -60,12 +63,16 @@ class RobotUnderTest:
 
         return Interfaces(self.rest, self.soap)
 
-    def connect(self) -> None:
+    def connect(self, progress: TextIO | None = None) -> None:
         """Look for each interface that has an address; what is not there is put down in ``run.unreachable``.
+
+        Args:
+            progress: where it is told that a request had no answer; None for nowhere.
 
         Raises:
             OSError: the CA file cannot be used.
         """
+        self._progress = progress
         self.connection.listeners.insert(0, Recorder(self.run.judge))
         self._connect_rest()
         self._connect_soap()
@@ -111,6 +118,9 @@ class RobotUnderTest:
                 run.unreachable[name] = str(none)
                 if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS}:
                     return
+                if self._progress is not None:
+                    self._progress.write(f"{name}: {method} {target}: {none}\n")
+                    self._progress.flush()
         if times:
             run.unreachable.pop(name, None)
             run.effort = run.effort.seen(statistics.median(times))

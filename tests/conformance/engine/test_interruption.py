@@ -38,7 +38,7 @@ def test_an_interruption_that_is_swallowed_is_remembered(number, monkeypatch):
 def test_a_run_with_a_swallowed_interruption_ends_as_interrupted(tmp_path, monkeypatch):
     robot = RobotUnderTest(Run())
 
-    def connect() -> None:
+    def connect(_progress) -> None:
         robot.run.interrupted = True
 
     monkeypatch.setattr(robot, "connect", connect)
