@@ -106,10 +106,12 @@ class Standstill:
     def _watch(self) -> _Seen:
         drive = Drive(Robot(self._api))
         while True:
+            # The last look begins when all would have shown, however long the one before it took.
+            last = time.monotonic() > self._until
             moved = self._look(drive)
             if moved is not None:
                 return moved
-            if time.monotonic() > self._until:
+            if last:
                 return _Seen(drive.trace.turns[-1].velocity_exchange, "")
 
     def _look(self, drive: Drive) -> _Seen | None:
