@@ -23,11 +23,11 @@ from reference_robot.names import RosNames
 from reference_robot.simulation.localisation import Localisation
 from reference_robot.simulation.messages import LATCHED, RESULT_TIMEOUT_S, PoseError, plain, pose_of, stamped_pose
 from reference_robot.simulation.planner import PlanError, Planner, Pose
+from reference_robot.simulation.progress import PATIENCE_S, Progress
 from reference_robot.simulation.pursuit import CRUISE, EXACT, Command, Pursuit
 
 _FEEDBACK_PERIOD_S: Final = 0.2
-_PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time; then the goal is aborted
-_PROGRESS_M: Final = 0.05
+_FAILED_TO_MAKE_PROGRESS: Final = 105  # nav2_msgs/FollowPath's code, which Nav2's navigator hands on
 
 
 class _DeferringActionServer(ActionServer):
@@ -52,8 +52,7 @@ class _Drive:
     handle: Any
     pursuit: Pursuit
     began: float
-    nearest: float = float("inf")
-    progressed: float = 0.0
+    progress: Progress
     reported: float = 0.0
     canceling: bool = False
 
@@ -110,8 +109,8 @@ class Navigation:
 
     def _begin(self, handle: Any) -> None:
         displaced, path = self._drive, self._path
-        self._drive = _Drive(handle, Pursuit(path, self._tolerances), began=time.monotonic())
-        self._drive.progressed = self._drive.began
+        now = time.monotonic()
+        self._drive = _Drive(handle, Pursuit(path, self._tolerances), now, Progress(now, self._time_scale))
         if displaced is not None:
             displaced.handle.abort()
             self._action.finish(displaced.handle, NavigateToPose.Result(error_msg="preempted by a newer goal"))
@@ -135,21 +134,19 @@ class Navigation:
             self._end(drive, drive.handle.succeed)
             return
         now = time.monotonic()
-        if command.remaining < drive.nearest - _PROGRESS_M:
-            drive.nearest, drive.progressed = command.remaining, now
-        if (now - drive.progressed) * self._time_scale > _PATIENCE_S:
-            self._end(drive, drive.handle.abort, f"no progress in {_PATIENCE_S:g} s")
+        if drive.progress.is_lacking(command.remaining, now):
+            self._end(drive, drive.handle.abort, _FAILED_TO_MAKE_PROGRESS, f"no progress in {PATIENCE_S:g} s")
             return
         self._command(command.linear, command.angular)
         if now - drive.reported >= _FEEDBACK_PERIOD_S:
             drive.reported = now
             self._tell_progress(drive, pose, command, now)
 
-    def _end(self, drive: _Drive, transition: Callable[[], None], message: str = "") -> None:
+    def _end(self, drive: _Drive, transition: Callable[[], None], error: int = 0, message: str = "") -> None:
         self._drive = None
         self._command(0.0, 0.0)
         transition()
-        self._action.finish(drive.handle, NavigateToPose.Result(error_msg=message))
+        self._action.finish(drive.handle, NavigateToPose.Result(error_code=error, error_msg=message))
         self._tell_current_goal()
 
     def _command(self, linear: float, angular: float) -> None:

@@ -34,7 +34,8 @@ def test_a_robot_that_is_slower_than_another_is_told_from_it(toy, load):
     for _ in range(8):
         run = load(*slow.both(), *against(quick), FAST, "--tolerance 50%")
         result = run.result
-        if result["against"]["verdict"] != "unclear":
+        verdicts = {change(result, interface)["verdict"] for interface in ("rest", "soap")}
+        if "unclear" not in verdicts | {result["against"]["verdict"]}:
             break  # a machine that stands still for seconds leaves some runs in the dark, and not all
     assert run.code == (ExitCode.FAILED if result["valid"] else ExitCode.INCONCLUSIVE), run.out + run.err
     assert result["against"]["verdict"] == "slower"

@@ -14,10 +14,12 @@ from observer import Observer, pose, until
 
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
+from reference_robot.simulation.delivery import Delivery
 from reference_robot.simulation.localisation import Localisation
 from reference_robot.simulation.navigation import Navigation
 from reference_robot.simulation.office import DEPOT, OFFICE, SOURCE
 from reference_robot.simulation.planner import Planner
+from reference_robot.simulation.requests import DeliveryRequests
 
 
 def test_a_goal_is_reached_with_feedback_and_shown_while_it_is_active(robot):
@@ -140,20 +142,33 @@ def test_compute_path_to_pose_plans_or_says_why_not(robot):
     assert "82" in refused.result.error_msg
 
 
-def test_a_goal_without_progress_is_aborted(domain_id):
+def test_a_goal_without_progress_is_aborted_and_fails_one_mission(domain_id):
     names = RosNames()
     with RosRuntime(domain_id) as ros:
         observer = Observer(ros, names)
         node = ros.create_node("navigation")
         planner, localisation = Planner(OFFICE), Localisation(node, names)
         navigation = Navigation(node, names, planner, localisation, time_scale=40.0)  # patience: half a second
+        delivery = Delivery(ros.create_node("delivery", apart=True), DeliveryRequests(ros, names), names)
         stuck = Odometry()  # a base that does not move, whatever it is told
         stuck.pose.pose = pose(*DEPOT).pose
         odometry = node.create_publisher(Odometry, names.topics.odom, 1)
         node.create_timer(0.02, lambda: odometry.publish(stuck))
         ros.start()
-        until(lambda: observer.odometry and observer.navigate.server_is_ready())
+        until(
+            lambda: (
+                observer.odometry and observer.navigate.server_is_ready() and observer.requests.get_subscription_count()
+            )
+        )
         handle = observer.send(pose(*SOURCE))
-        assert observer.end_of(handle) == GoalStatus.STATUS_ABORTED
+        ended = observer.ask(handle.get_result_async)
+        assert (ended.status, ended.result.error_code) == (GoalStatus.STATUS_ABORTED, 105)
+        assert ended.result.error_msg == "no progress in 20 s"
         until(lambda: observer.current_goal is None)
-        assert navigation  # kept while it serves
+        for _ in range(2):
+            observer.request(SOURCE, DEPOT, DEPOT)
+        until(lambda: observer.states == ["failed", "failed"])
+        reasons = [mission["reason"] for mission in observer.missions]
+        assert reasons == ["the navigation gave a leg up: no progress in 20 s"] * 2
+        assert navigation  # kept while they serve
+        assert delivery

@@ -1,0 +1,35 @@
+"""Whether a robot on its way to a goal gets nearer to it."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time
+_NEARER_M: Final = 0.05
+# A step of control comes with each odometry message, 50 a second. What takes longer held the robot's processes up, and
+# a robot that is held up fails at nothing.
+_STEP_S: Final = 0.1
+
+
+class Progress:
+    """What is left of one goal's way, step by step.
+
+    Args:
+        now: s of a clock, when the goal was taken.
+        time_scale: simulated seconds in one of these.
+    """
+
+    def __init__(self, now: float, time_scale: float) -> None:
+        self._time_scale = time_scale
+        self._stepped = now
+        self._nearest = math.inf
+        self._waited_s = 0.0
+
+    def is_lacking(self, remaining: float, now: float) -> bool:
+        """Take a step at which ``remaining`` m are left; whether it has come no nearer for too long."""
+        self._waited_s += min(now - self._stepped, _STEP_S) * self._time_scale
+        self._stepped = now
+        if remaining < self._nearest - _NEARER_M:
+            self._nearest, self._waited_s = remaining, 0.0
+        return self._waited_s > PATIENCE_S
