@@ -33,7 +33,7 @@ def bridge():
 
 
 def test_rosbridge_is_a_third_line_of_the_duel(toy, bridge, load):
-    run = load(*toy().both(), "--rosbridge", bridge("--delay", "0.003"), RUN, "--allow-motion")
+    run = load(*toy().both(), "--rosbridge", bridge("--delay", "0.03"), RUN, "--allow-motion")
     result = run.result
     assert run.code == (ExitCode.PASSED if result["valid"] else ExitCode.INCONCLUSIVE), run.out + run.err
     names = {(entry["operation"], entry["interface"], entry["client"]) for entry in result["series"]}
@@ -42,8 +42,8 @@ def test_rosbridge_is_a_third_line_of_the_duel(toy, bridge, load):
     delivery, pose = run.series("delivery", "rosbridge"), run.series("pose", "rosbridge")
     assert delivery["count"] > 15
     assert delivery["errors"] == pose["errors"] == 0
-    assert delivery["service_ms"]["p50"] >= 3, "an echo takes the bridge 3 ms"
-    assert 3 <= pose["service_ms"]["p50"] <= 40, "there is odometry every 20 ms"
+    assert delivery["service_ms"]["p50"] >= 30, "an echo takes the bridge 30 ms"
+    assert 3 <= pose["service_ms"]["p50"] <= 100, "there is odometry every 50 ms"
     ratio = next(
         entry
         for entry in result["further_interfaces"]

@@ -96,4 +96,5 @@ def test_a_server_that_awaits_an_acknowledgement_in_mid_answer_gets_it_at_once()
             assert client.send("GET", "/").response.body == server.body
             times.append(time.monotonic() - began)
     if hasattr(socket, "TCP_QUICKACK"):
-        assert statistics.median(times) < 0.02  # a delayed acknowledgement takes 0.04 s
+        # A delayed acknowledgement takes 0.04 s, and on a busy machine some take as long without.
+        assert statistics.quantiles(times)[0] < 0.02
