@@ -8,13 +8,15 @@ import pytest
 
 from conformance.rest.interface import RestInterface
 from conformance.robot.drive import Drive
+from conformance.robot.drive_trace import Command
 from conformance.robot.geometry import Pose, middle_of
 from conformance.robot.goal import NEW, await_none, goal_body, put_goal
 from conformance.robot.goals import choose_goals
 from conformance.robot.message_shapes import ODOMETRY
 from conformance.robot.plan import ask, judge_start
-from conformance.robot.robot import POSE, Robot
+from conformance.robot.robot import FARTHEST, POSE, Robot, Velocity
 from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("drive"), pytest.mark.needs("rest"), pytest.mark.motion]
@@ -25,6 +27,7 @@ _REACHED_M: Final = 0.3
 # Twice as far away is a goal, so that one that is given up on the way is not taken for reached, m.
 _AWAY_M: Final = 0.6
 _LOOKED_S: Final = 1.0
+_WATCHDOG: Final = "safety/watchdog"
 _LONGEST_S: Final = {"quick": 12.0}
 _LONGEST_DEFAULT_S: Final = 30.0
 
@@ -37,6 +40,7 @@ _LONGEST_DEFAULT_S: Final = 30.0
     "rest-resources/plan-start",
     "rest-resources/velocity-odometry",
     "rest-resources/pose-motion",
+    _WATCHDOG,
 )
 @pytest.mark.usefixtures("_prepared")
 def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface) -> None:
@@ -45,6 +49,7 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface
     if here is None:
         pytest.skip("the robot's pose cannot be read")
     there, other = choose_goals(robot, _AWAY_M, 2)
+    before = _told_to_turn(robot, api.run.effort)
     # Displaced at once: it is not taken up again when the robot has arrived where it was sent last.
     put_goal(robot, goal_body(other, robot.statement.motion.frame, "displaced"))
     body, exchange = _put(robot, there)
@@ -53,16 +58,54 @@ def test_goal_until_it_is_reached(robot: Robot, judge: Judge, api: RestInterface
         return
     if not _drive_to(robot, judge, there, here, _LONGEST_S.get(api.run.effort.name, _LONGEST_DEFAULT_S)):
         return
+    if before is not None:
+        _judge_turning(robot, judge, before)
     # Away from where it was at first: a plan that always starts there is seen now.
-    before = robot.map_pose()
+    arrived = robot.map_pose()
     _, plan, asked = ask(robot, here)
-    if plan is not None and before is not None:
-        judge_start(robot, plan, before, asked, lambda: ask(robot, here)[1])
+    if plan is not None and arrived is not None:
+        judge_start(robot, plan, arrived, asked, lambda: ask(robot, here)[1])
     again = put_goal(robot, body)
     status = again.response.status
     judge.check("rest-resources/goal-id-again", status in NEW, again, "201 or 202 for a goal whose id has ended before")
     await_none(robot, 0.1)
     robot.delete_goal()
+
+
+def _told_to_turn(robot: Robot, effort: Effort) -> Command | None:
+    """Command a velocity just before the goal; None where that would say nothing, or costs too much time."""
+    limits = robot.limits
+    turning = Velocity(angular_z=0.4 * limits.angular_rad_s)
+    seen_from_rest = limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s
+    if (
+        effort.name == "quick"
+        or limits.hold_s is None
+        or not robot.actuated(5)
+        or turning.angular_z < 4 * seen_from_rest
+    ):
+        return None
+    sent = time.monotonic()
+    exchange = robot.put_velocity(turning)
+    return Command(turning, sent, time.monotonic(), exchange) if exchange.response.ok else None
+
+
+def _judge_turning(robot: Robot, judge: Judge, before: Command) -> None:
+    """Judge that a velocity from before the goal, which has ended on the way, is not taken up again at the goal."""
+    limits = robot.limits
+    if limits.hold_s is None or time.monotonic() < before.answered + 1.5 * limits.hold_s + limits.settle_s:
+        return
+    drive = Drive(robot)
+    drive.keep(limits.settle_s)
+    turns, seen = drive.sees(before.velocity)
+    if turns:  # that it does not is no sign that a velocity ends by itself: the goal has ended this one
+        judge.check(
+            _WATCHDOG,
+            False,
+            drive.trace.turns[-1].velocity_exchange,
+            "a velocity from before the goal to have ended for good",
+            found=f"velocity {seen}",
+            cause="taken up after a goal",
+        )
 
 
 def _put(robot: Robot, there: Pose) -> tuple[dict[str, Any], Exchange]:
