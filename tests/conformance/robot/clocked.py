@@ -123,10 +123,13 @@ class Drive(drive.Drive):
     def _renew(self) -> None:
         self.tell(renewal=True)
 
-    def look(self) -> tuple[Velocity | None, Exchange]:
+    def _glance(self) -> None:
+        self.look(1)
+
+    def look(self, requests: int = 3) -> tuple[Velocity | None, Exchange]:
         """Take a sample, after a while."""
         clock = self.body.clock
-        clock.now += self.looks.get(len(self.trace.turns), max(_LOOK_S, self.look_s))
+        clock.now += self.looks.get(len(self.trace.turns), max(_LOOK_S, requests * self.robot.usual_s))
         seen = self.body.velocity
         odometry = Odometry(clock.now, clock.now, self.body.sampled, Pose(0.0, 0.0, 0.0), seen, _EXCHANGE)
         self.trace = self.trace.looked(Turn(odometry, clock.now, seen, _EXCHANGE, None, _EXCHANGE))

@@ -40,12 +40,19 @@ def test_a_robot_that_what_is_refused_stops_is_refuted_for_that_alone(monkeypatc
     assert _judged(monkeypatch, stops=True).judge.judged == {_RENEWAL: True, _REFUSED: False}
 
 
+@pytest.mark.parametrize("usual_s", [0.05, 0.06, 0.15, 0.3])
 @pytest.mark.parametrize("faults", [{}, {"renews": False}])
-def test_a_robot_whose_answers_are_slow_is_judged_by_what_can_be_read_in_time(monkeypatch, faults):
-    assert _judged(monkeypatch, usual_s=0.05, **faults).judge.judged[_RENEWAL] is not bool(faults)
+def test_a_robot_whose_answers_are_slow_is_judged_by_what_can_be_read_in_time(monkeypatch, usual_s, faults):
+    assert _judged(monkeypatch, usual_s=usual_s, **faults).judge.judged[_RENEWAL] is not bool(faults)
 
 
 def test_one_that_was_renewed_too_late_is_not_blamed(monkeypatch):
     driven = _judged(monkeypatch, looks=dict.fromkeys(range(400), 1.1))
     assert False not in driven.judge.judged.values()
     assert _RENEWAL in driven.judge.skipped
+
+
+def test_who_is_held_up_many_times_tries_again(monkeypatch):
+    driven = _judged(monkeypatch, looks=dict.fromkeys(range(16), 1.1))
+    assert driven.judge.judged[_RENEWAL] is True
+    assert driven.judge.skipped == []
