@@ -33,7 +33,7 @@ def robot_of(listening):
 
 
 def test_two_late_answers_in_eleven_make_no_robot_slow(robot_of):
-    robot = robot_of(0.4, *[0.0] * 4, 0.4, *[0.0] * 5)
+    robot = robot_of(0.2, *[0.0] * 4, 0.2, *[0.0] * 5)
     assert robot.connection.sent == 11
     assert robot.run.effort.speed.name == "local"
 
