@@ -73,12 +73,12 @@ def test_a_long_request_has_longer_and_its_client_knows_what_was_late(listening)
 def test_a_long_answer_has_longer(listening):
     def drip(sock: socket.socket) -> None:
         sock.recv(65536)
-        sock.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: 200000\r\n\r\n")
+        sock.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: 800000\r\n\r\n")
         for _ in range(4):
-            sock.sendall(b"x" * 50_000)
-            time.sleep(0.1)
+            sock.sendall(b"x" * 200_000)
+            time.sleep(0.3)
 
     url = listening(drip)
-    assert len(_client(url, 0.2).send("GET", "/").response.body) == 200_000
-    client = _client(url, 0.2)
-    assert raw.talk(client, raw.head(client, "GET", "/"), answers=1).octets.endswith(b"x" * 50_000)
+    assert len(_client(url, 0.5).send("GET", "/").response.body) == 800_000
+    client = _client(url, 0.5)
+    assert raw.talk(client, raw.head(client, "GET", "/"), answers=1).octets.endswith(b"x" * 200_000)
