@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from typing import TYPE_CHECKING, Any
 
 from conformance.contract.classes import CLASSES
@@ -77,7 +78,7 @@ def write_first_statement(path: Path, known: Statement) -> str:
         OSError: the file cannot be written.
     """
     robot = RobotUnderTest(Run(statement=known), connection_of(known.endpoints))
-    robot.connect()
+    robot.connect(sys.stderr)
     if not robot.reached:
         return "; ".join(f"{name}: {why}" for name, why in robot.run.unreachable.items())
     info = _openapi(robot.rest.client).get("info", {}) if robot.rest else {}

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import statistics
+import threading
 import time
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -14,6 +16,7 @@ from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from typing import TextIO
 
     from conformance.robot.interfaces import Interfaces
@@ -28,6 +31,8 @@ _GRACE_ANSWERS = 10
 _LOOKS = 11
 _FEWEST_LOOKS = 5
 _LOOKING_S = 1.0
+# Who looks on is told what is waited for after so long, s.
+_SILENT_S = 2.0
 
 
 @dataclass
@@ -67,7 +72,7 @@ class RobotUnderTest:
         """Look for each interface that has an address; what is not there is put down in ``run.unreachable``.
 
         Args:
-            progress: where it is told that a request had no answer; None for nowhere.
+            progress: where it is told what is waited for, and that a request had no answer; None for nowhere.
 
         Raises:
             OSError: the CA file cannot be used.
@@ -86,7 +91,8 @@ class RobotUnderTest:
         self.rest = RestInterface(self.run, HttpClient(where.rest, self.connection), self.alive)
         if contract.own:
             self.rest.domain = RobotDomain(self.rest)
-        self._look(Interface.REST, self.rest.client, self.rest.path)
+        with self._told(Interface.REST, where.rest):
+            self._look(Interface.REST, self.rest.client, self.rest.path)
 
     def _connect_soap(self) -> None:
         from conformance.robot.soap_services import known_messages  # noqa: PLC0415 - as above
@@ -99,10 +105,29 @@ class RobotUnderTest:
             (Interface.PUBLISHERS, where.publishers_wsdl, where.publishers_endpoint, contract.publishers_path),
             (Interface.SUBSCRIBERS, where.subscribers_wsdl, where.subscribers_endpoint, contract.subscribers_path),
         ):
-            if wsdl or endpoint:
-                services[name] = open_service(name, wsdl, endpoint, self.connection, path, known_messages)
-                self._look(name, services[name].client, services[name].path)
+            url = wsdl or endpoint
+            if url:
+                with self._told(name, url):
+                    services[name] = open_service(name, wsdl, endpoint, self.connection, path, known_messages)
+                    self._look(name, services[name].client, services[name].path)
         self._services = SoapServices(self.run, services.get(Interface.PUBLISHERS), services.get(Interface.SUBSCRIBERS))
+
+    @contextmanager
+    def _told(self, name: Interface, url: str) -> Iterator[None]:
+        """Look for an interface, and tell what is waited for where that takes long."""
+        waits = f"{name}: waiting for {url}, up to {self.connection.timeout_s:g} s for each answer"
+        later = threading.Timer(_SILENT_S, self._tell, [waits])
+        later.daemon = True
+        later.start()
+        try:
+            yield
+        finally:
+            later.cancel()
+
+    def _tell(self, line: str) -> None:
+        if self._progress is not None:
+            self._progress.write(f"{line}\n")
+            self._progress.flush()
 
     def _look(self, name: Interface, client: HttpClient, path: str) -> None:
         """Put an interface down as unreachable unless it answers something, and see how fast it answers."""
@@ -118,9 +143,7 @@ class RobotUnderTest:
                 run.unreachable[name] = str(none)
                 if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS}:
                     return
-                if self._progress is not None:
-                    self._progress.write(f"{name}: {method} {target}: {none}\n")
-                    self._progress.flush()
+                self._tell(f"{name}: {method} {target}: {none}")
         if times:
             run.unreachable.pop(name, None)
             run.effort = run.effort.seen(statistics.median(times))

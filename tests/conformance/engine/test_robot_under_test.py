@@ -1,5 +1,6 @@
 """How fast a robot answers is seen before anything is judged, and does not hang on one answer."""
 
+import io
 import itertools
 import time
 
@@ -7,6 +8,7 @@ import pytest
 
 from conformance.contract.interfaces import Interface
 from conformance.contract.statement import Endpoints, Statement
+from conformance.engine import robot_under_test
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.transport.client import Connection
 from conformance.verdict.run import Run
@@ -16,7 +18,7 @@ from conformance.verdict.run import Run
 def robot_of(listening):
     """A robot whose answers take so many seconds, each in its turn, on one connection."""
 
-    def make(*delays):
+    def make(*delays, progress=None):
         turns = itertools.cycle(delays)
 
         def answer(sock):
@@ -26,7 +28,7 @@ def robot_of(listening):
 
         statement = Statement(endpoints=Endpoints(rest=listening(answer)))
         robot = RobotUnderTest(Run(statement=statement), Connection(timeout_s=1.0))
-        robot.connect()
+        robot.connect(progress)
         return robot
 
     return make
@@ -50,3 +52,12 @@ def test_an_interface_that_hangs_is_put_down(robot_of):
     robot = robot_of(5.0)
     assert "no answer" in robot.run.unreachable[Interface.REST]
     assert not robot.reached
+
+
+@pytest.mark.parametrize(("takes_s", "told"), [(0.3, 1), (0.0, 0)])
+def test_who_waits_long_is_told_for_what(robot_of, monkeypatch, takes_s, told):
+    monkeypatch.setattr(robot_under_test, "_SILENT_S", 1.0)
+    progress = io.StringIO()
+    robot = robot_of(takes_s, progress=progress)
+    waits = f"rest: waiting for {robot.run.statement.endpoints.rest}, up to 1 s for each answer\n"
+    assert progress.getvalue() == told * waits
