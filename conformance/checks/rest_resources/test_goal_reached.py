@@ -97,7 +97,9 @@ def _judge_turning(robot: Robot, judge: Judge, before: Command) -> None:
     drive = Drive(robot)
     drive.keep(limits.settle_s)
     turns, seen = drive.sees(before.velocity)
-    if turns:  # that it does not is no sign that a velocity ends by itself: the goal has ended this one
+    # That it does not is no sign that a velocity ends by itself, for the goal has ended this one; and a robot that has
+    # a goal of its own may turn for that.
+    if turns and robot.goal()[0] is None:
         judge.check(
             _WATCHDOG,
             False,
