@@ -124,12 +124,16 @@ class Drive(drive.Drive):
         self.tell(renewal=True)
 
     def _glance(self) -> None:
-        self.look(1)
+        clock = self.body.clock
+        at = clock.now
+        clock.now += max(_LOOK_S, self.robot.usual_s)
+        # No stamp tells whether it is another sample than the one before.
+        self.trace = self.trace.looked(Turn(None, at, self.body.velocity, _EXCHANGE, None, _EXCHANGE))
 
-    def look(self, requests: int = 3) -> tuple[Velocity | None, Exchange]:
+    def look(self) -> tuple[Velocity | None, Exchange]:
         """Take a sample, after a while."""
         clock = self.body.clock
-        clock.now += self.looks.get(len(self.trace.turns), max(_LOOK_S, requests * self.robot.usual_s))
+        clock.now += self.looks.get(len(self.trace.turns), max(_LOOK_S, self.look_s))
         seen = self.body.velocity
         odometry = Odometry(clock.now, clock.now, self.body.sampled, Pose(0.0, 0.0, 0.0), seen, _EXCHANGE)
         self.trace = self.trace.looked(Turn(odometry, clock.now, seen, _EXCHANGE, None, _EXCHANGE))

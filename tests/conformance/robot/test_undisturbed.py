@@ -40,7 +40,7 @@ def test_a_robot_that_what_is_refused_stops_is_refuted_for_that_alone(monkeypatc
     assert _judged(monkeypatch, stops=True).judge.judged == {_RENEWAL: True, _REFUSED: False}
 
 
-@pytest.mark.parametrize("usual_s", [0.05, 0.06, 0.15, 0.3])
+@pytest.mark.parametrize("usual_s", [0.05, 0.1, 0.15, 0.3])
 @pytest.mark.parametrize("faults", [{}, {"renews": False}])
 def test_a_robot_whose_answers_are_slow_is_judged_by_what_can_be_read_in_time(monkeypatch, usual_s, faults):
     assert _judged(monkeypatch, usual_s=usual_s, **faults).judge.judged[_RENEWAL] is not bool(faults)
