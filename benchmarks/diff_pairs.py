@@ -25,11 +25,11 @@ from pathlib import Path
 from click.testing import CliRunner
 
 from conformance.contract.classes import CLASSES
+from conformance.mutation.messages import unchanged
+from conformance.mutation.mutant import Mutant
+from conformance.packs.table1.mutants import MUTANTS
 from conformance.selftest.certifying import run_job
-from conformance.selftest.messages import unchanged
 from conformance.selftest.mutant_run import RobotPool, job_for
-from conformance.selftest.mutants import MUTANTS
-from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import Robot
 from reports.cli.difference import diff

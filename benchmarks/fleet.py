@@ -24,7 +24,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from conformance.selftest.mutants import MUTANTS
+from conformance.packs.table1.mutants import MUTANTS
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import INDEPENDENT_ROBOTS, ON_SERVERS, REFERENCE, Robot, running, statement_of
 from conformance.selftest.servers.programs import NotInstalledError

@@ -2,7 +2,7 @@
 
 ``python benchmarks/inside.py`` certifies the independent robot ``baroque`` with each of its faulty bodies, and once
 without a fault, and prints a line for each and how many were caught; ``python benchmarks/inside.py 'goal-*'`` takes
-some. No ROS is needed. ``python -m conformance.selftest.independent_robots baroque --fault deadband`` starts one to
+some. No ROS is needed. ``python -m conformance.packs.table1.independent_robots baroque --fault deadband`` starts one to
 look at. The exit code is 1 when the robot without a fault is not found conformant, or no fault has such a name.
 """
 
@@ -11,10 +11,10 @@ import signal
 import sys
 from fnmatch import fnmatch
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
+from conformance.packs.table1.faulty_bodies import FAULTY_BODIES
 from conformance.selftest.at_once import each_at_once
 from conformance.selftest.certifying import Job, Outcome, run_job
-from conformance.selftest.faulty_bodies import FAULTY_BODIES
 from conformance.selftest.robots import running, statement_of
 from conformance.verdict.effort import EFFORTS
 

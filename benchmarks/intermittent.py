@@ -16,22 +16,11 @@ from fnmatch import fnmatch
 from typing import Any
 
 from conformance.contract.classes import Level
-from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import load_ledger
-from conformance.selftest.at_once import each_at_once
-from conformance.selftest.certifying import Outcome, run_job
-from conformance.selftest.messages import Forward, Request, Response
-from conformance.selftest.mutant_run import RobotPool, job_for
-from conformance.selftest.mutants.changes import (
-    GOAL,
-    PLAN,
-    POSE,
-    SENSORS,
-    VELOCITY,
+from conformance.mutation.changes import (
     Make,
     Where,
     altered,
-    deliveries,
     hanging_up,
     instead,
     page,
@@ -43,6 +32,12 @@ from conformance.selftest.mutants.changes import (
     text,
     values,
 )
+from conformance.mutation.messages import Forward, Request, Response
+from conformance.packs.table1.files import CONTRACT_DIR
+from conformance.packs.table1.mutants.paths import GOAL, PLAN, POSE, SENSORS, VELOCITY, deliveries
+from conformance.selftest.at_once import each_at_once
+from conformance.selftest.certifying import Outcome, run_job
+from conformance.selftest.mutant_run import RobotPool, job_for
 from conformance.selftest.robots import REFERENCE
 from conformance.verdict.effort import EFFORTS
 

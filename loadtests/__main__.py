@@ -13,7 +13,7 @@ import sys
 import traceback
 from pathlib import Path
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 
 
 def main() -> int:

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conformance.contract.command import CommandResult, ResultCommand
-from conformance.contract.exit_codes import ExitCode
-from conformance.contract.statement import Endpoints, Statement, load_statement
-from conformance.contract.thresholds import load_thresholds
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.contract.toml_file import TomlFileError
+from conformance.packs.table1.statement import Statement, load_robot_statement
+from conformance.packs.table1.thresholds import load_thresholds
+from conformance.statement.statement import Endpoints
 from loadtests.measuring.command_line import without_folders
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
@@ -98,7 +99,7 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     where = given.pop("against")
     described = {name: given.pop(f"against_{name}") for name in _DESCRIPTIONS}
     if where is not None and "://" not in where:
-        return load_statement(Path(where))
+        return load_robot_statement(Path(where))
     if where is None and not any(described.values()):
         return None
     shared = {name: given[name] or getattr(own.endpoints, name) for name in ("token_file", "ca_file", "timeout_s")}
@@ -188,7 +189,7 @@ def load(statement: Path | None, **options: Any) -> CommandResult:
     or it cannot be told; 130 interrupted.
     """
     try:
-        said = load_statement(statement) if statement is not None else Statement()
+        said = load_robot_statement(statement) if statement is not None else Statement()
         kept = _Baselines.of(options.pop("baselines"), options.pop("save"), options.pop("baseline"))
         limits = load_thresholds(options.pop("thresholds")) if options["thresholds"] else ()
         options.pop("thresholds", None)

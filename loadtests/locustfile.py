@@ -13,7 +13,7 @@ import locust.stats
 from locust import User, constant_throughput, events, tag, task
 from locust.exception import StopTest
 
-from conformance.contract.statement import Statement
+from conformance.packs.table1.statement import Statement
 from loadtests.clients.callers import Caller, Workload
 from loadtests.clients.endpoint import EndpointError
 from loadtests.clients.failures import CallError

@@ -7,7 +7,7 @@ from typing import Final
 
 import click
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 from reference_robot.ros_arguments import RosCommand
 
 _HIGHEST_DOMAIN_ID: Final = 101

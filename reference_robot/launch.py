@@ -17,7 +17,7 @@ from typing import Final
 import click
 from rclpy.logging import get_logging_directory
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.toml_file import TomlFileError
 from reference_robot.ending import Ending
 from reference_robot.ros import RosArgumentsError, RosRuntime

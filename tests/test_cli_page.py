@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 import pytest
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 from roaas import main
 
 _PAGE = (Path(__file__).parents[1] / "docs" / "cli.md").read_text(encoding="utf-8")

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 import roaas
-from conformance.contract.command import CommandResult, ResultCommand
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult, ResultCommand
 from reports import rendering
 
 

@@ -14,13 +14,12 @@ import msgspec
 from click.core import ParameterSource
 
 from conformance.cli.summary import print_summary
-from conformance.contract.classes import CLASSES, PROFILES
-from conformance.contract.command import CommandResult, FrontDoor, ResultCommand
-from conformance.contract.exit_codes import ExitCode
-from conformance.contract.files import CONTRACT_DIR, Contract, ContractError
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
+from conformance.contract.pack import DEFAULT_PACK, Contract, ContractError
 from conformance.contract.places import places
-from conformance.contract.requirement_sets import RequirementSetError, judged_by, names
-from conformance.contract.statement import Statement, StatementError, load_statement
+from conformance.contract.requirement_sets import RequirementSetError, judged_by
+from conformance.statement.statement import Statement, StatementError, empty_statement, load_statement
 from conformance.verdict.effort import EFFORTS, Effort
 
 if TYPE_CHECKING:
@@ -43,21 +42,18 @@ _OBJECTS = 20_000
 @click.option("--subscribers-wsdl", metavar="URL", help="WSDL of the subscribers service, URL or file.")
 @click.option("--publishers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say so.")
 @click.option("--subscribers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say so.")
-@click.option("--profile", type=click.Choice([str(name) for name in PROFILES]), help="Claim the classes of a profile.")
+@click.option("--profile", metavar="NAME", help="Claim the classes of a profile of the contract, such as full.")
+@click.option("--class", "classes", multiple=True, metavar="NAME", help="Claim a conformance class; repeatable.")
 @click.option(
-    "--class",
-    "classes",
-    multiple=True,
-    type=click.Choice([str(name) for name in CLASSES]),
-    metavar="NAME",
-    help="Claim a class; repeatable.",
-)
-@click.option(
-    "--contract", type=click.Path(path_type=Path), default=CONTRACT_DIR, help="Judge by the contract in this folder."
+    "--contract",
+    "pack",
+    metavar="PACK",
+    default=DEFAULT_PACK,
+    show_default=True,
+    help="Judge by this contract pack: its name, or its folder.",
 )
 @click.option(
     "--requirements",
-    type=click.Choice(names()),
     metavar="SET",
     help="Score by this frozen set of requirements; what is newer is shown.  [default: all]",
 )
@@ -124,15 +120,17 @@ def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> Comma
     if options["parallel"] is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
     try:
-        declared = load_statement(statement) if statement and not options["init"] else Statement()
-        chosen = _apply(declared, options)
+        contract = Contract.load(options["pack"])
+        known = statement and not options["init"]
+        declared = load_statement(statement, contract) if statement and known else empty_statement(contract)
+        chosen = _apply(declared, options, contract)
         if options["init"]:
-            return _init(statement, chosen, force=options["force"])
+            return _init(statement, chosen, contract, force=options["force"])
         if options["nonce"] is not None:
             _check_nonce(options["nonce"])
         # Before the run: what cannot be signed by this key is told at once.
         notary = door.notary(Path(options["key"])) if options["key"] else None
-        outcome = _certify(chosen, options, statement)
+        outcome = _certify(chosen, options, contract, statement)
     except (StatementError, ContractError) as error:
         raise click.UsageError(str(error)) from error
     except KeyboardInterrupt:
@@ -144,8 +142,12 @@ def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> Comma
     return CommandResult(outcome.exit_code, outcome.path, notary)
 
 
-def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
-    """Options win over the statement."""
+def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> Statement:
+    """Return the statement with the options applied, which win over it.
+
+    Raises:
+        StatementError: an option has a value that it cannot have.
+    """
     given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options[key] is not None}
     where = msgspec.structs.replace(declared.endpoints, **given)
     for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
@@ -156,21 +158,36 @@ def _apply(declared: Statement, options: dict[str, Any]) -> Statement:
         raise StatementError("no robot is named: give a STATEMENT, --rest, --publishers-wsdl or --subscribers-wsdl")
     claims = declared.claims
     if options["profile"] or options["classes"]:
-        claims = (*PROFILES.get(options["profile"] or "", ()), *options["classes"])
-    ros = declared.ros
+        claims = _claims(options, contract)
     if options["ros_domain_id"] is not None:
-        ros = msgspec.structs.replace(ros, domain_id=options["ros_domain_id"])
-    return msgspec.structs.replace(declared, endpoints=where, claims=claims, ros=ros)
+        declared = declared.on_domain(options["ros_domain_id"])
+    return msgspec.structs.replace(declared, endpoints=where, claims=claims)
 
 
-def _init(path: Path | None, chosen: Statement, *, force: bool) -> CommandResult:
+def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
+    """Return the classes that are claimed by options.
+
+    Raises:
+        StatementError: the contract has no such profile or class.
+    """
+    for option, names, known in (
+        ("--profile", filter(None, [options["profile"]]), contract.profiles),
+        ("--class", options["classes"], contract.classes),
+    ):
+        for name in names:
+            if name not in known:
+                raise StatementError(f"{option} {name!r}: {contract.name} has {', '.join(known)}")
+    return (*contract.profiles.get(options["profile"] or "", ()), *options["classes"])
+
+
+def _init(path: Path | None, chosen: Statement, contract: Contract, *, force: bool) -> CommandResult:
     from conformance.engine.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
 
     if path is None:
         raise click.UsageError("--init writes a statement: name the file, as in `roaas certify --init robot.toml`")
     if path.exists() and not force:
         raise click.UsageError(f"{path} exists already; --force overwrites it")
-    problem = write_first_statement(path, chosen)
+    problem = write_first_statement(path, chosen, contract)
     if problem:
         click.echo(f"the robot cannot be reached: {problem}", err=True)
         return CommandResult(ExitCode.UNREACHABLE)
@@ -185,7 +202,7 @@ def _check_nonce(nonce: str) -> None:
         raise click.UsageError("--seed follows from --nonce: give one of the two")
 
 
-def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None) -> Certification:
+def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, statement: Path | None) -> Certification:
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
     from conformance.engine.certification import certify as judge  # noqa: PLC0415
     from conformance.engine.pytest_run import connection_of  # noqa: PLC0415
@@ -197,7 +214,6 @@ def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None)
     # A run makes many objects that live for a moment, and few that are garbage in circles: looking for those less often
     # than every 700 objects saves a twentieth of its processor time.
     gc.set_threshold(_OBJECTS)
-    contract = Contract.load(options["contract"])
     try:
         connection = connection_of(chosen.endpoints)
         if chosen.endpoints.ca_file:
@@ -222,7 +238,7 @@ def _certify(chosen: Statement, options: dict[str, Any], statement: Path | None)
         effort=Effort(options["effort"], minutes=options["minutes"]),
     )
     known = {item.class_ for item in contract.ledger.values()}
-    run.claims = tuple(name for name in chosen.claimed(run.interfaces) if name in known)
+    run.claims = tuple(name for name in chosen.claimed(contract) if name in known)
     notes = _notes(run)
     command = shlex.join(["roaas", *sys.argv[1:]])
     return judge(RobotUnderTest(run, connection), options["out"], command=command, baseline=baseline, notes=notes)
@@ -234,7 +250,7 @@ def _notes(run: Run) -> tuple[str, ...]:
         notes.append(f"No classes were claimed; judged are those that have an address: {', '.join(run.claims)}.")
     notes += [
         f"Class {name} is not claimed: the robot's {' and '.join(missing)} interface has no address."
-        for name, missing in run.statement.lacking(run.interfaces).items()
+        for name, missing in run.statement.lacking(run.contract).items()
     ]
     if not run.allow_motion:
         notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from conformance.contract.command import CommandResult
-from conformance.contract.terminal import inert
+from conformance.commandline.result_command import CommandResult
+from conformance.commandline.terminal import inert
+from conformance.contract.pack import Contract, ContractError
 from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, refuse_same_identity
 from conformance.fleet.member_run import Outcome
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 PARALLEL = 4
 # Options that hold for each robot of a fleet; what else there is belongs to one robot, and into the file.
 _FOR_ALL = (
-    "profile", "classes", "contract", "requirements", "effort", "minutes", "seed", "nonce", "timeout_s", "request_rate",
+    "profile", "classes", "pack", "requirements", "effort", "minutes", "seed", "nonce", "timeout_s", "request_rate",
     "key",
 )  # fmt: skip
 _OWN = ("fleet", "parallel", "out", "allow_motion")
@@ -41,10 +42,10 @@ def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
 
     shared = _shared()
     try:
-        members = load_fleet(path)
+        members = load_fleet(path, Contract.load(options["pack"]))
         if options["key"]:
             refuse_same_identity(path, members)
-    except FleetError as error:
+    except (FleetError, ContractError) as error:
         raise click.UsageError(str(error)) from error
     limit_s = TIME_LIMIT_S + (options["minutes"] * 60 if options["effort"] == "deep" else 0)
     runs = [

@@ -9,10 +9,31 @@ from typing import Any
 
 import click
 
-from conformance.contract.classes import CLASSES, Level
-from conformance.contract.exit_codes import ExitCode
-from conformance.contract.files import CONTRACT_DIR, CONTRACT_FILES, CONTRACT_VERSION
-from conformance.contract.ledger import Requirement, load_ledger
+from conformance.commandline.exit_codes import ExitCode
+from conformance.contract.classes import Level
+from conformance.contract.ledger import Requirement
+from conformance.contract.pack import DEFAULT_PACK, Contract, ContractError
+
+_CONTRACT = click.option(
+    "--contract",
+    "pack",
+    metavar="PACK",
+    default=DEFAULT_PACK,
+    show_default=True,
+    help="The contract pack: its name, or its folder.",
+)
+
+
+def _loaded(pack: str) -> Contract:
+    """Return a pack.
+
+    Raises:
+        click.UsageError: it cannot be used.
+    """
+    try:
+        return Contract.load(pack)
+    except ContractError as error:
+        raise click.UsageError(str(error)) from error
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -21,24 +42,22 @@ def contract() -> None:
 
 
 @contract.command(name="list")
-@click.option(
-    "--class", "class_", type=click.Choice([str(name) for name in CLASSES]), help="Only those of one conformance class."
-)
+@_CONTRACT
+@click.option("--class", "class_", metavar="NAME", help="Only those of one conformance class.")
 @click.option("--level", type=click.Choice([str(level) for level in Level]), help="Only those of one level.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, for other programs.")
-def list_(class_: str | None, level: str | None, *, as_json: bool) -> None:
+def list_(pack: str, class_: str | None, level: str | None, *, as_json: bool) -> None:
     """List the requirements: id, level, text, source and origin."""
-    found = [
-        item
-        for item in load_ledger(CONTRACT_DIR / "requirements.toml").values()
-        if class_ in {None, item.class_} and level in {None, item.level}
-    ]
+    contract = _loaded(pack)
+    if class_ not in {None, *contract.classes}:
+        raise click.UsageError(f"--class {class_!r}: {contract.name} has {', '.join(contract.classes)}")
+    found = [item for item in contract.ledger.values() if class_ in {None, item.class_} and level in {None, item.level}]
     if as_json:
         click.echo(json.dumps([_as_json(item) for item in found], indent=2))
         return
     for item in found:
         click.echo(f"{item.id}\n    {item.level}: {item.text} [{item.origin}: {item.source}]")
-    click.echo(f"{len(found)} requirements of contract {CONTRACT_VERSION}", err=True)
+    click.echo(f"{len(found)} requirements of contract {contract.label}", err=True)
 
 
 def _as_json(requirement: Requirement) -> dict[str, Any]:
@@ -49,19 +68,21 @@ def _as_json(requirement: Requirement) -> dict[str, Any]:
 
 @contract.command()
 @click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
+@_CONTRACT
 @click.option("--force", is_flag=True, help="Overwrite files that are there.")
-def export(directory: Path, *, force: bool) -> None:
+def export(directory: Path, pack: str, *, force: bool) -> None:
     """Write the contract's files to DIR: its text, OpenAPI, WSDLs and XSDs, WADL and the ledger."""
-    there = [name for name in CONTRACT_FILES if (directory / name).exists()]
+    contract = _loaded(pack)
+    there = [path.name for path in contract.files if (directory / path.name).exists()]
     if there and not force:
         raise click.UsageError(f"{directory / there[0]} exists already; --force overwrites it")
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        for name in CONTRACT_FILES:
-            shutil.copyfile(CONTRACT_DIR / name, directory / name)
+        for path in contract.files:
+            shutil.copyfile(path, directory / path.name)
     except OSError as error:
         raise click.UsageError(f"the contract cannot be written to {directory}: {error}") from error
-    click.echo(f"wrote {len(CONTRACT_FILES)} files of contract {CONTRACT_VERSION} to {directory}")
+    click.echo(f"wrote {len(contract.files)} files of contract {contract.label} to {directory}")
 
 
 @contract.command()

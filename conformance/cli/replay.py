@@ -8,10 +8,10 @@ from typing import Any
 
 import click
 
-from conformance.contract.command import CommandResult, ResultCommand
-from conformance.contract.exit_codes import ExitCode
-from conformance.contract.files import CONTRACT_VERSION
-from conformance.contract.terminal import inert
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult, ResultCommand
+from conformance.commandline.terminal import inert
+from conformance.contract.pack import DEFAULT_PACK, Contract, ContractError
 
 _FORMAT = "roaas-result/1"
 _TIMEOUT_S = 10.0
@@ -27,6 +27,9 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
     "statement_file",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="The robot's statement: let the requirements' own checks judge again, in place of sending what was recorded.",
+)
+@click.option(
+    "--contract", "pack", metavar="PACK", help="The contract pack, where the result's is in a folder of your own."
 )
 @click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="Holds the bearer token to send.")
 @click.option(
@@ -50,6 +53,7 @@ def replay(
     *,
     allow_motion: bool,
     statement_file: Path | None,
+    pack: str | None,
     token_file: str | None,
     trusted: tuple[str, ...],
     ca_file: str | None,
@@ -79,14 +83,17 @@ def replay(
             raise click.UsageError(f"{result} has no finding" + (f" of {requirement}" if requirement else ""))
         if statement_file:
             given = {"token_file": token_file, "ca_file": ca_file, "timeout_s": timeout_s}
-            return _judge_again(document, statement_file, given, {id_ for id_, _ in chosen}, allow_motion=allow_motion)
+            requirements = {id_ for id_, _ in chosen}
+            contract = _contract_of(document, pack)
+            return _judge_again(document, contract, statement_file, given, requirements, allow_motion=allow_motion)
         if not allow_motion and any(moves(failure) for _, failure in chosen):
             raise click.UsageError("these requests may move the robot: add --allow-motion, or name one that only reads")
         if token:
             _check_addresses([failure for _, failure in chosen], trusted)
         # The contract at hand judges what was judged by it.
-        rest = document["target"].get("rest") if _by_contract(document) else None
-        replayed = [send_again(id_, failure, connection, rest) for id_, failure in chosen]
+        contract = _contract_of(document, pack)
+        rest = document["target"].get("rest") if contract else None
+        replayed = [send_again(id_, failure, connection, rest, contract) for id_, failure in chosen]
     except (KeyError, TypeError, ValueError) as error:
         raise click.UsageError(f"{result} is no well-made {_FORMAT}: {error!r}") from error
     for one in replayed:
@@ -109,26 +116,34 @@ def replay(
 
 
 def _judge_again(
-    document: dict[str, Any], statement_file: Path, given: dict[str, Any], requirements: set[str], *, allow_motion: bool
+    document: dict[str, Any],
+    contract: Contract | None,
+    statement_file: Path,
+    given: dict[str, Any],
+    requirements: set[str],
+    *,
+    allow_motion: bool,
 ) -> CommandResult:
     import msgspec  # noqa: PLC0415 - as above
 
-    from conformance.contract.files import ContractError  # noqa: PLC0415 - as above
-    from conformance.contract.statement import StatementError, load_statement  # noqa: PLC0415
     from conformance.engine.judged_again import judged_by_checks  # noqa: PLC0415
+    from conformance.statement.statement import StatementError, load_statement  # noqa: PLC0415
 
-    if not _by_contract(document):
-        raise click.UsageError(
-            "the result is by a contract of its own: its checks judge with `roaas certify --contract`"
-        )
+    if contract is None:
+        raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
     try:
-        statement = load_statement(statement_file)
+        statement = load_statement(statement_file, contract)
         options = {name: value for name, value in given.items() if value is not None}
         statement = msgspec.structs.replace(
             statement, endpoints=msgspec.structs.replace(statement.endpoints, **options)
         )
         judged = judged_by_checks(
-            statement, requirements, allow_motion=allow_motion, seed=document["seed"], effort=document["effort"]
+            contract,
+            statement,
+            requirements,
+            allow_motion=allow_motion,
+            seed=document["seed"],
+            effort=document["effort"],
         )
     except (StatementError, ContractError, OSError) as error:
         raise click.UsageError(str(error)) from error
@@ -158,9 +173,20 @@ def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -
         )
 
 
-def _by_contract(document: dict[str, Any]) -> bool:
-    """Whether the contract that is part of the suite judged, in its present version."""
-    return bool(document["suite"]["contract"] == CONTRACT_VERSION)
+def _contract_of(document: dict[str, Any], pack: str | None) -> Contract | None:
+    """Return the contract that judged, in its present version; None where it is not at hand.
+
+    Raises:
+        click.UsageError: the pack that was named cannot be used.
+    """
+    named = pack or str(document.get("pack", {}).get("name", DEFAULT_PACK))
+    try:
+        contract = Contract.load(named)
+    except ContractError as error:
+        if pack:
+            raise click.UsageError(str(error)) from error
+        return None
+    return contract if document["suite"]["contract"] == contract.label else None
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from conformance.mutation.mutant import Mutant
     from conformance.selftest.comparison import SchemathesisResult
     from conformance.selftest.controls import Case, ControlResult
     from conformance.selftest.mutant_run import MutantResult
-    from conformance.selftest.mutants.mutant import Mutant
     from conformance.selftest.report import Report
 
 # A dozen and some different ones, for a check in less than a minute; the longest first.
@@ -97,7 +97,7 @@ def selftest(context: click.Context, /, **options: Any) -> None:
     1 otherwise; 2 usage; 3 a robot does not start; 130 interrupted.
     """
     # lxml and the like cost what --help need not pay.
-    from conformance.selftest.mutants import MUTANTS  # noqa: PLC0415
+    from conformance.packs.table1.mutants import MUTANTS  # noqa: PLC0415
     from conformance.selftest.report import Report  # noqa: PLC0415
 
     if options["generated"]:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conformance.contract.exit_codes import ExitCode
-from conformance.contract.terminal import inert
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.terminal import inert
 
 if TYPE_CHECKING:
     from conformance.engine.certification import Certification

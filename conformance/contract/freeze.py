@@ -1,20 +1,21 @@
-"""``python -m conformance.contract.freeze NAME``: freeze the ledger as a set, at the end of a release."""
+"""``python -m conformance.contract.freeze NAME [PACK]``: freeze a pack's ledger as a set, at the end of a release."""
 
 import sys
 
-from conformance.contract.files import Contract
-from conformance.contract.requirement_sets import SET_DIR, frozen
+from conformance.contract.pack import DEFAULT_PACK, Contract
+from conformance.contract.requirement_sets import frozen, set_folder
 
 
-def freeze(name: str) -> None:
-    """Write ``sets/NAME.toml`` from the ledger."""
+def freeze(name: str, pack: str = DEFAULT_PACK) -> None:
+    """Write ``sets/NAME.toml`` of a pack from its ledger."""
+    contract = Contract.load(pack)
     lines = [f"# The requirements of set {name}: level, and SHA-256 of the text. Frozen: written once, by freeze.py."]
-    for id_, requirement in sorted(Contract.load().ledger.items()):
+    for id_, requirement in sorted(contract.ledger.items()):
         item = frozen(requirement)
         lines.append(f'requirements."{id_}" = {{ level = "{item.level}", text = "{item.text}" }}')
-    SET_DIR.mkdir(exist_ok=True)
-    (SET_DIR / f"{name}.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    set_folder(contract).mkdir(exist_ok=True)
+    (set_folder(contract) / f"{name}.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    freeze(sys.argv[1])
+    freeze(*sys.argv[1:])

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from conformance.contract.classes import CLASSES, ConformanceClass, Level, Origin, Prerequisite
+from conformance.contract.classes import Level, Origin, Prerequisite
 from conformance.contract.toml_file import Text, TomlFileError, fit, read_tables
 
 if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable
     from pathlib import Path
 
 
@@ -31,18 +32,16 @@ class Requirement:
             WS-I id; several are separated by "; ", and the first one is what binds.
         origin: what kind of text that is.
         needs: what a run must have to judge it beside the interface.
-        own: whether it speaks of RoAAS's own resources.
         untestable: why no check can judge it, or None.
     """
 
     id: str
-    class_: ConformanceClass
+    class_: str
     level: Level
     text: str
     source: str
     origin: Origin
     needs: tuple[Prerequisite, ...] = ()
-    own: bool = False
     untestable: str | None = None
 
 
@@ -54,24 +53,37 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     source: Text
     origin: Origin
     needs: tuple[Prerequisite, ...] = ()
-    own: bool = False
     untestable: Text | None = None
 
 
-def load_ledger(path: Path) -> dict[str, Requirement]:
+def expanded(ids: Iterable[str], ledger: Iterable[str]) -> tuple[str, ...]:
+    """Return ids with each pattern ``*/NAME`` replaced by the requirement of that name of every class."""
+    there = tuple(ledger)
+    return tuple(
+        id_
+        for one in ids
+        for id_ in ([id_ for id_ in there if id_.endswith(one[1:])] if one.startswith("*/") else [one])
+    )
+
+
+def load_ledger(path: Path, classes: Collection[str]) -> dict[str, Requirement]:
     """Read a ``requirements.toml``.
+
+    Args:
+        path: of the file.
+        classes: names of the conformance classes that its requirements may be in.
 
     Raises:
         LedgerError: the file cannot be read, or a requirement in it is not well made.
     """
     ledger: dict[str, Requirement] = {}
     for class_, requirements in read_tables(path, LedgerError).items():
-        if class_ not in CLASSES:
-            raise LedgerError(f"{path}: {class_!r} is no conformance class; there are {', '.join(CLASSES)}")
+        if class_ not in classes:
+            raise LedgerError(f"{path}: {class_!r} is no conformance class; there are {', '.join(classes)}")
         if not isinstance(requirements, dict):
             raise LedgerError(f"{path}: {class_} = {requirements!r} must be tables: [{class_}.NAME]")
         for name, table in requirements.items():
             id_ = f"{class_}/{name}"
             entry = fit(table, _Entry, f"{path}: {id_}", LedgerError)
-            ledger[id_] = Requirement(id_, ConformanceClass(class_), **msgspec.structs.asdict(entry))
+            ledger[id_] = Requirement(id_, class_, **msgspec.structs.asdict(entry))
     return ledger

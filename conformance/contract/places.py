@@ -9,16 +9,15 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.files import CONTRACT_DIR
+from conformance.contract.pack import GENERIC_RULES, LEDGER
 
 if TYPE_CHECKING:
-    from conformance.contract.files import Contract
+    from conformance.contract.pack import Contract
 
 _TABLE = re.compile(r'^\s*\[\s*"?([\w-]+)"?\s*\.\s*"?([\w-]+)"?\s*\]', re.MULTILINE)
 _CLAIMS = re.compile(r"^\s*\[\s*claims\s*\]", re.MULTILINE)
 _NEXT_TABLE = re.compile(r"^\s*\[[\w\s\"'.-]+\]\s*(?:#.*)?$", re.MULTILINE)
 _NAME = re.compile(r"[\"']([\w-]+)[\"']")
-_LEDGER = "requirements.toml"
 
 
 def places(contract: Contract, statement: Path | None) -> dict[str, Any]:
@@ -26,13 +25,17 @@ def places(contract: Contract, statement: Path | None) -> dict[str, Any]:
 
     Lines count from 1, and files are named from the working directory where they lie below it.
     """
-    own = contract.directory / _LEDGER
-    ledger = own if own.is_file() else CONTRACT_DIR / _LEDGER
-    lines = {id_: line for id_, line in _ledger_lines(_text(ledger)).items() if id_ in contract.ledger}
+    own, generic = contract.directory / LEDGER, GENERIC_RULES / LEDGER
     return {
         "statement": None if statement is None else {"file": _shown(statement), **_claim_lines(_text(statement))},
-        "ledger": {"file": _shown(ledger), "lines": lines},
+        "ledger": _ledger(own if own.is_file() else generic, contract),
+        "generic_ledger": _ledger(generic, contract),
     }
+
+
+def _ledger(path: Path, contract: Contract) -> dict[str, Any]:
+    lines = {id_: line for id_, line in _ledger_lines(_text(path)).items() if id_ in contract.ledger}
+    return {"file": _shown(path), "lines": lines}
 
 
 def _ledger_lines(text: str) -> dict[str, int]:

@@ -1,6 +1,6 @@
 """Frozen sets of requirements: a robot judged by one stays judged by it, whatever a later suite adds.
 
-``sets/NAME.toml`` holds id, level and digest of the text of each requirement of a set, and never changes once it is
+``sets/NAME.toml`` of a pack holds id, level and digest of the text of each requirement of a set, and never changes once it is
 published; ``python -m conformance.contract.freeze NAME`` writes one from the ledger. A suite's ledger keeps what is in
 a set as it was; what is newer is in none until the next set is frozen.
 """
@@ -20,10 +20,9 @@ from conformance.contract.toml_file import Text, TomlFileError, read_toml
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from conformance.contract.files import Contract
     from conformance.contract.ledger import Requirement
+    from conformance.contract.pack import Contract
 
-SET_DIR = Path(__file__).parent / "sets"
 _UNFROZEN = "unfrozen"
 
 
@@ -65,28 +64,35 @@ class RequirementSet:
         return {"name": self.name, "digest": self.digest}
 
 
-def names() -> tuple[str, ...]:
-    """The names of the sets that there are."""
-    return tuple(sorted(path.stem for path in SET_DIR.glob("*.toml")))
+def set_folder(contract: Contract) -> Path:
+    """Return the folder that holds a pack's sets."""
+    return contract.directory / "sets"
 
 
-def load_set(name: str) -> RequirementSet:
+def names(contract: Contract) -> tuple[str, ...]:
+    """Return the names of a pack's sets."""
+    return tuple(sorted(path.stem for path in set_folder(contract).glob("*.toml")))
+
+
+def load_set(contract: Contract, name: str) -> RequirementSet:
     """Read a set.
 
     Raises:
         RequirementSetError: there is none of that name, or its file cannot be used.
     """
-    if name not in names():
-        raise RequirementSetError(f"{name!r} is no set of requirements; there are {', '.join(names()) or 'none'}")
-    return RequirementSet(name, read_toml(SET_DIR / f"{name}.toml", _File, RequirementSetError).requirements)
+    if name not in names(contract):
+        there = ", ".join(names(contract)) or "none"
+        raise RequirementSetError(f"{contract.name} has no set of requirements {name!r}; there are {there}")
+    path = set_folder(contract) / f"{name}.toml"
+    return RequirementSet(name, read_toml(path, _File, RequirementSetError).requirements)
 
 
-def current(ledger: Mapping[str, Requirement]) -> RequirementSet:
-    """A ledger as a set: under the name of the frozen one that holds the same, where there is one."""
+def current(contract: Contract, ledger: Mapping[str, Requirement]) -> RequirementSet:
+    """Return a ledger as a set: under the name of the frozen one that holds the same, where there is one."""
     requirements = {id_: frozen(item) for id_, item in ledger.items()}
-    return next((one for one in map(load_set, names()) if one.requirements == requirements), None) or RequirementSet(
-        _UNFROZEN, requirements
-    )
+    sets = (load_set(contract, name) for name in names(contract))
+    same = next((one for one in sets if one.requirements == requirements), None)
+    return same or RequirementSet(_UNFROZEN, requirements)
 
 
 def frozen(requirement: Requirement) -> Frozen:
@@ -95,20 +101,20 @@ def frozen(requirement: Requirement) -> Frozen:
 
 
 def judged_by(contract: Contract, name: str | None) -> RequirementSet | None:
-    """The set that a run judges by; None where the contract is one of the user's own.
+    """The set that a run judges by; None where the contract has no pack.toml.
 
     Args:
         contract: of the run.
         name: what was asked for; None for all that this suite has.
 
     Raises:
-        RequirementSetError: there is none of that name, or the contract is one of the user's own.
+        RequirementSetError: there is none of that name, or the contract has no pack.toml.
     """
-    if not contract.published:
+    if contract.manifest is None or contract.only:
         if name is not None:
-            raise RequirementSetError(f"the set {name!r} is of RoAAS's own contract, and not of {contract.directory}")
+            raise RequirementSetError(f"{contract.directory} has no set of requirements {name!r}: it has no pack.toml")
         return None
-    return current(contract.ledger) if name is None else load_set(name)
+    return current(contract, contract.ledger) if name is None else load_set(contract, name)
 
 
 def _digest(text: str) -> str:

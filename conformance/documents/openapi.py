@@ -6,7 +6,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 from urllib.parse import unquote
 
-from conformance.contract.files import Contract, ContractError
+from conformance.contract.pack import Contract, ContractError
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, opened, resolved
 
 METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace")

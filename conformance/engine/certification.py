@@ -6,12 +6,14 @@ import datetime as dt
 import os
 import sys
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
 
-from conformance.contract.exit_codes import OF_VERDICT, ExitCode
+from conformance.api.device import fixtures_of
+from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.intermittent import look_again
 from conformance.engine.interruption import remembered
@@ -24,8 +26,7 @@ if TYPE_CHECKING:
     from conformance.engine.robot_under_test import RobotUnderTest
     from conformance.verdict.run import Run
     from conformance.verdict.verdicts import Verdict
-
-_CHECKS = Path(__file__).parents[1] / "checks"
+_SUITE = Path(__file__).parents[1]
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def draw_verdicts(run: Run) -> list[Verdict]:
         if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.error(requirement.id, run.aborted)
     return [
-        verdict_of(requirement, judge.evidence[requirement.id], run.claims, run.undeclared)
+        verdict_of(requirement, judge.evidence[requirement.id], run.claims, run.statement.undeclared)
         for requirement in run.contract.ledger.values()
     ]
 
@@ -129,14 +130,16 @@ def draw_verdicts(run: Run) -> list[Verdict]:
 def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str]) -> bool:
     """Run pytest over the checks, and nothing of the folder that the user happens to be in; True when interrupted."""
     teller = Progress(robot, progress)
-    options = [f"--config-file={os.devnull}", f"--rootdir={_CHECKS}", "--import-mode=importlib", "--capture=no"]
+    options = [f"--config-file={os.devnull}", f"--rootdir={_SUITE}", "--import-mode=importlib", "--capture=no"]
     unused = ("terminal", "cacheprovider", "logging", "junitxml", "unraisableexception", "threadexception")
     options += ["-Wignore", "--assert=plain", *(f"-pno:{name}" for name in unused)]
     try:
         with pytest.MonkeyPatch.context() as environment:
             environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
             environment.delenv("PYTEST_ADDOPTS", raising=False)
-            code = pytest.main([str(_CHECKS), *options], plugins=[ChecksPlugin(lambda: robot), teller])
+            folders = map(str, robot.run.contract.rules)
+            plugins = [ChecksPlugin(lambda: robot), teller, *map(import_module, fixtures_of(robot.run.contract))]
+            code = pytest.main([*folders, *options], plugins=plugins)
     except Exception as error:  # noqa: BLE001 - whatever breaks, what was judged until then is not lost
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
         robot.run.aborted = robot.run.aborted or "the suite itself failed"

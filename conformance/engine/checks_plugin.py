@@ -11,16 +11,17 @@ import pytest
 
 from conformance.contract.classes import Level
 from conformance.contract.interfaces import Interface
+from conformance.contract.ledger import expanded
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
-    from conformance.contract.statement import Statement
+    from conformance.api.interfaces import Interfaces
+    from conformance.api.rest.interface import RestInterface
+    from conformance.api.soap.callable_services import SoapServices
+    from conformance.api.soap.service import SoapService
     from conformance.engine.robot_under_test import RobotUnderTest
-    from conformance.rest.interface import RestInterface
-    from conformance.robot.interfaces import Interfaces
-    from conformance.soap.callable_services import SoapServices
-    from conformance.soap.service import SoapService
+    from conformance.statement.statement import Statement
     from conformance.transport.client import Connection, HttpClient
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
@@ -40,9 +41,9 @@ _NO_ADDRESS = "the robot's {} interface has no address"
 _Interface = TypeVar("_Interface")
 
 
-def ids_of(item: pytest.Item) -> tuple[str, ...]:
-    """The requirements that a check judges; empty for a test that is no check."""
-    return tuple(id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
+def is_check(item: pytest.Item) -> bool:
+    """Return whether a test judges requirements."""
+    return item.get_closest_marker("requirement") is not None
 
 
 def _turn(item: pytest.Item) -> tuple[int, str]:
@@ -73,6 +74,11 @@ class ChecksPlugin:
             self._connected = self._connect()
         return self._connected
 
+    def ids_of(self, item: pytest.Item) -> tuple[str, ...]:
+        """Return the ids of the requirements that a check judges."""
+        marked = (id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
+        return expanded(marked, self._robot().run.contract.ledger)
+
     def pytest_configure(self, config: pytest.Config) -> None:
         """Register the markers."""
         config.addinivalue_line("markers", "requirement(*ids): the requirements that a check judges")
@@ -82,12 +88,12 @@ class ChecksPlugin:
 
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         """Keep the checks that judge something claimed, in the order of their phases."""
-        if not any(ids_of(item) for item in items):
+        if not any(map(is_check, items)):
             return
         run = self._robot().run
         ledger = run.contract.ledger
         claimed = {id_ for id_, requirement in ledger.items() if requirement.class_ in run.claims}
-        kept = [item for item in items if not ids_of(item) or not claimed.isdisjoint(ids_of(item))]
+        kept = [item for item in items if not is_check(item) or not claimed.isdisjoint(self.ids_of(item))]
         dropped = [item for item in items if item not in kept]
         config.hook.pytest_deselected(items=dropped)
         items[:] = sorted(kept, key=_turn)
@@ -95,7 +101,7 @@ class ChecksPlugin:
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> None:
         """Skip what cannot be judged in this run; the reason goes into the verdict."""
-        if not ids_of(item):
+        if not is_check(item):
             return
         run = self._robot().run
         run.judge.begin(item.nodeid.rsplit("/", 1)[-1])
@@ -108,14 +114,14 @@ class ChecksPlugin:
             pytest.skip("it moves the robot, and --allow-motion was not given")
         for mark in item.iter_markers("needs"):
             for name in mark.args:
-                self._need(Interface(name), ids_of(item))
+                self._need(Interface(name), self.ids_of(item))
 
     def _need(self, name: Interface, ids: tuple[str, ...]) -> None:
         """Skip for want of an interface; what the contract does not describe, nobody has claimed."""
         run = self._robot().run
         if not self._robot().has(name):
             reason = _NO_ADDRESS.format(name)
-            for id_ in ids if name not in run.interfaces else ():
+            for id_ in ids if name not in run.contract.interfaces else ():
                 run.judge.unclaimed(id_, reason)
             pytest.skip(reason)
         if name in run.unreachable:
@@ -124,9 +130,9 @@ class ChecksPlugin:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Generator[None, object, object]:
         """Run a check, and turn what it raises into evidence."""
-        ids = ids_of(item)
-        if not ids:
+        if not is_check(item):
             return (yield)
+        ids = self.ids_of(item)
         # Imported late: the plugin is loaded in every pytest run where the suite is installed.
         from conformance.engine.record_exception import record_exception  # noqa: PLC0415
 
@@ -148,7 +154,7 @@ class ChecksPlugin:
     def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
         """Put a skip's reason down as evidence."""
         report: pytest.TestReport = yield
-        ids = ids_of(item)
+        ids = self.ids_of(item) if is_check(item) else ()
         if ids and report.skipped and call.excinfo is not None:
             run = self._robot().run
             reason = str(getattr(call.excinfo.value, "msg", call.excinfo.value))
@@ -160,9 +166,7 @@ class ChecksPlugin:
     def pytest_sessionfinish(self) -> None:
         """Leave the robot at rest, whatever happened, Ctrl-C included."""
         if self._connected is not None and self._connected.rest is not None:
-            from conformance.robot.stopping import leave_at_rest  # noqa: PLC0415 - as above
-
-            leave_at_rest(self._connected.rest)
+            self._connected.device.leave_at_rest(self._connected.rest)
 
     @pytest.fixture(scope="session")
     def run(self) -> Run:

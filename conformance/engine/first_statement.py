@@ -6,8 +6,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.classes import CLASSES
-from conformance.contract.interfaces import NEEDS, Interface
+from conformance.contract.interfaces import Interface
 from conformance.contract.toml_file import basic_string
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
@@ -17,7 +16,8 @@ from conformance.verdict.run import Run
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conformance.contract.statement import Statement
+    from conformance.contract.pack import Contract
+    from conformance.statement.statement import Statement
     from conformance.transport.client import HttpClient
 
 _TEMPLATE = """\
@@ -37,38 +37,13 @@ version = {version}
 # timeout_s = 10             # deadline of one request
 
 [claims]
-# profile = "full"           # or "paper"; beside or instead of single classes
+# profile = "full"           # claims all; beside or instead of single classes
 classes = [
 {claims}]
-
-[limits]
-# What is not declared is judged with the reference robot's limits halved, 2 s to settle, and no check of the hold time.
-# linear_m_s = 0.7           # greatest speed
-# angular_rad_s = 2.5        # greatest turning rate
-# settle_s = 0.6             # a commanded velocity is reached within
-# hold_s = 1.0               # a velocity holds for, unless renewed
-# tolerance = 0.05           # of a reached velocity, relative
-# tolerance_linear_m_s = 0.02     # and absolute
-# tolerance_angular_rad_s = 0.02
-
-[motion]
-# Where the robot may be driven. Without an arena, goals stay within radius_m of where it is.
-# arena = [0.0, 0.0, 10.0, 5.0]       # x_min, y_min, x_max, y_max, m
-# radius_m = 1.0
-# frame = "map"
-# goals = [[1.0, 2.0, 0.0]]           # x, y, yaw: poses that can be reached
-# odom_to_map = [0.0, 0.0, 0.0]       # x, y, yaw of the odometry frame in the map
-# actuated = ["linear.x", "angular.z"]
-
-[ros]
-# With a domain, a probe watches what reaches ROS (needs rclpy where the suite runs).
-# domain_id = 0
-# delivery_topic = "/DeliveryRequestMsg/from_json"
-# cmd_vel_topic = "/cmd_vel"
 """
 
 
-def write_first_statement(path: Path, known: Statement) -> str:
+def write_first_statement(path: Path, known: Statement, contract: Contract) -> str:
     """Ask the robot what it is and write a commented statement.
 
     Returns:
@@ -77,14 +52,14 @@ def write_first_statement(path: Path, known: Statement) -> str:
     Raises:
         OSError: the file cannot be written.
     """
-    robot = RobotUnderTest(Run(statement=known), connection_of(known.endpoints))
+    robot = RobotUnderTest(Run(known, contract), connection_of(known.endpoints))
     robot.connect(sys.stderr)
     if not robot.reached:
         return "; ".join(f"{name}: {why}" for name, why in robot.run.unreachable.items())
     info = _openapi(robot.rest.client).get("info", {}) if robot.rest else {}
     info = info if isinstance(info, dict) else {}
     doubts = _doubts(robot)
-    lines = [f'  "{name}",' if name not in doubts else f'  # "{name}",  # {doubts[name]}' for name in CLASSES]
+    lines = [f'  "{name}",' if name not in doubts else f'  # "{name}",  # {doubts[name]}' for name in contract.classes]
     path.write_text(
         _TEMPLATE.format(
             file=path.name,
@@ -92,7 +67,8 @@ def write_first_statement(path: Path, known: Statement) -> str:
             version=_quoted(info.get("version", "")),
             endpoints="\n".join(_endpoints(robot)),
             claims="".join(f"{line}\n" for line in lines),
-        ),
+        )
+        + robot.device.statement_template,
         encoding="utf-8",
     )
     return ""
@@ -147,13 +123,14 @@ def _doubts(robot: RobotUnderTest) -> dict[str, str]:
     """A doubt for each class that the robot does not look as if it had."""
     unreached = robot.run.unreachable
     doubts: dict[str, str] = {
-        name: f"no address for {' and '.join(missing)}" for name, missing in robot.run.statement.lacking().items()
+        name: f"no address for {' and '.join(missing)}"
+        for name, missing in robot.run.statement.lacking(robot.run.contract).items()
     }
-    for name in CLASSES:
-        silent = [one for one in NEEDS[name].interfaces if one in unreached]
+    for name, item in robot.run.contract.classes.items():
+        silent = [one for one in item.interfaces if one in unreached]
         if silent:
             doubts.setdefault(name, f"{' and '.join(silent)} did not answer")
-    doubts.setdefault("safety", "to claim it, declare limits and hold time below")
+    doubts = {**robot.device.doubts, **doubts}
     if "describe" not in doubts:
         missing = _undescribed(robot)
         if missing:

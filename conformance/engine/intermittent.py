@@ -11,14 +11,13 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.documents.xml import NotXmlError, parse
 from conformance.engine.sending_again import is_same, send_again
-from conformance.robot.stopping import leave_at_rest
 from conformance.transport.exchange import SAFE_METHODS, Exchange
 from conformance.verdict.evidence import Again
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from conformance.rest.interface import RestInterface
+    from conformance.api.rest.interface import RestInterface
     from conformance.transport.client import Connection
     from conformance.transport.exchange import Attempt, Request, Response
     from conformance.verdict.evidence import Finding
@@ -57,7 +56,7 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
             finding.again = Again(came_back, _TIMES)
     finally:
         if moves and rest is not None:
-            leave_at_rest(rest)
+            rest.device.leave_at_rest(rest)
 
 
 def _again(run: Run) -> Iterator[tuple[int, str, Finding, Exchange]]:

@@ -7,15 +7,13 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.classes import CLASSES
-from conformance.contract.files import Contract
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.observers import Observer
+from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.rest.interface import RestInterface
-from conformance.rest.observers import Observer
-from conformance.robot.clock import Clock
-from conformance.robot.observer import Observer as RobotObserver
+from conformance.statement.statement import empty_statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
@@ -23,33 +21,41 @@ from conformance.verdict.run import Run
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from conformance.contract.statement import Statement
+    from conformance.statement.statement import Statement
     from conformance.transport.exchange import Exchange
 
 
-def observed_to_fail(base_url: str, requirement: str, exchange: Exchange) -> bool:
+def observed_to_fail(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:
     """Whether the observers of REST, which judge each answer by itself, find a requirement not met in an exchange.
 
     Args:
+        contract: by which the exchange was judged.
         base_url: of the robot's REST interface.
         requirement: its id.
         exchange: any; one with another interface fails nothing.
     """
-    run = Run(contract=Contract.load())
+    run = Run(empty_statement(contract), contract)
     with closing(HttpClient(base_url, Connection())) as client:
         api = RestInterface(run, client)
-        for observer in (Observer(api), RobotObserver(api, Clock())):
+        for observer in (Observer(api), *api.device.observers(api)):
             observer.answered(exchange)
     evidence = run.judge.evidence.get(requirement)
     return bool(evidence and evidence.failures)
 
 
 def judged_by_checks(
-    statement: Statement, requirements: Collection[str], *, allow_motion: bool, seed: int, effort: str
+    contract: Contract,
+    statement: Statement,
+    requirements: Collection[str],
+    *,
+    allow_motion: bool,
+    seed: int,
+    effort: str,
 ) -> list[dict[str, Any]]:
     """Run the checks of some requirements, and no others, on a robot.
 
     Args:
+        contract: by which it is judged.
         statement: of the robot.
         requirements: their ids.
         allow_motion: whether the robot may be moved.
@@ -63,12 +69,12 @@ def judged_by_checks(
         ContractError: there is no such requirement.
         OSError: a file that the statement names cannot be read.
     """
-    contract = Contract.load(only=tuple(sorted(requirements)))
+    contract = Contract.load(contract.directory, only=tuple(sorted(requirements)))
     classes = {item.class_ for item in contract.ledger.values()}
     run = Run(
         statement=statement,
         contract=contract,
-        claims=tuple(name for name in CLASSES if name in classes),
+        claims=tuple(name for name in contract.classes if name in classes),
         allow_motion=allow_motion,
         seed=seed,
         effort=Effort(effort),

@@ -11,7 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
-from conformance.contract.files import CONTRACT_DIR
+from conformance.contract.pack import Contract
 from conformance.engine.sequence import read_request
 from conformance.transport.exchange import SAFE_METHODS
 
@@ -72,7 +72,7 @@ def _only_reads(request: Request) -> bool:
 def _asks(body: bytes) -> bool:
     """Whether a body is a SOAP message for an operation of the contract that only reads."""
     # Imported late: lxml and xmlschema cost a third of a second that a REST finding need not pay.
-    from conformance.soap.envelope import NotSoapError, read  # noqa: PLC0415
+    from conformance.api.soap.envelope import NotSoapError, read  # noqa: PLC0415
 
     try:
         message = read(body)
@@ -86,5 +86,5 @@ def _questions() -> frozenset[str]:
     """The elements that ask the contract's subscribers service for something."""
     from conformance.documents.wsdl import read_file  # noqa: PLC0415 - as above
 
-    operations = read_file(CONTRACT_DIR / "subscribers.wsdl").operations
+    operations = read_file(path).operations if (path := Contract.load().subscribers_path) else ()
     return frozenset(operation.request for operation in operations if operation.request)

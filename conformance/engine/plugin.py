@@ -19,6 +19,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Options for use in a project of one's own; ``roaas certify`` has better ones."""
     group = parser.getgroup("robot", "RoAAS: conformance of a robot's web services")
     group.addoption("--robot-statement", metavar="FILE", help="implementation conformance statement (TOML)")
+    group.addoption("--robot-contract", metavar="PACK", help="contract pack to judge by: its name or its folder")
     group.addoption("--robot-rest", metavar="URL", help="base URL of the robot's REST interface")
     group.addoption("--robot-publishers-wsdl", metavar="URL", help="WSDL of the publishers service, URL or file")
     group.addoption("--robot-subscribers-wsdl", metavar="URL", help="WSDL of the subscribers service, URL or file")

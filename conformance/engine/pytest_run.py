@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import msgspec
 import pytest
 
-from conformance.contract.classes import CLASSES, ConformanceClass
-from conformance.contract.statement import Statement, StatementError, load_statement
+from conformance.contract.pack import DEFAULT_PACK, Contract, ContractError
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.statement.statement import StatementError, empty_statement, load_statement
 from conformance.transport.client import Connection
 from conformance.verdict.effort import EFFORTS, Effort
 from conformance.verdict.run import Run
 
 if TYPE_CHECKING:
-    from conformance.contract.statement import Endpoints
+    from conformance.statement.statement import Endpoints
 
 
 def robot_from_options(config: pytest.Config) -> RobotUnderTest:
@@ -27,16 +27,17 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
     """
     given = config.getoption("robot_statement")
     try:
-        statement = load_statement(Path(given)) if given else Statement()
-    except StatementError as error:
+        contract = Contract.load(config.getoption("robot_contract") or DEFAULT_PACK)
+        statement = load_statement(Path(given), contract) if given else empty_statement(contract)
+    except (StatementError, ContractError) as error:
         raise pytest.UsageError(str(error)) from error
     statement = msgspec.structs.replace(statement, endpoints=_endpoints(config, statement.endpoints))
     classes = config.getoption("robot_class")
     if classes:
-        unknown = sorted(set(classes) - set(CLASSES))
+        unknown = sorted(set(classes) - set(contract.classes))
         if unknown:
-            raise pytest.UsageError(f"--robot-class {unknown[0]}: there are {', '.join(CLASSES)}")
-        statement = msgspec.structs.replace(statement, claims=tuple(map(ConformanceClass, classes)))
+            raise pytest.UsageError(f"--robot-class {unknown[0]}: there are {', '.join(contract.classes)}")
+        statement = msgspec.structs.replace(statement, claims=tuple(classes))
     where = statement.endpoints
     if not where.interfaces:
         raise pytest.UsageError("name a robot: --robot-rest, --robot-publishers-wsdl or --robot-subscribers-wsdl")
@@ -45,7 +46,8 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
         raise pytest.UsageError(f"--robot-effort {effort}: there are {', '.join(EFFORTS)}")
     run = Run(
         statement=statement,
-        claims=statement.claimed(),
+        claims=statement.claimed(contract),
+        contract=contract,
         allow_motion=config.getoption("robot_allow_motion"),
         seed=config.getoption("robot_seed"),
         effort=Effort(effort),

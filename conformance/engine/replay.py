@@ -15,6 +15,7 @@ from conformance.transport.exchange import Exchange, NoAnswer, Response, Unanswe
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from conformance.contract.pack import Contract
     from conformance.transport.client import Connection
     from conformance.transport.exchange import Attempt, Request
 
@@ -61,7 +62,13 @@ def findings(result: Mapping[str, Any], requirement: str | None) -> Iterator[tup
             yield from ((item["id"], failure) for failure in item["failures"])
 
 
-def replay(id_: str, failure: Mapping[str, Any], connection: Connection, rest: str | None = None) -> Replayed:
+def replay(
+    id_: str,
+    failure: Mapping[str, Any],
+    connection: Connection,
+    rest: str | None = None,
+    contract: Contract | None = None,
+) -> Replayed:
     """Send one finding's requests again.
 
     What the observers found in the recorded answer by itself, they judge in the new one. Of all else only the kind of
@@ -72,6 +79,7 @@ def replay(id_: str, failure: Mapping[str, Any], connection: Connection, rest: s
         failure: the finding, as in result.json.
         connection: to the robot.
         rest: base URL of its REST interface, or None.
+        contract: by which its observers judge; None: nothing but the kind of response is compared.
 
     Raises:
         ValueError, KeyError, TypeError: the result is not well made.
@@ -89,13 +97,13 @@ def replay(id_: str, failure: Mapping[str, Any], connection: Connection, rest: s
         if isinstance(attempt, Unanswered) and attempt.kind is NoAnswer.REFUSED:
             return Replayed(id_, message, Outcome.UNREACHABLE, attempt.problem)
         came.append(attempt)
-    there, told_by = _still_there(id_, failure["response"], requests[-1], came[-1], rest)
+    there, told_by = _still_there(id_, failure["response"], requests[-1], came[-1], rest, contract)
     outcome = Outcome.STILL_THERE if there else Outcome.GONE
     return Replayed(id_, message, outcome, came[-1].came, len(requests), told_by)
 
 
 def _still_there(
-    id_: str, recorded: Mapping[str, Any], request: Request, came: Attempt, rest: str | None
+    id_: str, recorded: Mapping[str, Any], request: Request, came: Attempt, rest: str | None, contract: Contract | None
 ) -> tuple[bool, str]:
     """Whether an answer is what was found, and what tells it."""
     if recorded["status"] is None or not isinstance(came, Exchange):
@@ -107,6 +115,11 @@ def _still_there(
     )
     before = Response(recorded["status"], fields, (recorded["body"] or "").encode(), 0.0)
     # Of a long body the result has only the beginning, of which nobody can judge.
-    if rest and "body_length" not in recorded and observed_to_fail(rest, id_, Exchange(request, before)):
-        return observed_to_fail(rest, id_, Exchange(request, came.response)), _BY_JUDGEMENT
+    if (
+        rest
+        and contract
+        and "body_length" not in recorded
+        and observed_to_fail(contract, rest, id_, Exchange(request, before))
+    ):
+        return observed_to_fail(contract, rest, id_, Exchange(request, came.response)), _BY_JUDGEMENT
     return is_same(before, came), _BY_KIND

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
 
-from conformance.contract.atomic_write import write_atomically
-from conformance.contract.classes import CLASS_TITLES
-from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION
+from conformance.commandline.atomic_write import write_atomically
 from conformance.contract.interfaces import Interface
 from conformance.engine.sequence import written
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
@@ -22,8 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from conformance.contract.files import Contract
-    from conformance.contract.limits import DeclaredLimits
     from conformance.engine.robot_under_test import RobotUnderTest
     from conformance.transport.exchange import Attempt
     from conformance.verdict.evidence import Finding
@@ -56,11 +52,8 @@ def result_document(
         "verdict": overall,
         **({"accepted_until": accepted_until} if accepted_until else {}),
         "interrupted": interrupted,
-        "suite": {
-            "version": suite_version(),
-            "contract": _contract_name(run.contract),
-            "digest": suite_digest(run.contract),
-        },
+        "suite": {"version": suite_version(), "contract": run.contract.label, "digest": suite_digest(run.contract)},
+        "pack": {"name": run.contract.name, "version": run.contract.version, "title": run.contract.title},
         "requirement_set": run.requirement_set.told if run.requirement_set else None,
         "digests": {"statement": run.given.statement, "contract": contract_digests(run.contract)},
         "baseline": {"digest": run.given.baseline} if run.given.baseline else None,
@@ -71,9 +64,7 @@ def result_document(
             "robot": statement.robot,
             "endpoints": {key: value for key, value in asdict(statement.endpoints).items() if value is not None},
             "claims": list(run.claims),
-            "declared": _declared(statement.declared),
-            "limits": statement.limits.figures,
-            "tolerances": statement.limits.tolerances,
+            **statement.figures,
             "motion_allowed": run.allow_motion,
         },
         "seed": run.seed,
@@ -94,25 +85,13 @@ def result_document(
             "libraries": {name: installed(name) for name in _LIBRARIES},
         },
         "classes": {name: value for name, (value, _) in classes.items()},
-        "class_titles": {name: CLASS_TITLES[name] for name in classes},
+        "class_titles": {name: run.contract.classes[name].title for name in classes},
         "class_views": dict(views(verdicts)),
         "class_reasons": {name: reason for name, (_, reason) in classes.items() if reason},
         "requirements": [_requirement(verdict) for verdict in verdicts],
         "contract_sections": {anchor: section._asdict() for anchor, section in run.contract.cited_sections.items()},
         "notes": notes,
     }
-
-
-def _declared(limits: DeclaredLimits) -> dict[str, float]:
-    """The figures that the statement itself names, those of the noise as ``noise_NAME``."""
-    figures = {name: figure for name, figure in asdict(limits).items() if figure is not None}
-    noise = figures.pop("noise", None)
-    return figures | {f"noise_{name}": figure for name, figure in (asdict(noise) if noise else {}).items() if figure}
-
-
-def _contract_name(contract: Contract) -> str:
-    directory = contract.directory
-    return CONTRACT_VERSION if directory == CONTRACT_DIR else f"own ({directory.resolve().name})"
 
 
 def _target(robot: RobotUnderTest) -> dict[str, Any]:
@@ -122,7 +101,7 @@ def _target(robot: RobotUnderTest) -> dict[str, Any]:
         service = robot.soap.there.get(name)
         target[f"{name}_wsdl"] = wsdl
         target[f"{name}_endpoint"] = service.client.base_url + service.path if service else None
-    return {**target, "ros_domain_id": robot.run.statement.ros.domain_id}
+    return {**target, "ros_domain_id": robot.run.statement.domain_id}
 
 
 def _requirement(verdict: Verdict) -> dict[str, Any]:

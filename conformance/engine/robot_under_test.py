@@ -7,11 +7,13 @@ import threading
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
+from conformance.api.device import Device, device_of
+from conformance.api.rest.interface import RestInterface, plain_path
 from conformance.contract.interfaces import Interface
 from conformance.engine.sequence import Recorder
-from conformance.rest.interface import RestInterface, plain_path
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
 
@@ -19,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import TextIO
 
-    from conformance.robot.interfaces import Interfaces
-    from conformance.soap.callable_services import SoapServices
+    from conformance.api.interfaces import Interfaces
+    from conformance.api.soap.callable_services import SoapServices
     from conformance.verdict.run import Run
 
 # How long a robot that stopped answering is given to come back before the rest of the run is called off, s.
@@ -55,16 +57,21 @@ class RobotUnderTest:
     def soap(self) -> SoapServices:
         """Its SOAP services, each of which may be missing."""
         # Imported late: zeep, lxml and xmlschema cost a third of a second that --help need not pay.
-        from conformance.soap.callable_services import SoapServices  # noqa: PLC0415
+        from conformance.api.soap.callable_services import SoapServices  # noqa: PLC0415
 
         if self._services is None:
             self._services = SoapServices(self.run)
         return self._services
 
+    @cached_property
+    def device(self) -> Device:
+        """What the contract pack knows of the robot."""
+        return device_of(self.run) if self.rest is None else self.rest.device
+
     @property
     def interfaces(self) -> Interfaces:
         """All interfaces that have an address."""
-        from conformance.robot.interfaces import Interfaces  # noqa: PLC0415 - as above
+        from conformance.api.interfaces import Interfaces  # noqa: PLC0415 - as above
 
         return Interfaces(self.rest, self.soap)
 
@@ -83,21 +90,16 @@ class RobotUnderTest:
         self._connect_soap()
 
     def _connect_rest(self) -> None:
-        where, contract = self.run.statement.endpoints, self.run.contract
+        where = self.run.statement.endpoints
         if not where.rest:
             return
-        from conformance.robot.examples import RobotDomain  # noqa: PLC0415 - as above
-
         self.rest = RestInterface(self.run, HttpClient(where.rest, self.connection), self.alive)
-        if contract.own:
-            self.rest.domain = RobotDomain(self.rest)
         with self._told(Interface.REST, where.rest):
             self._look(Interface.REST, self.rest.client, self.rest.path)
 
     def _connect_soap(self) -> None:
-        from conformance.robot.soap_services import known_messages  # noqa: PLC0415 - as above
-        from conformance.soap.callable_services import SoapServices  # noqa: PLC0415 - as above
-        from conformance.soap.discovery import open_service  # noqa: PLC0415 - as above
+        from conformance.api.soap.callable_services import SoapServices  # noqa: PLC0415 - as above
+        from conformance.api.soap.discovery import open_service  # noqa: PLC0415 - as above
 
         where, contract = self.run.statement.endpoints, self.run.contract
         services = {}
@@ -108,7 +110,7 @@ class RobotUnderTest:
             url = wsdl or endpoint
             if url:
                 with self._told(name, url):
-                    services[name] = open_service(name, wsdl, endpoint, self.connection, path, known_messages)
+                    services[name] = open_service(name, wsdl, endpoint, self.connection, path, self.device.messages)
                     self._look(name, services[name].client, services[name].path)
         self._services = SoapServices(self.run, services.get(Interface.PUBLISHERS), services.get(Interface.SUBSCRIBERS))
 

@@ -7,13 +7,14 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from conformance.contract.classes import PROFILES
-from conformance.contract.files import Contract
+from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import load_set, names
 
 _PACKAGE = Path(__file__).parents[1]
 # The rooms that decide what is asked and what is said of it.
-JUDGING = ("contract", "transport", "documents", "verdict", "rest", "soap", "robot", "checks", "engine")
+# The folders of a pack that only its self-test uses.
+_SELFTEST = {"mutants", "faulty_bodies", "independent_robots"}
+JUDGING = ("contract", "statement", "transport", "documents", "verdict", "api", "rules", "engine")
 
 
 def installed(name: str) -> str:
@@ -30,20 +31,23 @@ def suite_version() -> str:
 
 
 def suite_digest(contract: Contract, package: Path = _PACKAGE) -> str:
-    """Digest over the package's modules that judge and the contract's files: two runs of one digest asked the same."""
+    """Return the digest over all that judges: the suite's modules and ledger, the pack's modules and files."""
     modules = {
-        path.relative_to(package).as_posix(): path for room in JUDGING for path in (package / room).rglob("*.py")
+        path.relative_to(package).as_posix(): path
+        for room in JUDGING
+        for pattern in ("*.py", "*.toml")
+        for path in (package / room).rglob(pattern)
     }
-    texts = {f"the contract: {path.name}": path for path in _contract_files(contract)}
+    pack = {f"the contract: {path.relative_to(contract.directory).as_posix()}": path for path in _judging(contract)}
     digest = hashlib.sha256()
-    for name, path in sorted({**modules, **texts}.items()):
+    for name, path in sorted({**modules, **pack}.items()):
         digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return f"sha256:{digest.hexdigest()}"
 
 
 def contract_digests(contract: Contract) -> dict[str, str]:
     """Each file of a contract with its digest, as `sha256:…`."""
-    return {path.name: file_digest(path) for path in sorted(_contract_files(contract))}
+    return {path.name: file_digest(path) for path in contract.files}
 
 
 def file_digest(path: Path) -> str:
@@ -55,14 +59,17 @@ def file_digest(path: Path) -> str:
     return f"sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}"
 
 
-def known() -> dict[str, Any]:
+def known(contract: Contract | None = None) -> dict[str, Any]:
     """What tells whether a certificate is of this suite: its digest, its requirement sets, its profiles' classes."""
+    contract = contract or Contract.load()
     return {
-        "suite": suite_digest(Contract.load()),
-        "requirement_sets": {name: load_set(name).digest for name in names()},
-        "profiles": {str(name): [str(class_) for class_ in classes] for name, classes in PROFILES.items()},
+        "suite": suite_digest(contract),
+        "requirement_sets": {name: load_set(contract, name).digest for name in names(contract)},
+        "profiles": {name: list(classes) for name, classes in contract.profiles.items()},
     }
 
 
-def _contract_files(contract: Contract) -> list[Path]:
-    return [path for path in contract.directory.iterdir() if path.is_file() and path.suffix != ".py"]
+def _judging(contract: Contract) -> list[Path]:
+    """Return what of a pack decides on a verdict: its files, and its modules but those of the self-test."""
+    modules = (path for path in contract.directory.rglob("*.py") if not _SELFTEST.intersection(path.parts))
+    return [*contract.files, *modules]

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import msgspec
 
-from conformance.contract.statement import Endpoints, StatementError, beside, load_statement
+from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Positive, Text, TomlFileError, read_toml
+from conformance.statement.statement import Endpoints, StatementError, beside, load_statement
 
 TIME_LIMIT_S = 3600.0
 """How long one robot may take where the file does not say, s."""
@@ -59,10 +60,12 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     robot: tuple[_Robot, ...] = ()
 
 
-def load_fleet(path: Path) -> tuple[Member, ...]:
+def load_fleet(path: Path, contract: Contract) -> tuple[Member, ...]:
     """Read a fleet's file, and the statements that it names.
 
-    Files that it names are looked for beside it.
+    Args:
+        path: of the file; files that it names are looked for beside it.
+        contract: by which the robots are judged.
 
     Raises:
         FleetError: it cannot be read, a statement of it cannot, or two robots have a name or an address in common.
@@ -70,12 +73,12 @@ def load_fleet(path: Path) -> tuple[Member, ...]:
     file = read_toml(path, _File, FleetError)
     if not file.robot:
         raise FleetError(f"{path} names no robot: write [[robot]] with statement = FILE, or with endpoints, for each")
-    members = tuple(_member(path, number, robot, file) for number, robot in enumerate(file.robot, 1))
+    members = tuple(_member(path, number, robot, file, contract) for number, robot in enumerate(file.robot, 1))
     _refuse_common(path, members)
     return members
 
 
-def _member(path: Path, number: int, robot: _Robot, file: _File) -> Member:
+def _member(path: Path, number: int, robot: _Robot, file: _File, contract: Contract) -> Member:
     where = f"{path}: [[robot]] number {number}"
     if (robot.statement is None) == (robot.endpoints is None):
         raise FleetError(f"{where} must have one of the two: statement, or endpoints")
@@ -88,7 +91,7 @@ def _member(path: Path, number: int, robot: _Robot, file: _File) -> Member:
     identity = (name, "")
     if statement is not None:
         try:
-            declared = load_statement(statement)
+            declared = load_statement(statement, contract)
             endpoints = declared.endpoints
             identity = (declared.robot.get("name", ""), declared.robot.get("vendor", ""))
         except StatementError as error:

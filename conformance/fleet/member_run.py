@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.toml_file import basic_string
 
 if TYPE_CHECKING:

@@ -6,9 +6,8 @@ import json
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.atomic_write import write_atomically
-from conformance.contract.classes import CLASS_TITLES, CLASSES
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.exit_codes import ExitCode
 from conformance.engine.result import rfc3339
 from conformance.engine.suite import suite_version
 from conformance.fleet.member_run import EXIT_CODES, MemberResult
@@ -44,8 +43,7 @@ def fleet_document(
     results: Sequence[MemberResult], *, started: dt.datetime, finished: dt.datetime, parallel: int, interrupted: bool
 ) -> dict[str, Any]:
     """Put a fleet together as fleet.json has it."""
-    judged = {name for result in results for name in (result.document or {}).get("classes", ())}
-    names = [name for name in CLASSES if name in judged]
+    titles = {name: title for one in results for name, title in (one.document or {}).get("class_titles", {}).items()}
     return {
         "format": FLEET_FORMAT,
         "suite": {"version": suite_version()},
@@ -56,7 +54,7 @@ def fleet_document(
         "interrupted": interrupted,
         "exit_code": int(exit_code(results, interrupted=interrupted)),
         "outcomes": dict(Counter(str(result.outcome) for result in results)),
-        "class_titles": {str(name): CLASS_TITLES[name] for name in names},
+        "class_titles": titles,
         "robots": [_robot(result) for result in results],
     }
 

@@ -8,7 +8,7 @@ import signal
 import time
 from typing import TYPE_CHECKING, TextIO
 
-from conformance.contract.terminal import inert
+from conformance.commandline.terminal import inert
 from conformance.fleet.member_run import MemberResult, MemberRun, Outcome, Stop
 
 if TYPE_CHECKING:

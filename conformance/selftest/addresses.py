@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from conformance.selftest.messages import Request, Response
+from conformance.mutation.messages import Request, Response
 
 _ORIGIN: Final = re.compile(r"^https?://[^/?]*(?=[/?])", re.IGNORECASE)
 

@@ -14,12 +14,11 @@ from typing import Any
 
 import msgspec
 
-from conformance.contract.classes import ConformanceClass
-from conformance.contract.files import Contract
-from conformance.contract.statement import load_statement
+from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.packs.table1.statement import load_robot_statement
 from conformance.transport.exchange import Attempt
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -141,7 +140,7 @@ def _run(job: Job, pipe: Pipe) -> None:
 
 def robot_of(job: Job, folder: Path) -> RobotUnderTest:
     """The robot and the run that a job describes; ``folder`` is for its token."""
-    statement = load_statement(job.statement)
+    statement = load_robot_statement(job.statement)
     given = dict(job.endpoints)
     if job.token:
         (folder / "token").write_text(job.token, encoding="utf-8")
@@ -149,13 +148,15 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
     where = msgspec.structs.replace(
         statement.endpoints, rest=job.rest, publishers_wsdl=job.publishers, subscribers_wsdl=job.subscribers, **given
     )
-    ros = msgspec.structs.replace(statement.ros, domain_id=job.domain_id)
-    claims = tuple(map(ConformanceClass, job.classes)) or statement.claims
-    statement = msgspec.structs.replace(statement, endpoints=where, claims=claims, ros=ros)
+    claims = job.classes or statement.claims
+    statement = msgspec.structs.replace(statement, endpoints=where, claims=claims)
+    if job.domain_id is not None:
+        statement = statement.on_domain(job.domain_id)
+    contract = Contract.load(only=job.requirements)
     run = Run(
         statement=statement,
-        contract=Contract.load(only=job.requirements),
-        claims=statement.claimed(),
+        contract=contract,
+        claims=statement.claimed(contract),
         allow_motion=True,
         seed=job.seed,
         effort=Effort(job.effort),

@@ -15,11 +15,11 @@ from pathlib import Path
 
 from lxml import etree
 
-from conformance.contract.files import CONTRACT_DIR
+from conformance.mutation.messages import unchanged
+from conformance.mutation.mutant import Mutant
+from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.selftest.at_once import each_at_once
-from conformance.selftest.messages import unchanged
 from conformance.selftest.mutant_run import RobotPool
-from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.proxy import Proxy
 
 EXAMPLES, LIMIT_S = 3, 40.0

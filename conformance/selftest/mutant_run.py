@@ -6,10 +6,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any, Self
 
+from conformance.mutation.messages import unchanged
+from conformance.mutation.mutant import Mutant
 from conformance.selftest.at_once import each_at_once
 from conformance.selftest.certifying import Job, Outcome, run_job
-from conformance.selftest.messages import unchanged
-from conformance.selftest.mutants.mutant import Mutant
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import REFERENCE, Robot, running, statement_of
 

@@ -8,9 +8,9 @@ import traceback
 from dataclasses import replace
 from urllib.parse import urlsplit
 
+from conformance.mutation.messages import Change, Forward, HangUpError, IncompleteRequest, Request, Response, unchanged
+from conformance.mutation.wire import ClientConnection, IncompleteMessageError, RobotConnection
 from conformance.selftest.addresses import Addresses
-from conformance.selftest.messages import Change, Forward, HangUpError, IncompleteRequest, Request, Response, unchanged
-from conformance.selftest.wire import ClientConnection, IncompleteMessageError, RobotConnection
 
 _IDLE_S = 60.0
 

@@ -155,7 +155,7 @@ def _command(kind: str, domain_id: int, seed: int) -> list[str]:
     if kind == "golang":
         return [str(built(*sorted(folder.glob("*.go")))), str(Path(conformance.contract.__file__).parent)]
     check_installed(*_FRAMEWORKS.get(kind, ()))
-    return [sys.executable, "-m", "conformance.selftest.independent_robots", kind, *ports]
+    return [sys.executable, "-m", "conformance.packs.table1.independent_robots", kind, *ports]
 
 
 def _ready(process: subprocess.Popen[str], kind: str) -> tuple[str, str]:

@@ -15,10 +15,10 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
+from conformance.mutation.changes import JSON, parsed, problem, soap
+from conformance.mutation.messages import Change, Forward, Request, Response, unchanged
+from conformance.mutation.wire import IncompleteMessageError
 from conformance.selftest.link import LINKS, Link
-from conformance.selftest.messages import Change, Forward, Request, Response, unchanged
-from conformance.selftest.mutants.changes import JSON, parsed, problem, soap
-from conformance.selftest.wire import IncompleteMessageError
 
 _PREFIX = "/r2d2/api"
 _TOKEN = "open-sesame"  # noqa: S105 - of a robot that lives for seconds, on loopback

@@ -6,17 +6,13 @@ import hashlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.classes import Prerequisite
-from conformance.contract.files import Contract
-from conformance.contract.interfaces import Interface
-from conformance.contract.statement import Statement
+from conformance.contract.pack import Contract
+from conformance.statement.statement import Statement, empty_statement
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
+    from conformance.contract.interfaces import Interface
     from conformance.contract.requirement_sets import RequirementSet
 
 
@@ -62,7 +58,7 @@ class Run:
         cut_short: by check, how many of the cases that were made for it were not tried for want of time.
     """
 
-    statement: Statement = field(default_factory=Statement)
+    statement: Statement = field(default_factory=lambda: empty_statement(Contract.load()))
     contract: Contract = field(default_factory=Contract.load)
     claims: tuple[str, ...] = ()
     allow_motion: bool = False
@@ -90,28 +86,3 @@ class Run:
                 f"cases that were made were not tried: {checks}."
             )
         return tuple(found)
-
-    @property
-    def undeclared(self) -> dict[str, str]:
-        """Why what needs a figure is not judged, by the prerequisite that the statement does not declare."""
-        limits = self.statement.limits
-        kinds = {name.partition(".")[0] for name in self.statement.motion.actuated}
-        declared = {"linear": limits.linear_declared, "angular": limits.angular_declared}
-        there = {
-            Prerequisite.HOLD: limits.hold_s is not None,
-            Prerequisite.LIMITS: all(declared[kind] for kind in kinds),
-        }
-        words = {Prerequisite.HOLD: "hold time", Prerequisite.LIMITS: "limits of speed and turning rate"}
-        return {
-            need: f"not judged: the statement declares no {words[need]}" for need, known in there.items() if not known
-        }
-
-    @property
-    def interfaces(self) -> tuple[Interface, ...]:
-        """The interfaces that the contract describes."""
-        described: Mapping[Interface, Path | None] = {
-            Interface.REST: self.contract.openapi_path,
-            Interface.PUBLISHERS: self.contract.publishers_path,
-            Interface.SUBSCRIBERS: self.contract.subscribers_path,
-        }
-        return tuple(name for name, path in described.items() if path)

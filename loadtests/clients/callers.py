@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import gevent
 
-from conformance.contract.thresholds import ApiStyle
+from conformance.packs.table1.thresholds import ApiStyle
 from loadtests.clients.failures import CallError, answer_error, is_success
 from loadtests.clients.library import LibraryRest, LibrarySoap
 from loadtests.clients.payloads import Values, variants

@@ -18,7 +18,7 @@ from urllib3.connection import HTTPConnection, HTTPSConnection
 from zeep.transports import Transport
 from zeep.wsdl import Document
 
-from conformance.contract.thresholds import Client
+from conformance.packs.table1.thresholds import Client
 from loadtests.clients.failures import CallError, answer_error, connect_error
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from conformance.contract.delivery import COFFEE, COORDINATES, COURIER, EXAMPLE, PATH_NAMES, XSD_FIELDS
+from conformance.packs.table1.delivery import COFFEE, COORDINATES, COURIER, EXAMPLE, PATH_NAMES, XSD_FIELDS
 from loadtests.clients.wire import Request
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.statement import Ros
+from conformance.packs.table1.statement import Ros
 from loadtests.clients.endpoint import Endpoint, tls_context
 from loadtests.clients.payloads import BUILDERS, CATALOGUE, variants
 from loadtests.clients.rosbridge import Bridge, bridge_requests

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from conformance.contract.thresholds import ApiStyle
+from conformance.packs.table1.thresholds import ApiStyle
 from loadtests.clients.library import LIBRARY
 from loadtests.schedule.plan import LIBRARY_RATE, Plan
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import gevent
 import locust  # patches the standard library, which has to come before our modules that use it
 
-from conformance.contract.command import CommandResult
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult
 from loadtests.clients.failures import CallError
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.engine.liveness import Liveness

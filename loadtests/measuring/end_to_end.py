@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import gevent
 import numpy as np
 
-from conformance.contract.delivery import COURIER, EXAMPLE, MESSAGE_FIELDS
+from conformance.packs.table1.delivery import COURIER, EXAMPLE, MESSAGE_FIELDS
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, answer_error
 from loadtests.clients.payloads import BUILDERS

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
-from conformance.contract.delivery import COORDINATES, XSD_FIELDS
+from conformance.packs.table1.delivery import COORDINATES, XSD_FIELDS
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values
 from loadtests.clients.xml_reader import XmlError, parse_xml
 

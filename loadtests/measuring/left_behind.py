@@ -12,7 +12,7 @@ import platform
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.atomic_write import write_atomically
+from conformance.commandline.atomic_write import write_atomically
 from loadtests.statistics.recorder import Recorder
 
 if TYPE_CHECKING:

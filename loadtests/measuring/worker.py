@@ -22,7 +22,7 @@ import gevent
 import locust.runners
 from gevent.event import Event
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 from loadtests.clients.robot import Robot
 from loadtests.measuring.clocks import answer_clock, clock_id
 from loadtests.measuring.executor import REPORT_S, new_environment, now_ns

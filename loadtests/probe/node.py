@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from conformance.contract.delivery import MESSAGE_FIELDS
+from conformance.packs.table1.delivery import MESSAGE_FIELDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

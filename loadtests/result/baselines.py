@@ -9,7 +9,7 @@ import json
 import re
 from pathlib import Path
 
-from conformance.contract.atomic_write import write_atomically
+from conformance.commandline.atomic_write import write_atomically
 
 FOLDER = Path(".roaas", "baselines")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")

@@ -6,7 +6,7 @@ import os
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 from loadtests.clients.library import LIBRARY
 from loadtests.clients.payloads import CATALOGUE
 from loadtests.measuring.command_line import without_folders

@@ -9,7 +9,7 @@ from typing import Any
 
 from hdrh.histogram import HdrHistogram
 
-from conformance.contract.atomic_write import write_atomically
+from conformance.commandline.atomic_write import write_atomically
 
 FORMAT = "roaas-latency/1"
 _TICKS = 5  # percentiles reported for each halving of the distance to 100 %

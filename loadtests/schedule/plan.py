@@ -21,7 +21,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from conformance.contract.thresholds import ApiStyle, Client, Operation
+from conformance.packs.table1.thresholds import ApiStyle, Client, Operation
 
 INTERFACES = tuple(map(str, ApiStyle))
 #: REST and SOAP at once, in steps of the load: every other request goes over the other.

@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.statement import Endpoints, Statement
+from conformance.packs.table1.statement import Statement
+from conformance.statement.statement import Endpoints
 from loadtests.settings.settings import STEP_S, Generator, Repeats, Selection
 
 TOLERANCE = 0.05
 KNEE_SEARCHES = 5
 
 if TYPE_CHECKING:
-    from conformance.contract.thresholds import Threshold
+    from conformance.packs.table1.thresholds import Threshold
 
 
 @dataclass(frozen=True)

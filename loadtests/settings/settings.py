@@ -5,7 +5,7 @@ from typing import Self
 
 import msgspec
 
-from conformance.contract.thresholds import Threshold
+from conformance.packs.table1.thresholds import Threshold
 from loadtests.clients.robot import Robot
 from loadtests.schedule.plan import Load
 

@@ -16,7 +16,8 @@ from loadtests.settings.contradictions import contradiction
 from loadtests.settings.settings import Against, EndToEnd, Limits, Output, Selection, Settings, Steps
 
 if TYPE_CHECKING:
-    from conformance.contract.statement import Endpoints, Statement
+    from conformance.packs.table1.statement import Statement
+    from conformance.statement.statement import Endpoints
     from loadtests.settings.cli_options import CliOptions
 
 DEFAULT_RATE = 200.0

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 from loadtests.statistics.figures import compared, named, pair_s, plain_quantiles, rounded_interval
 from loadtests.statistics.intervals import figure_interval_ms
 from loadtests.statistics.measured import Side

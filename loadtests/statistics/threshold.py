@@ -14,7 +14,7 @@ from loadtests.statistics.rounds import SHARES
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from conformance.contract.thresholds import Threshold
+    from conformance.packs.table1.thresholds import Threshold
     from loadtests.statistics.measured import Measured
 
 _SMALL_CHANCE = 0.025

@@ -36,7 +36,8 @@ def _places(result: Mapping[str, Any], case: Case) -> Iterator[Place]:
     statement, ledger = known.get("statement"), known.get("ledger")
     if statement:
         yield Place(statement["file"], statement["classes"].get(case.class_name, statement["line"]))
-    if ledger and case.name in ledger["lines"]:
-        yield Place(ledger["file"], ledger["lines"][case.name])
+    stated = [one for one in (ledger, known.get("generic_ledger")) if one and case.name in one["lines"]]
+    if stated:
+        yield Place(stated[0]["file"], stated[0]["lines"][case.name])
     elif not statement:
         yield Place(ledger["file"] if ledger else _UNKNOWN, 1)

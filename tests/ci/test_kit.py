@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from conformance.selftest.mutants import MUTANTS
+from conformance.packs.table1.mutants import MUTANTS
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import running
 from reports.attestation.envelope import ENVELOPE_NAME

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from conformance.contract.files import Contract
+from conformance.contract.pack import Contract
 from conformance.engine.suite import suite_digest
 from conformance.selftest.robots import running
 
@@ -124,7 +124,7 @@ def test_a_pytest_run_has_the_checks_where_it_asks_for_them_and_nothing_else(ins
     done = run(installed, tmp_path, *pytest_, "test_own.py")
     assert done.returncode == 0, done.stdout
     assert "--robot-rest" not in run(installed, tmp_path, *pytest_, "--help").stdout
-    checks = ["--pyargs", "conformance.checks.describe", "--collect-only"]
+    checks = ["--pyargs", "conformance.rules.describe", "--collect-only"]
     named = run(installed, tmp_path, *pytest_, "-p", "roaas_pytest", *checks)
     assert "tests collected" in named.stdout
     assert "name a robot: --robot-rest" in named.stderr

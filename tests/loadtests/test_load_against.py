@@ -5,7 +5,7 @@ import re
 import pytest
 from click.testing import CliRunner
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 from loadtests.cli import load as command
 
 FAST = "--rate 150 --duration 3.2 --warmup 0.2 --client wire"

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
 
 
 @pytest.fixture

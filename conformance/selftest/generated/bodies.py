@@ -3,11 +3,11 @@
 import re
 from collections.abc import Callable, Iterator
 
+from conformance.mutation.changes import becomes
+from conformance.mutation.messages import Change, Request, Response
 from conformance.selftest.generated.mutant import GeneratedMutant, Tally, answers, classes_of_answers, in_mode
 from conformance.selftest.generated.operators import single
 from conformance.selftest.generated.places import Exchange
-from conformance.selftest.messages import Change, Request, Response
-from conformance.selftest.mutants.changes import becomes
 
 _SUCCESS = range(200, 300)
 # Makes a mutant of an operation's whole answers, in a mode.

@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterator
 from http import HTTPStatus
 from typing import Any
 
+from conformance.mutation.changes import becomes
+from conformance.mutation.changes import status as status_is
+from conformance.mutation.messages import Request, Response
 from conformance.selftest.generated.mutant import GeneratedMutant, answers, classes_of_answers, in_mode
 from conformance.selftest.generated.places import Exchange
-from conformance.selftest.messages import Request, Response
-from conformance.selftest.mutants.changes import becomes
-from conformance.selftest.mutants.changes import status as status_is
 
 _KNOWN = frozenset(status.value for status in HTTPStatus)
 _SUCCESS = range(200, 300)

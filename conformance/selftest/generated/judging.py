@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from conformance.contract.classes import Level
-from conformance.contract.files import CONTRACT_DIR
-from conformance.contract.ledger import load_ledger
-from conformance.contract.statement import load_statement
+from conformance.contract.pack import Contract
+from conformance.mutation.messages import unchanged
+from conformance.packs.table1.statement import load_robot_statement
 from conformance.selftest.at_once import each_at_once
 from conformance.selftest.certifying import Outcome, run_job
 from conformance.selftest.generated.mutant import GeneratedMutant, Tally
-from conformance.selftest.messages import unchanged
 from conformance.selftest.mutant_run import RobotPool, job_for
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import Robot, statement_of
@@ -75,7 +74,7 @@ def judge(
         seed: of everything random.
         tell: called as each is done.
     """
-    claimed = tuple(load_statement(statement_of(pool.kind)).claimed())
+    claimed = load_robot_statement(statement_of(pool.kind)).claimed(Contract.load())
     blamed = _Blamed(seed)
 
     def one(mutant: GeneratedMutant) -> GeneratedResult:
@@ -126,7 +125,7 @@ def _judge(
 ) -> GeneratedResult:
     result = GeneratedResult(mutant)
     tally = Tally()
-    ledger = load_ledger(CONTRACT_DIR / "requirements.toml")
+    ledger = Contract.load().ledger
     musts = frozenset(id_ for id_, requirement in ledger.items() if requirement.level is Level.MUST)
     given_up = False
     waiting = [(effort, attempt) for effort in efforts for attempt in _attempts(mutant, claimed)]
@@ -163,7 +162,7 @@ def _attempts(mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Att
     """Classes and requirements to judge, one after the other: those about the operation, then whole classes."""
     classes = tuple(class_ for class_ in mutant.classes if class_ in claimed)
     words = {word.lower() for word in _WORD.findall(mutant.exchange.name)}
-    ids = load_ledger(CONTRACT_DIR / "requirements.toml")
+    ids = Contract.load().ledger
     first = tuple(id_ for id_ in ids if id_.split("/")[0] == classes[0]) if classes else ()
     near = tuple(id_ for id_ in first if id_.split("/")[1].split("-")[0] in words)
     types = tuple(id_ for id_ in near if id_.endswith("-type"))

@@ -4,9 +4,9 @@ import json
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from conformance.mutation.messages import Change, Forward, Request, Response
 from conformance.selftest.generated.mutant import GeneratedMutant, Tally
 from conformance.selftest.generated.places import ITEM, Place, places
-from conformance.selftest.messages import Change, Forward, Request, Response
 
 _SUCCESS = range(200, 300)
 

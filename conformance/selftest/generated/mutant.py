@@ -6,11 +6,11 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from conformance.mutation.messages import Change, Forward, Request, Response
+from conformance.mutation.mutant import Mutant
 from conformance.selftest.generated.operators import Operator
 from conformance.selftest.generated.places import Exchange, Place
 from conformance.selftest.generated.slots import edit_message
-from conformance.selftest.messages import Change, Forward, Request, Response
-from conformance.selftest.mutants.mutant import Mutant
 
 _RARE = 20
 _ERROR = 400

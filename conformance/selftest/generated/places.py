@@ -8,13 +8,13 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.contract.files import Contract
+from conformance.contract.pack import Contract
 from conformance.documents import wsdl
 from conformance.documents.json_schema import Schema, kind_of
 from conformance.documents.openapi import PARAMETER, Operation, operations_of
 from conformance.documents.xsd_shapes import Complex, Element
-from conformance.selftest.messages import Request
-from conformance.selftest.mutants.changes import soap
+from conformance.mutation.changes import soap
+from conformance.mutation.messages import Request
 
 ITEM = "[]"
 _NUMBERS = {"double", "float", "decimal"}

@@ -11,8 +11,8 @@ from urllib.parse import parse_qsl, quote, unquote, urlencode
 
 from lxml import etree
 
+from conformance.mutation.messages import Request, Response
 from conformance.selftest.generated.places import ITEM, Place
-from conformance.selftest.messages import Request, Response
 
 # Stands before the name of a member that is to be written twice.
 _AGAIN = "@again@"

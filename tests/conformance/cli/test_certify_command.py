@@ -16,8 +16,9 @@ from urllib.request import urlopen
 import pytest
 
 from conformance import selftest
-from conformance.contract.files import CONTRACT_DIR, Contract
+from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import current, load_set
+from conformance.packs.table1.files import CONTRACT_DIR
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, statement_in
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate
 from reports.attestation.statement import seed_of
@@ -163,7 +164,7 @@ def test_a_first_statement_is_written_and_can_be_used(tmp_path, web_server):
 
 @contextmanager
 def _independent_robot(name):
-    command = [sys.executable, "-m", "conformance.selftest.independent_robots", name]
+    command = [sys.executable, "-m", "conformance.packs.table1.independent_robots", name]
     command += ["--rest-port", "0", "--soap-port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:

@@ -9,7 +9,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from click.testing import CliRunner
 
-from conformance.contract.files import CONTRACT_VERSION
+from conformance.contract.pack import CONTRACT_VERSION
 from conformance.engine.permission import moves
 from conformance.engine.sequence import read_request, written
 from conformance.transport.exchange import Request

@@ -2,8 +2,16 @@
 
 import re
 
-from conformance.contract.delivery import COFFEE, COORDINATES, COURIER, EXAMPLE, MESSAGE_FIELDS, PATH_NAMES, XSD_FIELDS
-from conformance.contract.files import Contract
+from conformance.contract.pack import Contract
+from conformance.packs.table1.delivery import (
+    COFFEE,
+    COORDINATES,
+    COURIER,
+    EXAMPLE,
+    MESSAGE_FIELDS,
+    PATH_NAMES,
+    XSD_FIELDS,
+)
 
 
 def test_the_path_of_the_openapi_description():

@@ -3,8 +3,8 @@
 import pytest
 
 from conformance.contract.classes import CLASSES, PROFILES
-from conformance.contract.files import CONTRACT_DIR, CONTRACT_FILES, GENERIC_CLASSES, Contract, ContractError
 from conformance.contract.ledger import LedgerError, load_ledger
+from conformance.contract.pack import CONTRACT_DIR, CONTRACT_FILES, GENERIC_CLASSES, Contract, ContractError
 
 LEDGER = Contract.load().ledger
 

@@ -3,7 +3,7 @@
 import pytest
 from openapi_spec_validator import OpenAPIV31SpecValidator
 
-from conformance.contract.files import Contract
+from conformance.contract.pack import Contract
 from conformance.documents.json_schema import shape_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import from_element, parse_xml

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from conformance.contract.classes import Level, Origin
-from conformance.contract.files import CONTRACT_DIR, Contract
+from conformance.contract.pack import Contract
 from conformance.contract.sections import cited_in, sections_of
+from conformance.packs.table1.files import CONTRACT_DIR
 
 LEDGER = Contract.load().ledger
 CLAUSES = tomllib.loads((Path(__file__).parents[1] / "data" / "clauses.toml").read_text(encoding="utf-8"))

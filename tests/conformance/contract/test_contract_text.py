@@ -5,9 +5,9 @@ import re
 import pytest
 
 from conformance.contract.classes import CLASSES
-from conformance.contract.files import CONTRACT_DIR, CONTRACT_VERSION, Contract
-from conformance.contract.limits import DeclaredLimits
+from conformance.contract.pack import CONTRACT_DIR, CONTRACT_VERSION, Contract
 from conformance.contract.sections import anchor_of, cited_in, sections_of
+from conformance.packs.table1.limits import DeclaredLimits
 
 TEXT = (CONTRACT_DIR / "contract.md").read_text(encoding="utf-8")
 SECTIONS = sections_of(TEXT)

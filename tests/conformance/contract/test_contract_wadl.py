@@ -1,8 +1,8 @@
 """The contract's two descriptions of REST name the same resources, methods and parameters."""
 
-from conformance.contract.files import Contract
+from conformance.api.rest.description import described_by_wadl, differences
+from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
-from conformance.rest.description import described_by_wadl, differences
 
 CONTRACT = Contract.load()
 

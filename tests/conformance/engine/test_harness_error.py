@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from conformance.contract.files import Contract
-from conformance.contract.statement import Endpoints, Statement
+from conformance.api.rest import calls
+from conformance.contract.pack import Contract
 from conformance.documents.xml_node import Node
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.rest import calls
-from conformance.robot import delivery, delivery_messages
+from conformance.packs.table1.robot import delivery, delivery_messages
 from conformance.selftest.robots import running
+from conformance.statement.statement import Endpoints, Statement
 from conformance.transport import raw
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run

@@ -7,9 +7,9 @@ import time
 import pytest
 
 from conformance.contract.interfaces import Interface
-from conformance.contract.statement import Endpoints, Statement
 from conformance.engine import robot_under_test
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.statement.statement import Endpoints, Statement
 from conformance.transport.client import Connection
 from conformance.verdict.run import Run
 

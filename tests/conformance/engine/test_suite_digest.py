@@ -4,8 +4,9 @@ import shutil
 
 import pytest
 
-from conformance.contract.files import CONTRACT_DIR, Contract
+from conformance.contract.pack import Contract
 from conformance.engine.suite import JUDGING, suite_digest
+from conformance.packs.table1.files import CONTRACT_DIR
 
 _OTHERS = ("fleet", "selftest", "cli")
 

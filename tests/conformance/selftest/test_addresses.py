@@ -1,7 +1,7 @@
 """A robot's own addresses lead to the proxy."""
 
+from conformance.mutation.messages import Request, Response
 from conformance.selftest.addresses import Addresses
-from conformance.selftest.messages import Request, Response
 
 PLAIN = Addresses({"rest": "http://r:1", "soap": "http://r:2"}, {"rest": "http://p:3", "soap": "http://p:4"})
 PREFIXED = Addresses(PLAIN.robot, PLAIN.proxy, "/api")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from conformance.contract.files import Contract, ContractError
+from conformance.contract.pack import Contract, ContractError
 from conformance.selftest.certifying import Job, Outcome, robot_of, run_job
 from conformance.selftest.robots import statement_of
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from conformance.robot.message_shapes import ODOMETRY
+from conformance.packs.table1.faulty_bodies import FAULTY_BODIES
+from conformance.packs.table1.independent_robots.baroque import BUILD
+from conformance.packs.table1.independent_robots.body import Body, pose
+from conformance.packs.table1.robot.message_shapes import ODOMETRY
 from conformance.selftest.certifying import Job, run_job
-from conformance.selftest.faulty_bodies import FAULTY_BODIES
-from conformance.selftest.independent_robots.baroque import BUILD
-from conformance.selftest.independent_robots.body import Body, pose
 from conformance.selftest.robots import running, statement_of
 
 

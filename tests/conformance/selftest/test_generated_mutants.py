@@ -5,9 +5,10 @@ import math
 
 import pytest
 
-from conformance.contract.files import Contract
+from conformance.contract.pack import Contract
 from conformance.documents import wsdl
 from conformance.documents.openapi import operations_of
+from conformance.mutation.messages import Request, Response
 from conformance.selftest.certifying import Outcome
 from conformance.selftest.comparison import SchemathesisResult
 from conformance.selftest.generated import judging
@@ -18,7 +19,6 @@ from conformance.selftest.generated.open_places import RULES
 from conformance.selftest.generated.operators import OPERATORS
 from conformance.selftest.generated.report import document, summary
 from conformance.selftest.generated.sampling import Rate, rate_of, rates_by, sample
-from conformance.selftest.messages import Request, Response
 from conformance.selftest.mutant_run import RobotPool
 from conformance.selftest.report import Report
 

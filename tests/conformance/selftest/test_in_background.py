@@ -4,8 +4,8 @@ import threading
 
 import pytest
 
-from conformance.selftest.mutants.in_background import later
-from conformance.selftest.wire import IncompleteMessageError
+from conformance.mutation.wire import IncompleteMessageError
+from conformance.packs.table1.mutants.in_background import later
 
 
 def test_it_is_done_with_its_arguments():

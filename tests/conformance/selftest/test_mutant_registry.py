@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from conformance.contract.classes import Level
-from conformance.contract.files import CONTRACT_DIR
 from conformance.contract.ledger import load_ledger
+from conformance.packs.table1.files import CONTRACT_DIR
+from conformance.packs.table1.mutants import MUTANTS
 from conformance.selftest import coverage
-from conformance.selftest.mutants import MUTANTS
 
 ROOT = Path(coverage.__file__).parents[2]
 

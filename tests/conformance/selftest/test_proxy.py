@@ -11,9 +11,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from conformance.selftest.independent_robots.plain import serve as plain_robot
-from conformance.selftest.messages import HangUpError, Response
-from conformance.selftest.mutants.changes import altered, becomes, header, instead, plain, rest, rewritten, values
+from conformance.mutation.changes import altered, becomes, header, instead, plain, rest, rewritten, values
+from conformance.mutation.messages import HangUpError, Response
+from conformance.packs.table1.independent_robots.plain import serve as plain_robot
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.variants import VARIANTS, certificate
 

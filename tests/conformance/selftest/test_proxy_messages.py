@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.selftest.messages import Request, Response
+from conformance.mutation.messages import Request, Response
 
 
 def test_fields_are_found_in_any_case_and_altered_in_a_copy_alone():

@@ -2,10 +2,10 @@
 
 import json
 
+from conformance.packs.table1.mutants import MUTANTS
 from conformance.selftest.certifying import Outcome
 from conformance.selftest.controls import ControlResult
 from conformance.selftest.mutant_run import MutantResult
-from conformance.selftest.mutants import MUTANTS
 from conformance.selftest.report import Report
 
 

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from conformance.cli.contract import contract
 from conformance.cli.selftest import selftest
-from conformance.contract.files import CONTRACT_FILES
+from conformance.contract.pack import CONTRACT_FILES
 
 
 def run(command, *words):

@@ -3,10 +3,10 @@
 import pytest
 from lxml import etree
 
-from conformance.selftest.messages import Request
-from conformance.selftest.mutants import soap_responses as edits
-from conformance.selftest.mutants.changes import SOAP, becomes, page
-from conformance.selftest.mutants.xml_trees import each, named, says, tree
+from conformance.mutation.changes import SOAP, becomes, page
+from conformance.mutation.messages import Request
+from conformance.packs.table1.mutants import soap_responses as edits
+from conformance.packs.table1.mutants.xml_trees import each, named, says, tree
 
 ASKED = Request("soap", "POST", "/")
 

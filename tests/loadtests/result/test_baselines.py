@@ -12,8 +12,8 @@ from click.testing import CliRunner
 
 import loadtests.cli
 import roaas
-from conformance.contract.command import CommandResult
-from conformance.contract.exit_codes import ExitCode
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult
 
 EXAMPLE = Path(__file__).parents[2] / "reports" / "data" / "latency-example.json"
 _PAGE = Path(__file__).parents[3] / "docs" / "load.md"

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from conformance.contract.exit_codes import ExitCode
-from conformance.contract.statement import Endpoints, Load, Statement
-from conformance.contract.thresholds import ThresholdsError, load_thresholds
+from conformance.commandline.exit_codes import ExitCode
+from conformance.packs.table1.thresholds import ThresholdsError, load_thresholds
+from conformance.statement.statement import Endpoints, Load, Statement
 from loadtests.cli import load
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.settings import Settings

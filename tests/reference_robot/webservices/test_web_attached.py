@@ -12,7 +12,7 @@ import pytest
 from web_messages import delivery_path, goal, query_envelope, twist
 from web_robot import RosProcess, Served, eventually, ros_environment, running_robot
 
-from conformance.contract.delivery import EXAMPLE
+from conformance.packs.table1.delivery import EXAMPLE
 from reference_robot import ros
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime

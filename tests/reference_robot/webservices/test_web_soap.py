@@ -6,7 +6,7 @@ import zeep
 from lxml import etree
 from web_messages import ENVELOPE, NAMESPACE, delivery_envelope, goal, query_envelope
 
-from conformance.contract.delivery import EXAMPLE
+from conformance.packs.table1.delivery import EXAMPLE
 
 SOAP = "{http://schemas.xmlsoap.org/soap/envelope/}"
 GOOD = delivery_envelope()

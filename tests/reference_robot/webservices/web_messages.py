@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from conformance.contract.delivery import EXAMPLE, PATH_NAMES, XSD_FIELDS
+from conformance.packs.table1.delivery import EXAMPLE, PATH_NAMES, XSD_FIELDS
 
 ENVELOPE = '<s:Envelope xmlns:s="http://schemas.xmlsoap.org/soap/envelope/">{}<s:Body>{}</s:Body></s:Envelope>'
 NAMESPACE = "http://soap.turtlebot.mybot.org/"

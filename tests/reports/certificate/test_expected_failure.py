@@ -17,7 +17,7 @@ def robot() -> Iterator[str]:
     """Yield the REST address of an independent robot."""
     command = [
         sys.executable,
-        *["-m", "conformance.selftest.independent_robots", "plain", "--rest-port=0", "--soap-port=0"],
+        *["-m", "conformance.packs.table1.independent_robots", "plain", "--rest-port=0", "--soap-port=0"],
     ]
     with subprocess.Popen([*command, "--soap-port=0"], stdout=subprocess.PIPE, text=True) as process:
         try:

@@ -10,8 +10,9 @@ import pytest
 from click.testing import CliRunner
 from jsonschema import Draft4Validator, Draft202012Validator
 
-from conformance.contract.files import CONTRACT_DIR, Contract
+from conformance.contract.pack import Contract
 from conformance.contract.places import places
+from conformance.packs.table1.files import CONTRACT_DIR
 from reports.cli.pages import report
 from reports.formats.catalogue import FORMATS
 from reports.formats.source_pages import page_of

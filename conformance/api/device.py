@@ -1,0 +1,104 @@
+"""What a contract pack knows of its device, asked by the generic suite; the defaults know nothing and move nothing."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from conformance.contract.pack import Contract
+    from conformance.documents.wsdl import Operation
+    from conformance.documents.xml_node import Node
+    from conformance.transport.exchange import Listener
+    from conformance.verdict.run import Run
+
+# A RestInterface, a SoapService and a Question: their modules import this one.
+Rest = Any
+Soap = Any
+Question = Any
+
+_SETTLE_S = 2.0
+
+
+class Device:
+    """One device in one run. A pack's plugin module has a class ``Device`` of this kind.
+
+    Attributes:
+        run: what is judged, and by what.
+    """
+
+    #: Whether the device's own values are known, so that no other valid request that moves it is sent.
+    is_known = False
+    #: pytest plugins (names of modules) with the fixtures of the pack's checks.
+    fixtures: tuple[str, ...] = ()
+
+    #: What `--init` writes below the generic tables of a first statement.
+    statement_template: str = ""
+    #: Why `--init` comments out a class although its interfaces answer, by class.
+    doubts: Mapping[str, str] = MappingProxyType({})
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+
+    @property
+    def settle_s(self) -> float:
+        """Time within which the device takes up what it was sent, s."""
+        return _SETTLE_S
+
+    @property
+    def hold_s(self) -> float | None:
+        """Time for which the device keeps what it was sent unless it is sent again, s; None: for ever."""
+        return None
+
+    def fit(self, api: Rest, operation_id: str, value: Any) -> Any:  # noqa: ARG002 - for packs
+        """Return a valid value of an operation (its body, or its parameters by name) that makes sense to the device."""
+        return value
+
+    def marked(self, operation_id: str, value: Any) -> Any:  # noqa: ARG002 - for packs
+        """Return a valid value with a text of the suite's own in it, where the operation has room for one."""
+        return value
+
+    def answers_alike(self, template: str) -> bool:  # noqa: ARG002 - for packs
+        """Return whether a resource's responses to equal requests are equal."""
+        return False
+
+    def is_near(self, place: str, shown: Any, wanted: Any) -> bool:  # noqa: ARG002 - for packs
+        """Return whether a value that is read is the one that was sent, within the device's tolerance."""
+        return bool(shown == wanted)
+
+    def messages(self, service: Soap, operation: Operation) -> Iterator[Node]:  # noqa: ARG002 - for packs
+        """Yield SOAP messages that the device takes, likeliest first; none where the obvious one will do."""
+        return iter(())
+
+    def questions(self, api: Rest) -> Iterable[Question]:  # noqa: ARG002 - for packs
+        """Return requests whose responses only the pack can tell apart."""
+        return ()
+
+    def observers(self, api: Rest) -> Iterable[Listener]:  # noqa: ARG002 - for packs
+        """Return what judges every exchange of the run."""
+        return ()
+
+    def halt(self, api: Rest) -> None:
+        """Stop what a request may have set in motion, without waiting until the device stands still."""
+
+    def bring_to_rest(self, api: Rest) -> str:  # noqa: ARG002 - for packs
+        """Stop the device and wait until it stands still; return why it does not, or an empty text."""
+        return ""
+
+    def leave_at_rest(self, api: Rest) -> None:
+        """Stop the device at the end of a run; never raises, and returns within seconds."""
+
+
+def device_of(run: Run) -> Device:
+    """Return the device of a run, as its contract pack knows it."""
+    plugin = run.contract.plugin
+    found: Device = getattr(plugin, "Device", Device)(run)
+    return found
+
+
+def fixtures_of(contract: Contract) -> tuple[str, ...]:
+    """Return the pytest plugins of a pack."""
+    found: tuple[str, ...] = getattr(contract.plugin, "Device", Device).fixtures
+    return found

@@ -1,0 +1,19 @@
+"""All interfaces of one robot, each of which may be missing."""
+
+from dataclasses import dataclass
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.soap.callable_services import SoapServices
+
+
+@dataclass(frozen=True)
+class Interfaces:
+    """The interfaces that have an address.
+
+    Attributes:
+        rest: or None.
+        soap: the services, each of which may be None.
+    """
+
+    rest: RestInterface | None
+    soap: SoapServices

@@ -1,0 +1,74 @@
+"""Requests that are written by hand and are valid all the same: read back from their octets before they are sent.
+
+h11 stands for the robot's server: what it does not take as one request or several, no robot is sent as valid.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import h11
+
+from conformance.api.rest.validity import require_valid
+from conformance.transport import raw
+from conformance.verdict.evidence import HarnessError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from conformance.api.rest.interface import RestInterface
+
+
+def talk(api: RestInterface, octets: bytes, *, answers: int = 0, refused: bool = False, **how: Any) -> raw.RawAnswer:
+    """Send octets that hold valid requests, and read what comes; see raw.talk().
+
+    Args:
+        api: the robot's REST interface.
+        octets: what to send.
+        answers: stop when so many whole answers to GET have come.
+        refused: whether what they ask for may break the contract; the octets hold whole requests all the same.
+        how: deadline and pauses, as raw.talk() has them.
+
+    Raises:
+        HarnessError: they do not.
+        NoAnswerError: there is no connection.
+    """
+    for request, body in _requests(octets):
+        method, target = request.method.decode(), request.target.decode()
+        if not target.startswith("/"):
+            parts = urlsplit(target)
+            target = parts.path + (f"?{parts.query}" if parts.query else "")
+        fields = dict(request.headers)
+        media_type = fields.get(b"content-type", b"").decode().split(";", 1)[0].strip().lower()
+        below = target.removeprefix(api.client.prefix)
+        if not refused:
+            require_valid(api.run.contract, method, below, media_type, body)
+    return raw.talk(api.client, octets, answers=answers, **how)
+
+
+def _requests(octets: bytes) -> Iterator[tuple[h11.Request, bytes]]:
+    """Each request in some octets, with its content.
+
+    Raises:
+        HarnessError: they are no requests, or not whole.
+    """
+    while octets:
+        server = h11.Connection(h11.SERVER)
+        server.receive_data(octets)
+        request: h11.Request | None = None
+        body = bytearray()
+        try:
+            while not isinstance(event := server.next_event(), h11.EndOfMessage):
+                if isinstance(event, h11.Request):
+                    request = event
+                elif isinstance(event, h11.Data):
+                    body += event.data
+                else:
+                    raise HarnessError(f"{octets[:80]!r} was made as a whole request, and is none")
+        except h11.RemoteProtocolError as error:
+            raise HarnessError(f"{octets[:80]!r} was made as a valid request, and is none: {error}") from error
+        if request is None:
+            raise AssertionError("unreachable: h11 has no content without a request")
+        yield request, bytes(body)
+        octets = server.trailing_data[0]

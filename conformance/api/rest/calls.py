@@ -1,0 +1,169 @@
+"""Requests made from the contract's own examples, made fit for the robot at hand."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import quote
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.validity import require_valid
+from conformance.documents.json_schema import Schema, kind_of
+from conformance.documents.openapi import SAFE, Operation
+from conformance.documents.representation import flat
+from conformance.documents.writing import json_text, text_of, xml_bytes
+from conformance.transport.exchange import Exchange
+
+JSON = "application/json"
+XML = "application/xml"
+_DEPTH = 12
+# What is there again in so many seconds is worth waiting for.
+_MOMENT_S = 2
+
+
+@dataclass(frozen=True)
+class Call:
+    """One request for an operation.
+
+    Attributes:
+        operation: which.
+        values: texts of path and query parameters, by name, before they are percent-encoded.
+        media_type: of the body; empty where there is none.
+        body: octets.
+        value: what the body holds, or None.
+    """
+
+    operation: Operation
+    values: dict[str, str]
+    media_type: str = ""
+    body: bytes = b""
+    value: Any = None
+
+    @property
+    def path(self) -> str:
+        """The target below the base URL, with its query."""
+        path = self.operation.template
+        for item in self.operation.parameter("path"):
+            path = path.replace(f"{{{item.name}}}", quote(self.values.get(item.name, ""), safe=""))
+        query = "&".join(
+            f"{quote(item.name, safe='')}={quote(self.values[item.name], safe='')}"
+            for item in self.operation.parameter("query")
+            if item.name in self.values
+        )
+        return f"{path}?{query}" if query else path
+
+    def having(self, name: str, text: str | None) -> Call:
+        """The same with another text for a parameter, or without it."""
+        values = {key: item for key, item in self.values.items() if key != name}
+        return replace(self, values=values if text is None else {**values, name: text})
+
+    def carrying(self, body: bytes) -> Call:
+        """The same with another body, of whatever kind."""
+        return replace(self, body=body)
+
+    def rewritten(self, api: RestInterface, body: bytes) -> Call:
+        """The same with another valid body.
+
+        Raises:
+            HarnessError: it is not valid by the contract.
+        """
+        require_valid(api.run.contract, self.operation.method, self.path, self.media_type, body)
+        return replace(self, body=body)
+
+    def send(
+        self, api: RestInterface, *headers: tuple[str, str], method: str | None = None, fresh: bool = False
+    ) -> Exchange:
+        """Send it; a read that the robot puts off for a moment (no odometry just now), a few times in a run once more.
+
+        Raises:
+            NoAnswerError: no HTTP response came.
+        """
+        fields = list(headers)
+        names = {name.lower() for name, _ in fields}
+        if self.media_type and "content-type" not in names:
+            fields.append(("Content-Type", self.media_type))
+        asked = method or self.operation.method
+        sent = [pair for pair in fields if pair != ("Content-Type", "")]
+        exchange = api.client.send(asked, self.path, headers=sent, body=self.body, fresh=fresh)
+        after = _put_off(exchange)
+        if asked not in SAFE or after is None or api.waits <= 0:
+            return exchange
+        api.waits -= 1
+        time.sleep(after)
+        return api.client.send(asked, self.path, headers=sent, body=self.body, fresh=fresh)
+
+
+def _put_off(exchange: Exchange) -> int | None:
+    """After how many seconds a robot wants to be asked again (RFC 9110 10.2.3), where it is not long; else None."""
+    after = exchange.response.header("retry-after") or ""
+    put_off = exchange.response.status == HTTPStatus.SERVICE_UNAVAILABLE and after.isdecimal() and after.isascii()
+    return int(after) if put_off and len(after) == 1 and int(after) <= _MOMENT_S else None
+
+
+def example_call(api: RestInterface, operation: Operation, media_type: str = JSON) -> Call:
+    """A valid request for an operation, by the contract's examples.
+
+    Optional query parameters are given where the contract has an example for them.
+
+    Args:
+        api: the robot's REST interface.
+        operation: which.
+        media_type: of the body, where the operation takes one.
+
+    Raises:
+        HarnessError: what was made is not valid by the contract.
+    """
+    call = _example(api, operation, media_type)
+    require_valid(api.run.contract, operation.method, call.path, call.media_type, call.body)
+    return call
+
+
+def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
+    given: dict[str, Any] = {}
+    for item in operation.parameters:
+        if item.where in {"path", "query"} and (item.required or item.examples):
+            given[item.name] = item.examples[0] if item.examples else minimal(item.schema)
+    if given:
+        given = _fitted(api, operation, given)
+    call = Call(operation, {name: text_of(value) for name, value in given.items()})
+    if media_type not in operation.bodies:
+        return call
+    body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
+    plain = [item for item in body.examples if not isinstance(item, str)]
+    value = _fitted(api, operation, plain[0] if plain else minimal(body.schema))
+    if media_type == XML:
+        octets = xml_bytes(value, root_name(operation.bodies[XML].schema) or "value")
+    else:
+        octets = json_text(value).encode()
+    return replace(call, media_type=media_type, body=octets, value=value)
+
+
+def root_name(schema: Schema) -> str:
+    """The name that a schema gives its XML element; empty where it gives none."""
+    return str(schema.get("xml", {}).get("name", ""))
+
+
+def minimal(schema: Schema, depth: int = 0) -> Any:
+    """A small value that a schema allows (patterns aside)."""
+    schema = flat(schema)
+    given = [schema[key] for key in ("example", "const", "default") if key in schema]
+    given += [schema[key][0] for key in ("examples", "enum") if schema.get(key)]
+    if given:
+        return given[0]
+    kind = kind_of(schema)
+    if kind == "object":
+        names = schema.get("required", ()) if depth < _DEPTH else ()
+        return {name: minimal(schema.get("properties", {}).get(name, {}), depth + 1) for name in names}
+    if kind == "array":
+        return [minimal(schema.get("items", {}), depth + 1) for _ in range(schema.get("minItems", 0))]
+    if kind in {"number", "integer"}:
+        least = schema.get("minimum", schema.get("exclusiveMinimum", 0) + (1 if "exclusiveMinimum" in schema else 0))
+        return max(least, min(1, schema.get("maximum", max(least, 1))))
+    return True if kind == "boolean" else "a" * max(1, schema.get("minLength", 1))
+
+
+def _fitted(api: RestInterface, operation: Operation, value: Any) -> Any:
+    """A value made fit for this robot: within its limits, near where it is."""
+    return api.device.fit(api, operation.id, value)

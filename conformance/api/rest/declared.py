@@ -1,0 +1,137 @@
+"""Whether an answer is one that the contract declares for its operation: status, media type, shape, Vary."""
+
+from http import HTTPStatus
+
+from conformance.api.rest.accept import quality
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.request_context import RequestContext
+from conformance.documents.json_schema import Schema, shape_of
+from conformance.documents.openapi import Operation, is_json, is_xml
+from conformance.documents.representation import UnreadableError, read
+from conformance.transport.exchange import Exchange, Response
+
+# RFC 9110 and RFC 6585 give these to any request: authentication, rate, and 5xx, which a requirement of its own judges.
+_ANY_REQUEST = frozenset({401, 429})
+# ... and these to a request that has more in it than method, path and Accept.
+_ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
+_OK, _NO_CONTENT, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 404, 405, 406, 500
+
+
+def judge(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+    """Judge one answer to a request that is for an operation of the contract."""
+    operation = context.operation
+    if operation is None:
+        return
+    if answer.status < _SERVER_ERROR:
+        api.run.judge.check(
+            "http/declared-status",
+            _status_fits(operation, answer, context),
+            exchange,
+            f"a status that the contract declares for {operation.id}: {', '.join(operation.responses)}",
+            found=f"status {answer.status}",
+            cause=f"{operation.id} {answer.status}",
+        )
+    if answer.ok and not context.is_head:
+        _judge_body(api, exchange, answer, context)
+    if answer.ok and operation.method == "GET":
+        _judge_negotiation(api, exchange, answer, context)
+
+
+def _status_fits(operation: Operation, answer: Response, context: RequestContext) -> bool:
+    status = answer.status
+    if status in _ANY_REQUEST or operation.declared(status) is not None:
+        return True
+    if status == _OK and operation.declared(_NO_CONTENT) is not None:
+        return True  # a robot may say 200 for 204
+    if status == _NOT_ACCEPTABLE:
+        return context.accept not in {None, "*/*"}
+    if context.plain and not operation.parameters:
+        return False
+    if status in _ODD_REQUEST:
+        return True
+    # Invalid input may be refused with any 4xx (contract, fine print); 404 only where a value is in the path.
+    has_input = bool(context.request.body or operation.parameters or operation.bodies)
+    elsewhere = status == _NO_METHOD or (status == _NOT_FOUND and not operation.parameter("path"))
+    return has_input and HTTPStatus.BAD_REQUEST <= status < _SERVER_ERROR and not elsewhere
+
+
+def _judge_body(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+    operation = context.operation
+    content = operation.declared(answer.status) if operation else None
+    if operation is None or not content:
+        return
+    if not answer.body:
+        # Only what was asked for has to come: a PUT may be answered without the accepted representation.
+        if operation.method == "GET" and answer.status != _NO_CONTENT:
+            api.run.judge.check(
+                "http/declared-body",
+                holds=False,
+                exchange=exchange,
+                expected=f"a body, as {' or '.join(content)}",
+                found="no body",
+            )
+        return
+    media_type = answer.media_type
+    declared = api.run.judge.check(
+        "http/declared-body",
+        media_type in content,
+        exchange,
+        f"a body as {' or '.join(content)}",
+        found=f"{media_type or 'no media type'}",
+        cause=f"{operation.id} {media_type}",
+    )
+    if declared:
+        _judge_shape(api, exchange, answer, operation, content[media_type])
+
+
+def _judge_shape(
+    api: RestInterface, exchange: Exchange, answer: Response, operation: Operation, schema: Schema
+) -> None:
+    media_type = answer.media_type
+    if is_json(media_type):
+        id_, kind = "http/declared-body", "JSON"
+    elif is_xml(media_type):
+        id_, kind = "rest-formats/xml", "XML"
+    elif media_type == "text/plain" and operation.shape is not None:
+        id_, kind, schema = "rest-formats/text", "YAML", operation.shape
+    else:
+        return
+    try:
+        fault = shape_of(schema).problem(read(media_type, answer.body, schema))
+    except UnreadableError as error:
+        fault = str(error)
+    api.run.judge.check(
+        id_,
+        not fault,
+        exchange,
+        f"{kind} in the shape that the contract declares for {operation.id}",
+        found=fault,
+        cause=f"{operation.id} {kind} {fault.split(':', 1)[0]}",
+    )
+
+
+def _judge_negotiation(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:
+    operation = context.operation
+    if operation is None or not operation.formats:
+        return
+    media_type = answer.media_type
+    if media_type and context.usual:
+        # To send what q=0 rules out breaks a weaker rule than to send what was never named.
+        ruled_out = "q=0" in (context.accept or "").lower().replace(" ", "")
+        api.run.judge.check(
+            "http/q-zero" if ruled_out else "http/not-acceptable",
+            quality(media_type, context.accept) > 0,
+            exchange,
+            f"an acceptable format, or 406 (Accept: {context.accept})",
+            found=f"{answer.status} with {media_type}",
+            cause="not acceptable",
+        )
+    if len(operation.formats) > 1 and not context.is_head:
+        vary = (answer.header("vary") or "").lower()
+        api.run.judge.check(
+            "rest-formats/vary",
+            "*" in vary or "accept" in [name.strip() for name in vary.split(",")],
+            exchange,
+            "Vary: Accept",
+            found=f"Vary: {answer.header('vary')}",
+        )

@@ -1,0 +1,58 @@
+"""Whether what was put is what is then got."""
+
+import math
+import time
+from http import HTTPStatus
+
+from conformance.api.rest.calls import JSON, Call, example_call
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.snapshot import flatten
+from conformance.documents.openapi import operations_of
+from conformance.documents.representation import flattened
+from conformance.transport.pace import Patience
+
+_PAUSE_S = 0.01
+
+
+def reader_of(api: RestInterface, call: Call) -> Call | None:
+    """The GET of the resource that a PUT is for, with the same values in its path."""
+    for operation in operations_of(api.run.contract):
+        if operation.method == "GET" and operation.template == call.operation.template:
+            read = example_call(api, operation)
+            return Call(operation, {**read.values, **call.values})
+    return None
+
+
+def settles_at(api: RestInterface, call: Call) -> str | None:
+    """Wait until GET shows what was put.
+
+    Returns:
+        Empty when it does; what it shows instead when the settle time is over (a quarter more than declared, and half
+        a second for a loaded machine); None where nothing can be compared.
+    """
+    read = reader_of(api, call)
+    if read is None or not isinstance(call.value, dict):
+        return None
+    device = api.device
+    pace = api.client.connection.pace
+    patience = Patience(pace, 1.25 * device.settle_s + 0.5 + 4 * pace.usual_s)
+    wanted = flattened(call.value)
+    every_s = 0.4 * (device.hold_s or math.inf)
+    renew_at = time.monotonic() + every_s
+    while True:
+        shown = flatten(read.send(api, ("Accept", JSON)))
+        if shown["status"] == HTTPStatus.NOT_FOUND:  # what was put has ended since: a goal that was reached
+            return None
+        other = [
+            f"{place} is {shown.get(place, 'nothing')!r} for {value!r}"
+            for place, value in wanted.items()
+            if not place.endswith("[]") and not device.is_near(place, shown.get(place), value)
+        ]
+        if not other:
+            return ""
+        if patience.over:
+            return other[0]
+        if time.monotonic() > renew_at:
+            call.send(api)
+            renew_at = time.monotonic() + every_s
+        time.sleep(_PAUSE_S)

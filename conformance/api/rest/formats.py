@@ -1,0 +1,143 @@
+"""One state in several formats: read each, and compare value by value."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from conformance.api.rest.calls import JSON, Call
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.snapshot import steady
+from conformance.documents.json_schema import Schema
+from conformance.documents.representation import UnreadableError, flattened, read
+from conformance.transport.exchange import Exchange
+
+# A robot at rest jitters; what its formats say otherwise in so many turns in a row is no jitter.
+_TURNS = 10
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """One value that two formats tell differently.
+
+    Attributes:
+        place: which.
+        description: what each says.
+        exchange: the answer that disagrees with JSON.
+    """
+
+    place: str
+    description: str
+    exchange: Exchange
+
+
+# By format and place.
+Found = dict[tuple[str, str], Disagreement]
+
+
+def disagreements(
+    api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
+) -> tuple[list[Disagreement], Exchange]:
+    """Read a resource as JSON, in the other formats, and as JSON again, until all say the same.
+
+    Only what both JSON answers say alike is compared, so that what changes between two reads blames nobody; what
+    differs in every turn, at the same place, is a disagreement.
+
+    Returns:
+        What disagrees in every turn; and the last JSON exchange.
+    """
+    suspects: Found | None = None
+    for _ in range(_TURNS):
+        renew()
+        found, exchange = one_turn(api, call, media_types)
+        suspects = found if suspects is None else {key: item for key, item in found.items() if key in suspects}
+        if not suspects:
+            break
+    return list((suspects or {}).values()), exchange
+
+
+def one_turn(api: RestInterface, call: Call, media_types: list[str]) -> tuple[Found, Exchange]:
+    """Read a resource as JSON, in the other formats, and as JSON again, once.
+
+    Returns:
+        What disagrees, by format and place (nothing where JSON cannot be read, which others judge); and the last JSON
+        exchange.
+    """
+    schema = call.operation.shape or {}
+    first = call.send(api, ("Accept", JSON))
+    others = [(name, call.send(api, ("Accept", name))) for name in media_types]
+    last = call.send(api, ("Accept", JSON))
+    snapshots = [_snapshot(item, JSON, schema) for item in (first, last)]
+    if any(shown is None for shown in snapshots):
+        return {}, last
+    known = steady(shown for shown in snapshots if shown is not None)
+    return {
+        (name, item.place): item
+        for name, other in others
+        for item in _compare(known, snapshots, _snapshot(other, name, schema), name, other)
+    }, last
+
+
+def judge_same_values(
+    api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
+) -> Exchange:
+    """Judge that the formats of a resource agree, where it can be read; give the last JSON exchange.
+
+    Args:
+        api: the robot's REST interface.
+        call: reads the resource.
+        media_types: other than JSON.
+        renew: what keeps the state as it is, before each turn.
+    """
+    found, exchange = disagreements(api, call, media_types, renew)
+    if exchange.response.ok:
+        judge_disagreement(api, call, found[0] if found else None, exchange)
+    return exchange
+
+
+def judge_disagreement(api: RestInterface, call: Call, found: Disagreement | None, exchange: Exchange) -> None:
+    """Judge that the formats of a resource agree."""
+    api.run.judge.check(
+        "rest-formats/same-values",
+        found is None,
+        found.exchange if found else exchange,
+        f"the same values in all formats of {call.operation.template}",
+        found=found.description if found else "",
+        cause=call.operation.id,
+    )
+
+
+def _snapshot(exchange: Exchange, media_type: str, schema: Schema) -> dict[str, Any] | None:
+    answer = exchange.response
+    if not answer.ok or answer.media_type != media_type:
+        return None
+    try:
+        return flattened(read(media_type, answer.body, schema))
+    except UnreadableError:
+        return None
+
+
+def _compare(
+    known: dict[str, Any],
+    snapshots: list[dict[str, Any] | None],
+    other: dict[str, Any] | None,
+    name: str,
+    exchange: Exchange,
+) -> list[Disagreement]:
+    if other is None:
+        return []
+    found = [
+        Disagreement(place, f"{place} is {other.get(place, 'nothing')!r} in {name} and {value!r} in JSON", exchange)
+        for place, value in known.items()
+        if not _same(value, other.get(place, None if value is None else ...))
+    ]
+    everywhere = set().union(*(shown or {} for shown in snapshots))
+    found += [
+        Disagreement(place, f"{place} is {value!r} in {name} and nothing in JSON", exchange)
+        for place, value in other.items()
+        if place not in everywhere
+    ]
+    return found
+
+
+def _same(value: Any, other: Any) -> bool:
+    return type(value) is type(other) and bool(value == other)

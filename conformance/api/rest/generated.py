@@ -1,0 +1,176 @@
+"""Schemathesis as a maker of requests: its cases go through the suite's own client and are judged by the suite.
+
+Its own checks take 5xx for a refusal, and call data negative that is valid once it is on the wire; so what it makes
+is read back from the wire (validity.py) and judged by that.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import requests
+import schemathesis
+from schemathesis import GenerationMode
+from schemathesis.core.result import Ok
+from schemathesis.core.transport import Response as ThesisResponse
+from schemathesis.generation.drivers import CoverageGenerator, ExamplesGenerator
+from schemathesis.generation.feedback import NO_FEEDBACK
+from schemathesis.generation.overrides import Override
+
+from conformance.api.rest.interface import RestInterface
+from conformance.contract.pack import Contract
+from conformance.transport.exchange import Exchange
+
+if TYPE_CHECKING:
+    from hypothesis.strategies import SearchStrategy
+
+_BASE = "http://robot.invalid"
+
+
+@dataclass(frozen=True)
+class GeneratedRequest:
+    """One request that Schemathesis made.
+
+    Attributes:
+        method: as to be sent.
+        target: path and query below the base URL.
+        content_type: whole field; empty where there is none.
+        body: octets.
+    """
+
+    method: str
+    target: str
+    content_type: str
+    body: bytes
+
+    @property
+    def media_type(self) -> str:
+        """Content-Type without parameters."""
+        return self.content_type.split(";", 1)[0].strip().lower()
+
+    def send(self, api: RestInterface) -> Exchange:
+        """Send it through the run's client.
+
+        Raises:
+            NoAnswerError: no HTTP response came.
+        """
+        fields = [("Content-Type", self.content_type)] if self.content_type else []
+        return api.client.send(self.method, self.target, headers=fields, body=self.body)
+
+
+@dataclass(frozen=True)
+class Target:
+    """One operation, as Schemathesis has it.
+
+    Attributes:
+        label: method and path.
+        operation: Schemathesis's own.
+        schema: of the whole contract.
+    """
+
+    label: str
+    operation: Any
+    schema: Any
+
+    @property
+    def has_input(self) -> bool:
+        """Whether there is anything in its requests to vary."""
+        return any(True for _ in self.operation.iter_parameters()) or bool(list(self.operation.body))
+
+    def examples(self) -> Iterator[GeneratedRequest]:
+        """From the contract's examples."""
+        maker = ExamplesGenerator(
+            operation=self.operation, override=Override(), feedback=NO_FEEDBACK, fill_missing=False
+        )
+        yield from _requests(maker)
+
+    def coverage(self) -> Iterator[GeneratedRequest]:
+        """Each constraint of the schemas, from its one side and from the other."""
+        config = self.schema.config.generation_for(operation=self.operation, phase="coverage")
+        maker = CoverageGenerator(
+            operation=self.operation,
+            generation_modes=[GenerationMode.POSITIVE, GenerationMode.NEGATIVE],
+            generation_config=config,
+            auth_storage=None,
+            override=Override(),
+            feedback=NO_FEEDBACK,
+        )
+        yield from _requests(maker)
+
+    def fuzzing(self, *, negative: bool) -> SearchStrategy[GeneratedRequest | None]:
+        """Anything that fits the schemas, or does not; None for what cannot be sent."""
+        mode = GenerationMode.NEGATIVE if negative else GenerationMode.POSITIVE
+        strategy: SearchStrategy[Any] = self.operation.as_strategy(generation_mode=mode)
+        return strategy.map(as_request)
+
+
+def targets(contract: Contract) -> tuple[Target, ...]:
+    """The operations of a contract; those that Schemathesis cannot read are left out.
+
+    Read anew each time: Schemathesis keeps in its schema which cases it has made, and makes some only once.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        schema = schemathesis.openapi.from_dict(contract.openapi)
+        found = []
+        for result in schema.get_all_operations():
+            operation: Any = result.ok() if isinstance(result, Ok) else None
+            if operation is None:
+                continue
+            found.append(Target(operation.label, operation, schema))
+        return tuple(found)
+
+
+def state_machine(document: dict[str, Any]) -> Any:
+    """The state machine that the contract's links make; None where it has none."""
+    from schemathesis.core.errors import NoLinksFound  # noqa: PLC0415 - an internal name, used here alone
+
+    try:
+        return schemathesis.openapi.from_dict(document).as_state_machine()
+    except NoLinksFound:
+        return None
+
+
+def _requests(cases: Any) -> Iterator[GeneratedRequest]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for case in cases:
+            one = as_request(case)
+            if one is not None:
+                yield one
+
+
+def as_request(case: Any) -> GeneratedRequest | None:
+    """A case as it goes over the wire; None where HTTP cannot carry it."""
+    try:
+        given = case.as_transport_kwargs(base_url=_BASE)
+        keys = ("method", "url", "files", "data", "json", "params", "cookies")
+        request = requests.Request(
+            **{key: given[key] for key in keys if key in given}, headers=dict(given.get("headers") or {})
+        ).prepare()
+    except (ValueError, TypeError, requests.RequestException, UnicodeError):
+        return None
+    url = urlsplit(request.url or "")
+    body = request.body or b""
+    if not isinstance(body, str | bytes):
+        return None
+    content_type = str(request.headers.get("Content-Type") or "")
+    target = (url.path or "/") + (f"?{url.query}" if url.query else "")
+    method = str(request.method)
+    if not (content_type.isprintable() and content_type.isascii() and target.isascii() and method.isascii()):
+        return None
+    return GeneratedRequest(method, target, content_type, body.encode() if isinstance(body, str) else body)
+
+
+def as_thesis(exchange: Exchange) -> ThesisResponse:
+    """An answer as Schemathesis's state machine takes it."""
+    answer = exchange.response
+    headers: dict[str, list[str]] = {}
+    for name, value in answer.headers:
+        headers.setdefault(name.lower(), []).append(value)
+    sent = requests.Request(exchange.request.method, exchange.request.url).prepare()
+    return ThesisResponse(answer.status, headers, answer.body, sent, answer.elapsed_ms / 1000, verify=True)

@@ -1,0 +1,93 @@
+"""Random requests made harmless: what a robot accepts of them stays slow, near and seldom."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.calls import JSON, example_call
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.validity import INVALID, VALID, Validity, validity
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation
+from conformance.documents.writing import json_text
+
+if TYPE_CHECKING:
+    # Schemathesis takes a quarter of a second to import, and quick effort does without it.
+    from conformance.api.rest.generated import GeneratedRequest
+
+# How many valid requests of one moving operation are sent: each may start a mission.
+_ACCEPTED = 3
+# The greatest number in an invalid body: a robot that takes it all the same must not run away.
+_SLOW = 0.1
+
+
+class MotionGuard:
+    """Looks at every random request before it is sent.
+
+    Args:
+        api: the robot's REST interface.
+    """
+
+    def __init__(self, api: RestInterface) -> None:
+        self._api = api
+        self._valid: Counter[str] = Counter()
+
+    def admit(self, item: GeneratedRequest) -> GeneratedRequest | None:
+        """The request as it may be sent; None where it may not."""
+        said = self._validity(item)
+        operation = said.operation
+        if operation is None:
+            return item if self._may_reach(item) else None
+        if not allowed(self._api, operation):
+            return None
+        if not operation.motion:
+            return item
+        if said.verdict == VALID:
+            return self._fitted(item, operation)
+        if not self._api.device.is_known:
+            return item
+        # What may be taken with whatever values are in it is not sent to a robot; what must be refused is sent slow.
+        return self._slow(item) if said.verdict == INVALID else None
+
+    def count(self, item: GeneratedRequest, *, accepted: bool) -> None:
+        """Count what was accepted."""
+        operation = self._validity(item).operation
+        if accepted and operation is not None and operation.motion:
+            self._valid[operation.id] += 1
+
+    def _validity(self, item: GeneratedRequest) -> Validity:
+        return validity(self._api.run.contract, item.method, item.target, item.media_type, item.body)
+
+    def _may_reach(self, item: GeneratedRequest) -> bool:
+        """Whether a request for no operation of the contract may be sent: a method that a resource has not."""
+        return self._api.run.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
+
+    def _fitted(self, item: GeneratedRequest, operation: Operation) -> GeneratedRequest | None:
+        """A valid request of a moving operation with the contract's values, fit for this robot; a few of them."""
+        if self._valid[operation.id] >= _ACCEPTED:
+            return None
+        if not self._api.device.is_known:
+            return item
+        call = example_call(self._api, operation, item.media_type or JSON)
+        return replace(item, target=call.path, body=call.body if operation.bodies else item.body)
+
+    def _slow(self, item: GeneratedRequest) -> GeneratedRequest:
+        text = read_json(item.body)
+        if not item.body or text.problem or item.media_type != JSON:
+            return item
+        return replace(item, body=json_text(_slowed(text.value)).encode())
+
+
+def _slowed(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _slowed(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_slowed(item) for item in value]
+    if isinstance(value, float) and abs(value) > _SLOW:
+        return _SLOW
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 1:
+        return 1
+    return value

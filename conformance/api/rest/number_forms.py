@@ -1,0 +1,31 @@
+"""The same JSON with its numbers written otherwise, and integers at the ends of their range."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from conformance.api.rest.mutations import places, replaced, with_options
+from conformance.documents.json_schema import Schema
+from conformance.documents.writing import Token, json_text
+
+_INT32_ENDS = (-(2**31), 2**31 - 1)
+
+
+def with_numbers(value: Any, write: Callable[[float], str]) -> bytes:
+    """JSON whose doubles are written as ``write`` has it; integers and texts stay as they are."""
+
+    def written(item: Any) -> Any:
+        if isinstance(item, dict):
+            return {name: written(part) for name, part in item.items()}
+        if isinstance(item, list):
+            return [written(part) for part in item]
+        return Token(write(item)) if isinstance(item, float) else item
+
+    return json_text(written(value)).encode()
+
+
+def at_integer_ends(value: Any, schema: Schema) -> Iterator[Any]:
+    """The value with each int32 of its optional parts at either end of its range."""
+    for whole, part in with_options(value, schema):
+        for place in places(part.value, part.schema, part.path):
+            if (place.schema.get("minimum"), place.schema.get("maximum")) == _INT32_ENDS:
+                yield from (replaced(whole, place.path, end) for end in _INT32_ENDS)

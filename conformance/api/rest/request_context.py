@@ -1,0 +1,90 @@
+"""What a request makes applicable: its path below the base URL, its operation, and whether it is an unusual one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from conformance.api.rest.accept import accept_of, quality
+from conformance.contract.pack import Contract
+from conformance.documents.openapi import Operation, is_normal, matching
+from conformance.transport.exchange import Request
+
+_USUAL_FIELDS = {
+    "host",
+    "accept",
+    "content-type",
+    "content-length",
+    "transfer-encoding",
+    "authorization",
+    "connection",
+    "user-agent",
+}
+_USUAL_OCTETS = 2000
+
+
+@dataclass(frozen=True)
+class RequestContext:
+    """One request, seen from the contract.
+
+    Attributes:
+        request: as it went out.
+        target: path and query below the base URL.
+        operation: the one that it is for, or None; also where a server may make another path of it.
+    """
+
+    request: Request
+    target: str
+    operation: Operation | None
+
+    @classmethod
+    def of(cls, contract: Contract, base_url: str, request: Request) -> RequestContext | None:
+        """See a request; None where it went elsewhere."""
+        if not request.url.startswith(base_url):
+            return None
+        target = request.url[len(base_url) :]
+        if target and target[0] not in "/?":
+            return None
+        path = target.split("?", 1)[0]
+        return cls(request, target, matching(contract, request.method, path) if is_normal(path) else None)
+
+    @property
+    def is_head(self) -> bool:
+        """Whether the answer has no body because of the method."""
+        return self.request.method == "HEAD"
+
+    @cached_property
+    def accept(self) -> str | None:
+        """The Accept field, or None."""
+        return accept_of(self.request.headers)
+
+    @cached_property
+    def usual(self) -> bool:
+        """Whether nothing in it but parameters and body could be a reason to refuse it."""
+        names = [name.lower() for name, _ in self.request.headers]
+        return (
+            self.request.raw is None
+            and set(names) <= _USUAL_FIELDS
+            and names.count("host") == 1
+            and self.request.size - len(self.request.body) < _USUAL_OCTETS
+        )
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is usual, and has neither parameters nor a body."""
+        return self.usual and "?" not in self.target and not self.request.body
+
+    @cached_property
+    def likes_json(self) -> float:
+        """How much the client wants errors as JSON."""
+        return max(quality("application/json", self.accept), quality("application/problem+json", self.accept))
+
+    @cached_property
+    def likes_xml(self) -> float:
+        """How much the client wants errors as XML."""
+        return max(quality("application/xml", self.accept), quality("application/problem+xml", self.accept))
+
+    @property
+    def names_xml(self) -> bool:
+        """Whether the client asked for XML by name."""
+        return "xml" in (self.accept or "").lower() and self.likes_xml > 0

@@ -1,0 +1,176 @@
+"""Whether a request is valid by the contract, read back from what really goes over the wire."""
+
+import math
+import re
+from dataclasses import dataclass
+from urllib.parse import parse_qsl, unquote
+
+from conformance.contract.pack import Contract
+from conformance.documents.json_schema import Schema, kind_of, shape_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, Parameter, is_json, is_normal, is_xml, matching
+from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
+from conformance.verdict.evidence import HarnessError
+
+VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
+# The contract's grammar of numbers in paths and queries (fine print).
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
+# What no reader takes for a number: nothing, or a letter where none can be.
+_NO_NUMBER = re.compile(r"|.*[A-DF-Za-df-z].*|[eE].*", re.DOTALL)
+# Digits of an integer.
+_BEYOND_EVERY_BOUND = 40
+_RULES = {
+    "required": "json-missing",
+    "additionalProperties": "json-unknown",
+    "unevaluatedProperties": "json-unknown",
+    "type": "json-type",
+}
+
+
+@dataclass(frozen=True)
+class Validity:
+    """What is said of a request.
+
+    Attributes:
+        verdict: valid, invalid, or unclear (then a robot may do as it likes).
+        operation: the one that it is for, or None.
+        requirement: name in class strict-input of what asks for its refusal.
+        why: what is wrong with it.
+    """
+
+    verdict: str
+    operation: Operation | None = None
+    requirement: str = ""
+    why: str = ""
+
+
+def validity(contract: Contract, method: str, target: str, media_type: str, body: bytes) -> Validity:
+    """Judge a request.
+
+    Args:
+        contract: by which.
+        method: as sent.
+        target: path and query below the base URL, as sent.
+        media_type: without parameters; empty where there is none.
+        body: octets.
+    """
+    path, _, query = target.partition("?")
+    operation = matching(contract, method, path)
+    if operation is None or method != operation.method or not is_normal(path):
+        return Validity(UNCLEAR)
+    found = [*_of_path(operation, path), *_of_query(operation, query), _of_body(operation, media_type, body)]
+    for wanted in (UNCLEAR, INVALID):
+        for verdict, requirement, why in found:
+            if verdict == wanted:
+                return Validity(verdict, operation, requirement, why)
+    return Validity(VALID, operation)
+
+
+def require_valid(contract: Contract, method: str, target: str, media_type: str = "", body: bytes = b"") -> None:
+    """See that a request which is to be sent as a valid one is not invalid by the contract.
+
+    Raises:
+        HarnessError: it is; the message says why.
+    """
+    said = validity(contract, method, target, media_type, body)
+    if said.verdict == INVALID:
+        raise HarnessError(f"{method} {target[:200]} was made as a valid request, and is none: {said.why}")
+
+
+_Said = tuple[str, str, str]
+
+
+def _of_path(operation: Operation, path: str) -> list[_Said]:
+    names = re.findall(r"\{([^{}]*)\}", operation.template)
+    pattern = re.compile(re.sub(r"\\\{[^{}]*\\\}", "([^/]*)", re.escape(operation.template)))
+    match = pattern.fullmatch(path)
+    if match is None:
+        return [(UNCLEAR, "", "")]
+    texts = dict(zip(names, match.groups(), strict=True))
+    return [
+        _of_text(item, unquote(texts[item.name]), "path-parameter")
+        for item in operation.parameter("path")
+        if item.name in texts
+    ]
+
+
+def _of_query(operation: Operation, query: str) -> list[_Said]:
+    given = parse_qsl(query, keep_blank_values=True)
+    known = {item.name: item for item in operation.parameter("query")}
+    texts = dict(given)
+    said: list[_Said] = []
+    if len(texts) < len(given) or set(texts) - set(known):
+        said.append((UNCLEAR, "", ""))
+    for name, item in known.items():
+        if name in texts:
+            said.append(_of_text(item, texts[name], "query-parameter"))
+        elif item.required:
+            said.append((INVALID, "query-missing", f"no parameter {name}"))
+    return said
+
+
+def _of_text(parameter: Parameter, text: str, requirement: str) -> _Said:
+    """A parameter's text; near misses of a number are unclear (contract, fine print)."""
+    schema = parameter.schema
+    kind = kind_of(schema)
+    why = f"{text[:40]!r} at {parameter.name}"
+    value: float | int | str = text
+    if kind in {"number", "integer"}:
+        if _NO_NUMBER.fullmatch(text):
+            return INVALID, requirement, why
+        if not (_INTEGER if kind == "integer" else _NUMBER).fullmatch(text):
+            return UNCLEAR, "", ""
+        value = float(text)
+        if not math.isfinite(value):
+            return INVALID, requirement, why
+        value = int(text) if kind == "integer" and len(text) < _BEYOND_EVERY_BOUND else value
+    elif kind != "string" or not text:
+        return UNCLEAR, "", ""
+    return (INVALID, requirement, why) if shape_of(schema).problem(value) else (VALID, "", "")
+
+
+def _of_body(operation: Operation, media_type: str, body: bytes) -> _Said:
+    if not operation.bodies:
+        return (UNCLEAR, "", "") if body else (VALID, "", "")
+    if media_type not in operation.bodies:
+        return UNCLEAR, "", ""
+    schema = operation.bodies[media_type].schema
+    if is_json(media_type):
+        return json_fault(body, schema)
+    if is_xml(media_type):
+        return _xml_fault(body, schema)
+    return UNCLEAR, "", ""
+
+
+def json_fault(body: bytes, schema: Schema) -> _Said:
+    """What is wrong with a JSON body, by the requirement that asks for its refusal."""
+    text = read_json(body)
+    for there, requirement in (
+        (not body.strip(), "json-empty"),
+        (text.encoding, "json-encoding"),
+        (text.non_finite, "json-non-finite"),
+        (text.malformed, "json-malformed"),
+        (text.twice, "json-duplicate"),
+    ):
+        if there:
+            return INVALID, requirement, text.problem or "no body"
+    problem = shape_of(schema).problem(text.value)
+    if not problem:
+        return VALID, "", ""
+    rule, whole = shape_of(schema).broken_rule(text.value)
+    requirement = "json-root" if whole and rule == "type" else _RULES.get(rule, "json-bounds")
+    return INVALID, requirement, problem
+
+
+def _xml_fault(body: bytes, schema: Schema) -> _Said:
+    """What is wrong with an XML body; one that looks right may have more in it, and stays unclear."""
+    try:
+        root = parse_xml(body)
+    except UnreadableError as error:
+        return INVALID, "xml-body", str(error)
+    wanted = schema.get("xml", {}).get("name")
+    if wanted and local_name(root) != wanted:
+        return INVALID, "xml-body", f"the root element {local_name(root)!r}"
+    problem = shape_of(schema).problem(from_element(root, schema))
+    return (INVALID, "xml-body", problem) if problem else (UNCLEAR, "", "")

@@ -1,0 +1,73 @@
+"""Which SOAP services a check may call in this run."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from conformance.api.soap.service import SoapService
+from conformance.contract.interfaces import Interface
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
+
+_NO_MOTION = "the publishers service moves the robot, and --allow-motion was not given"
+
+
+@dataclass
+class SoapServices:
+    """A robot's SOAP services in one run.
+
+    Attributes:
+        run: what is judged, and by what.
+        publishers: the service that acts, or None where it has no address.
+        subscribers: the service that only reads, or None.
+    """
+
+    run: Run
+    publishers: SoapService | None = None
+    subscribers: SoapService | None = None
+
+    @property
+    def there(self) -> dict[Interface, SoapService]:
+        """Those that have an address, the one that acts first."""
+        named = {Interface.PUBLISHERS: self.publishers, Interface.SUBSCRIBERS: self.subscribers}
+        return {name: service for name, service in named.items() if service is not None}
+
+
+def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
+    """The services that may be called, the one that only reads first.
+
+    What was not allowed or does not answer is put down against those of the requirements that need it, so that they are
+    not passed on half of the evidence.
+
+    Raises:
+        pytest.skip.Exception: none may be asked.
+    """
+    found: list[SoapService] = []
+    reasons: list[str] = []
+    for service in reversed(soap.there.values()):
+        if problem := _problem(soap.run, service):
+            reasons.append(problem)
+        else:
+            found.append(service)
+    if not found:
+        pytest.skip("; ".join(reasons) or "no SOAP service has an address")
+    for id_ in ids:
+        requirement = soap.run.contract.ledger.get(id_)
+        for reason in reasons:
+            if requirement is not None and (reason != _NO_MOTION or "motion" in requirement.needs):
+                soap.run.judge.skip(id_, reason)
+    return found
+
+
+def _problem(run: Run, service: SoapService) -> str:
+    """Why a service may not be called; empty where it may."""
+    if service.name == Interface.PUBLISHERS and not run.allow_motion:
+        return _NO_MOTION
+    if service.name in run.unreachable:
+        return f"the robot's {service.name} interface does not answer: {run.unreachable[service.name]}"
+    return f"the contract describes no {service.name} service" if service.contract_wsdl_path is None else ""
+
+
+def repetitions(effort: Effort, standard: int) -> int:
+    """How often to repeat what one time shows already, for the sake of failures that come now and then."""
+    return max(1, round(standard * effort.factor))

@@ -1,0 +1,126 @@
+"""Calling a service, and what its response comes to: accepted, refused, or neither."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, envelope, read
+from conformance.api.soap.service import SoapService
+from conformance.documents.xml_node import Node
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+_SHOWN = 200
+
+
+@dataclass(frozen=True)
+class SoapResponse:
+    """What a service answered.
+
+    Attributes:
+        exchange: request and response.
+        envelope: the message in the response, or None.
+        problem: why there is no message; empty where there is one.
+    """
+
+    exchange: Exchange
+    envelope: Envelope | None
+    problem: str
+
+    @property
+    def status(self) -> int:
+        """HTTP status."""
+        return self.exchange.response.status
+
+    @property
+    def fault(self) -> Fault | None:
+        """The fault, or None."""
+        return self.envelope.fault if self.envelope else None
+
+    @property
+    def code(self) -> str:
+        """The standard code of the fault (SOAP 1.1, 4.4.1); empty without a fault, or with a code of another kind."""
+        return self.fault.standard if self.fault else ""
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the answer says that all is well: 2xx, and no fault."""
+        return self.exchange.response.ok and self.fault is None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the request was accepted: success, said by a message. A page in its place says nothing."""
+        return self.succeeded and self.envelope is not None
+
+    @property
+    def refused(self) -> bool:
+        """Whether the request was refused: by a fault, or by 4xx."""
+        return self.fault is not None or 400 <= self.status < 500  # noqa: PLR2004 - RFC 9110 15.5
+
+    @property
+    def first(self) -> etree._Element | None:
+        """The first child of the response's Body; None without one."""
+        return self.envelope.first if self.envelope else None
+
+    @property
+    def payload(self) -> str | None:
+        """The tag of that child; None without one."""
+        return None if self.first is None else str(self.first.tag)
+
+    def describe(self) -> str:
+        """What came, in words for a finding."""
+        came = f"status {self.status}"
+        if self.fault is not None:
+            return f"{came}, fault {self.fault.code or '(no code)'}: {self.fault.string[:_SHOWN]!r}"
+        if self.envelope is None:
+            return f"{came}, {self.problem}"
+        return f"{came}, {self.payload or 'an empty Body'}"
+
+
+def read_exchange(exchange: Exchange) -> SoapResponse:
+    """What an exchange comes to."""
+    if not exchange.response.body:
+        return SoapResponse(exchange, None, "an empty body")
+    try:
+        return SoapResponse(exchange, read(exchange.response.body), "")
+    except NotSoapError as error:
+        return SoapResponse(exchange, None, str(error))
+
+
+def send(service: SoapService, message: Node | bytes | str, **how: Any) -> SoapResponse:
+    """Send an Envelope, or a document as it is, and read the answer; ``how`` is as SoapService.post() has it.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    if isinstance(message, Node):
+        message = message.written()
+    elif isinstance(message, str):
+        message = message.encode()
+    return read_exchange(service.post(message, **how))
+
+
+def call(service: SoapService, *payload: Node, headers: tuple[Node, ...] | None = None, **how: Any) -> SoapResponse:
+    """Send an envelope of the given children of Body and Header.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    return send(service, envelope(payload, headers), **how)
+
+
+def judge_answer(
+    judge: Judge,
+    requirement: str,
+    holds: bool,  # noqa: FBT001 - as Judge.check()
+    answer: SoapResponse,
+    expected: str,
+    *,
+    cause: str = "",
+) -> bool:
+    """Judge one case by what a service answered, which a finding then describes; see Judge.check()."""
+    return judge.check(requirement, holds, answer.exchange, expected, found=answer.describe(), cause=cause)

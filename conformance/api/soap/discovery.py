@@ -1,0 +1,67 @@
+"""Finding out where a robot's SOAP service is."""
+
+from pathlib import Path
+
+from conformance.api.soap.address import is_http, may_be_followed, soap_address, split
+from conformance.api.soap.published_wsdl import PublishedWsdl, get, obtain
+from conformance.api.soap.service import KnownMessages, SoapService
+from conformance.contract.interfaces import Interface
+from conformance.statement.statement import StatementError
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import NoAnswerError
+
+# How long the address in a WSDL is given to answer before the WSDL's own is taken instead, s.
+_PROBE_S = 3.0
+
+
+def open_service(
+    name: Interface,
+    wsdl: str | None,
+    endpoint: str | None,
+    connection: Connection,
+    contract_wsdl_path: Path | None,
+    known_messages: KnownMessages = lambda _service, _operation: (),
+) -> SoapService:
+    """Find out where a service is. Whatever the robot answers, there is a service to send to afterwards.
+
+    An endpoint that is given wins. Else it is what the WSDL's soap:address says, if that answers; else the WSDL's URL
+    without its query.
+
+    Args:
+        name: ``publishers`` or ``subscribers``.
+        wsdl: URL or file of the robot's WSDL.
+        endpoint: URL of the service.
+        connection: deadline, credentials, ceiling and listeners.
+        contract_wsdl_path: the contract's WSDL of this service.
+        known_messages: messages that a robot of this contract is likely to take.
+
+    Raises:
+        StatementError: what was given names no place: no HTTP URL, a file that cannot be read, or one that names no
+            usable address while no endpoint is given.
+    """
+    for option, url in (("endpoint", endpoint), ("WSDL", wsdl if wsdl and "://" in wsdl else None)):
+        if url is not None and not is_http(url):
+            raise StatementError(f"{name} {option} {url!r} is no http or https URL")
+    published = obtain(name, wsdl, connection)
+    where = endpoint or _located(published, connection)
+    if where is None:
+        raise StatementError(
+            f"{name}: {wsdl} has no soap:address with an http URL; say where the service is with --{name}-endpoint"
+        )
+    base, path = split(where)
+    return SoapService(name, HttpClient(base, connection), path, published, contract_wsdl_path, known_messages)
+
+
+def _located(published: PublishedWsdl, connection: Connection) -> str | None:
+    """Where a service is by its WSDL; None where a file does not say it."""
+    address = soap_address(published.document) if published.document else None
+    if published.url is None:
+        return address if address and is_http(address) else None
+    if address and may_be_followed(address, published.url, with_token=connection.token is not None):
+        try:
+            get(address, connection, timeout_s=min(_PROBE_S, connection.timeout_s))
+        except NoAnswerError:
+            pass
+        else:
+            return address
+    return published.url.split("?", 1)[0]

@@ -1,0 +1,121 @@
+"""Messages made from a schema: an ordinary one, and strategies for all valid ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from hypothesis import strategies as st
+
+from conformance.api.soap import forms
+from conformance.documents import xsd_lexical as lexical
+from conformance.documents.xml_names import local
+from conformance.documents.xml_node import Node
+from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
+
+if TYPE_CHECKING:
+    from hypothesis.strategies import SearchStrategy
+
+
+def padded(document: bytes, octets: int) -> bytes:
+    """A document of so many octets: blanks before its last end tag are no part of what it says."""
+    end = document.rindex(b"</")
+    return document[:end] + b" " * (octets - len(document)) + document[end:]
+
+
+def ordinary(element: Element, *, optional: bool = False) -> Node:
+    """One valid message with ordinary values, with optional elements or without.
+
+    An optional element that alone is in its parent is always made: a wrapper without its argument says nothing.
+    """
+    kind = element.type
+    if isinstance(kind, Simple):
+        return Node(element.tag, lexical.plain(kind))
+    attributes = tuple((name, lexical.plain(simple)) for name, simple, required in kind.attributes if required)
+    if kind.text is not None:
+        return Node(element.tag, lexical.plain(kind.text), (), attributes)
+    return Node(element.tag, "", _ordinary(kind.content, optional=optional), attributes)
+
+
+def _ordinary(group: Group | None, *, optional: bool) -> tuple[Node, ...]:
+    if group is None:
+        return ()
+    if group.model == "choice":
+        return _some(group.items[0], optional=optional) if group.items else ()
+    alone = len(group.items) == 1
+    return tuple(node for item in group.items for node in _some(item, optional=optional or alone))
+
+
+def _some(item: Element | Group, *, optional: bool) -> tuple[Node, ...]:
+    count = max(item.minimum, 1 if optional and item.maximum != 0 else 0)
+    made = (ordinary(item, optional=optional),) if isinstance(item, Element) else _ordinary(item, optional=optional)
+    return made * count
+
+
+def filled(element: Element, values: Mapping[str, str]) -> Node:
+    """A message of given values (text by the local name of its element), in the order of the schema.
+
+    Elements without a value are left out, and so are those that would be empty.
+    """
+    children = [filled(child, values) for child in element.children]
+    kept = [child for child in children if child.children or child.name in values]
+    return Node(element.tag, values.get(local(element.tag), ""), tuple(kept))
+
+
+def variants(element: Element, base: Node, fixed: frozenset[tuple[int, ...]] = frozenset()) -> SearchStrategy[Node]:
+    """Valid messages of the same structure as ``base``, with other values.
+
+    Those at ``fixed`` paths are left as they are, because the contract limits them beyond the schema.
+    """
+    leaves = [(path, simple) for path, simple in simple_leaves(element, base) if path not in fixed]
+    if not leaves:
+        return st.just(base)
+
+    def filled(texts: tuple[str, ...]) -> Node:
+        made = base
+        for (path, _), text in zip(leaves, texts, strict=True):
+            made = with_text(made, path, text)
+        return made
+
+    return st.tuples(*(forms.values(simple) for _, simple in leaves)).map(filled)
+
+
+def with_text(node: Node, path: tuple[int, ...], text: str) -> Node:
+    """A copy of a message with another text at a path."""
+    return node.replaced(path, replace(node.at(path), text=text))
+
+
+def declarations(element: Element, node: Node) -> list[tuple[tuple[int, ...], Element]]:
+    """The declaration of each descendant of a valid message, with its path; those that have none are left out."""
+    found: list[tuple[tuple[int, ...], Element]] = []
+    by_tag = {child.tag: child for child in element.children}
+    for index, child in enumerate(node.children):
+        declared = by_tag.get(child.tag)
+        if declared is not None:
+            found.append(((index,), declared))
+            found += [((index, *path), inner) for path, inner in declarations(declared, child)]
+    return found
+
+
+def simple_leaves(element: Element, node: Node) -> list[tuple[tuple[int, ...], Simple]]:
+    """Paths of the values in a valid message, each with its type."""
+    own = [((), element.type)] if isinstance(element.type, Simple) else []
+    return own + [
+        (path, declared.type) for path, declared in declarations(element, node) if isinstance(declared.type, Simple)
+    ]
+
+
+def sequences(element: Element, node: Node) -> list[tuple[int, ...]]:
+    """Paths of the elements of a message whose children have a fixed order."""
+    found: list[tuple[int, ...]] = [()] if _is_sequence(element) else []
+    return found + [path for path, declared in declarations(element, node) if _is_sequence(declared)]
+
+
+def _is_sequence(element: Element) -> bool:
+    return (
+        isinstance(element.type, Complex)
+        and element.type.content is not None
+        and element.type.content.model == "sequence"
+        and element.type.text is None
+    )

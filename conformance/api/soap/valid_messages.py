@@ -1,0 +1,156 @@
+"""Messages that a robot takes: what mutations start from, and what shows that it still answers.
+
+A contract may limit values beyond its schema. So a message is not believed to be valid before the robot has taken it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+from conformance.api.soap.calls import SoapResponse, call
+from conformance.api.soap.envelope import NotSoapError, read_root
+from conformance.api.soap.messages import ordinary, simple_leaves, with_text
+from conformance.api.soap.service import SoapService
+from conformance.documents.wsdl import Operation
+from conformance.documents.xml import NotXmlError, parse
+from conformance.documents.xml_names import XSD, XSI, clark, namespace
+from conformance.documents.xml_node import Node
+from conformance.documents.xsd_lexical import FLOATS, INTEGERS, bounds
+from conformance.documents.xsd_shapes import Element
+from conformance.verdict.evidence import HarnessError
+
+# Whole numbers tried where a contract takes only some, such as codes.
+_NUMBERS: Final = (0, 1, 2, 3, 4, 5)
+
+
+def require_valid_message(service: SoapService, message: Node) -> Node:
+    """See that a message which is to be sent as a valid one is valid by the contract, and give it back.
+
+    Raises:
+        HarnessError: it is not; the message says why.
+        DescriptionError: the contract cannot be used.
+    """
+    fault = service.contract.types.invalid(parse(message.written()))
+    if fault:
+        raise HarnessError(f"{message.name} was made as a valid message, and is none: {fault}")
+    return message
+
+
+def require_valid_document(service: SoapService, document: bytes | str) -> bytes:
+    """See that octets which are to be sent as a valid message are one by the contract, and give them back.
+
+    Raises:
+        HarnessError: they are not; the message says why.
+        DescriptionError: the contract cannot be used.
+    """
+    octets = document.encode() if isinstance(document, str) else document
+    try:
+        # Without comments, by which a value would be in two pieces.
+        message = read_root(parse(octets, comments=False))
+    except (NotXmlError, NotSoapError) as error:
+        raise HarnessError(f"a document was made as a valid message, and is none: {error}") from error
+    faults = [f"{len(message.payload)} children of Body"] if len(message.payload) != 1 else []
+    faults += filter(None, map(service.contract.types.invalid, message.payload))
+    if faults:
+        raise HarnessError(f"a document was made as a valid message, and is none: {faults[0]}")
+    return octets
+
+
+def call_valid(service: SoapService, payload: Node, *, headers: tuple[Node, ...] | None = None) -> SoapResponse:
+    """Call a service by a message that is valid by the contract.
+
+    Raises:
+        HarnessError: it is not.
+        NoAnswerError: no HTTP response came.
+    """
+    return call(service, require_valid_message(service, payload), headers=headers)
+
+
+def example(service: SoapService, operation: Operation) -> Node | None:
+    """A message that the robot takes for the operation, found once; None where it takes none of those tried.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+        DescriptionError: the contract cannot be used.
+        HarnessError: none of those made is valid by the contract.
+    """
+    if operation.name not in service.examples:
+        service.examples[operation.name] = _found(service, operation)
+    return service.examples[operation.name]
+
+
+def _found(service: SoapService, operation: Operation) -> Node | None:
+    declared = service.contract.shape(operation.request) if operation.request else None
+    if declared is None:
+        return None
+    tried: set[bytes] = set()
+    faults: list[str] = []
+    for candidate in candidates(service, operation, declared):
+        document = candidate.written()
+        if document in tried:
+            continue
+        tried.add(document)
+        fault = service.contract.types.invalid(parse(document))
+        if fault:
+            faults.append(fault)
+        elif call(service, candidate).accepted:
+            return candidate
+    if len(faults) == len(tried):
+        raise HarnessError(f"no message made for {operation.name} is valid: {faults[-1]}")
+    return None
+
+
+def candidates(service: SoapService, operation: Operation, declared: Element) -> Iterator[Node]:
+    """Messages of an operation to try, likeliest first, at least one.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    yield from service.known_messages(service, operation)
+    for optional in (False, True):
+        yield ordinary(declared, optional=optional)
+    full = ordinary(declared, optional=True)
+    for number in _NUMBERS:
+        made = full
+        for path, simple in simple_leaves(declared, full):
+            if simple.builtin in FLOATS and not simple.enumeration:
+                made = with_text(made, path, f"{number}.0")
+            elif simple.builtin in INTEGERS and not simple.enumeration:
+                low, high = bounds(simple)
+                made = with_text(made, path, str(min(max(number, low), high)))
+        yield made
+
+
+def quiet_example(service: SoapService) -> tuple[Operation, Node] | None:
+    """The first operation of the service with a message that the robot takes; None where there is none.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+        DescriptionError: the contract cannot be used.
+    """
+    # The operation that asks for least is the one that is least likely to be refused.
+    for operation in sorted(service.contract.operations, key=lambda item: _size(service, item)):
+        message = example(service, operation)
+        if message is not None:
+            return operation, message
+    return None
+
+
+def _size(service: SoapService, operation: Operation) -> int:
+    declared = service.contract.shape(operation.request) if operation.request else None
+    return len(ordinary(declared, optional=True).paths()) if declared is not None else 1000
+
+
+def typed(message: Node, declared: Element, payload: Node) -> bytes:
+    """A message in which each value of the payload says its type by xsi:type, as RPC-encoded SOAP did."""
+    made = payload
+    for path, simple in simple_leaves(declared, payload):
+        if path:
+            attribute = (clark(XSI, "type"), f"xs:{simple.builtin}")
+            made = made.replaced(path, replace(made.at(path), attributes=(attribute,)))
+    if made == payload:
+        made = replace(payload, attributes=((clark(XSI, "type"), f"tns:{payload.name}"),))
+    body = message.children[-1]
+    whole = replace(message, children=(*message.children[:-1], replace(body, children=(made,))))
+    bindings = f' xmlns:xs="{XSD}" xmlns:tns="{namespace(payload.tag)}" xmlns:'.encode()
+    return whole.written().replace(b" xmlns:", bindings, 1)

@@ -1,0 +1,340 @@
+"""Contract packs: a folder with a contract's text, its descriptions, its ledger, and what judges a device by it.
+
+A pack is found by its name (a folder of ``conformance/packs``, or an installed package's entry point in the group
+``roaas.packs``) or by its folder. A folder with nothing but descriptions is a pack too: a device with such a
+description is judged by what binds every web API.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import yaml
+
+from conformance.contract.classes import FULL, ConformanceClass
+from conformance.contract.interfaces import Interface
+from conformance.contract.ledger import LedgerError, Requirement, load_ledger
+from conformance.contract.sections import TEXT_NAME, Section, cited_in, sections_of
+from conformance.contract.toml_file import Text, TomlFileError, read_toml
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+#: The pack that is used where none is named.
+DEFAULT_PACK = "table1"
+ENTRY_POINTS = "roaas.packs"
+MANIFEST, LEDGER = "pack.toml", "requirements.toml"
+_SUITE = Path(__file__).parents[1]
+_BUILT_IN = _SUITE / "packs"
+#: What judges any web API: its classes, its ledger, its checks.
+GENERIC_RULES = _SUITE / "rules"
+# libyaml, where PyYAML was built with it, is ten times as fast: a third of a second of each run.
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_OPENAPI_NAMES = ("openapi.yaml", "openapi.yml", "openapi.json")
+
+
+class ContractError(TomlFileError):
+    """A contract pack that cannot be used; the message names the file and what is wrong with it."""
+
+
+class _Class(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    name: Text
+    title: Text | None = None
+    interfaces: tuple[Interface, ...] | None = None
+    one_is_enough: bool = False
+
+
+class _Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """``pack.toml``."""
+
+    name: Text
+    version: Text
+    title: Text
+    class_: tuple[_Class, ...] = msgspec.field(name="class")
+    plugin: Text | None = None
+    profiles: dict[str, tuple[str, ...]] = {}
+
+
+class _Classes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """``rules/classes.toml``."""
+
+    class_: tuple[_Class, ...] = msgspec.field(name="class")
+
+
+@dataclass(frozen=True)
+class Contract:
+    """One contract pack.
+
+    Attributes:
+        directory: the pack's folder.
+        openapi_path: the OpenAPI description, or None where the contract has no REST side.
+        wadl_path: the WADL, or None.
+        publishers_path: the WSDL of the service that acts, or None.
+        subscribers_path: the WSDL of the service that only reads, or None.
+        only: ids of the requirements to judge by, so that other checks do not run; empty: all.
+        manifest: what its ``pack.toml`` says; None: the folder has none.
+    """
+
+    directory: Path
+    openapi_path: Path | None
+    wadl_path: Path | None
+    publishers_path: Path | None
+    subscribers_path: Path | None
+    only: tuple[str, ...] = ()
+    manifest: _Manifest | None = field(default=None, repr=False)
+
+    @classmethod
+    @cache  # reading openapi.yaml takes a third of a second
+    def load(cls, pack: Path | str = DEFAULT_PACK, *, only: tuple[str, ...] = ()) -> Contract:
+        """Return the pack of a name or in a folder.
+
+        Of its files, ``openapi.yaml`` (or .yml, .json), one ``*.wadl``, and at most two ``*.wsdl`` describe the device:
+        the WSDL whose name holds "subscriber" is of the service that only reads, the other one of the service that acts.
+
+        Raises:
+            ContractError: there is no such pack, or nothing in it describes an interface, or too much does.
+        """
+        directory = _folder(pack)
+        openapi = next((directory / name for name in _OPENAPI_NAMES if (directory / name).is_file()), None)
+        wsdls = sorted(directory.glob("*.wsdl"))
+        reading = [path for path in wsdls if "subscriber" in path.name.lower()]
+        acting = [path for path in wsdls if path not in reading]
+        if openapi is None and not wsdls:
+            raise ContractError(f"{directory} describes nothing: it has neither {_OPENAPI_NAMES[0]} nor a *.wsdl")
+        for kind, found in (("services that act", acting), ("services that only read", reading)):
+            if len(found) > 1:
+                names = ", ".join(path.name for path in found)
+                raise ContractError(f"{directory} has more than one WSDL of {kind}: {names}")
+        manifest = directory / MANIFEST
+        return cls(
+            directory,
+            openapi,
+            next(iter(sorted(directory.glob("*.wadl"))), None),
+            acting[0] if acting else None,
+            reading[0] if reading else None,
+            only,
+            read_toml(manifest, _Manifest, ContractError) if manifest.is_file() else None,
+        )
+
+    @property
+    def name(self) -> str:
+        """The pack's name; of a folder without a manifest, the folder's."""
+        return self.manifest.name if self.manifest else self.directory.resolve().name
+
+    @property
+    def version(self) -> str:
+        """The contract's version; empty where there is no manifest."""
+        return self.manifest.version if self.manifest else ""
+
+    @property
+    def title(self) -> str:
+        """What a robot that keeps this contract is said to conform to."""
+        return self.manifest.title if self.manifest else self.name
+
+    @property
+    def label(self) -> str:
+        """The name by which results know the contract: the version of the suite's own, else name and version."""
+        if self.name == DEFAULT_PACK:
+            return self.version
+        return f"{self.name} {self.version}" if self.manifest else f"own ({self.name})"
+
+    @cached_property
+    def classes(self) -> dict[str, ConformanceClass]:
+        """The conformance classes, by name, in the manifest's order; without a manifest, all of the generic suite.
+
+        Raises:
+            ContractError: a class is neither declared with its interfaces nor one of the generic suite's.
+        """
+        generic = generic_classes()
+        if self.manifest is None:
+            return generic
+        found: dict[str, ConformanceClass] = {}
+        for entry in self.manifest.class_:
+            known = generic.get(entry.name)
+            if known is None and (entry.interfaces is None or entry.title is None):
+                raise ContractError(
+                    f"{self.directory / MANIFEST}: class {entry.name!r} needs title and interfaces; "
+                    f"those that need none are {', '.join(generic)}"
+                )
+            interfaces = entry.interfaces or (known.interfaces if known else ())
+            enough = known.one_is_enough if known else entry.one_is_enough
+            found[entry.name] = ConformanceClass(entry.name, entry.title or known.title, interfaces, enough)  # type: ignore[union-attr] # checked above
+        return found
+
+    @cached_property
+    def profiles(self) -> dict[str, tuple[str, ...]]:
+        """The classes that each profile claims; "full" claims all.
+
+        Raises:
+            ContractError: a profile names no class of the pack.
+        """
+        named = self.manifest.profiles if self.manifest else {}
+        for profile, classes in named.items():
+            for name in set(classes) - set(self.classes):
+                raise ContractError(
+                    f"{self.directory / MANIFEST}: profile {profile!r} names {name!r}, which is no class"
+                )
+        return {**named, FULL: tuple(self.classes)}
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """The interfaces that the contract describes."""
+        described = {
+            Interface.REST: self.openapi_path,
+            Interface.PUBLISHERS: self.publishers_path,
+            Interface.SUBSCRIBERS: self.subscribers_path,
+        }
+        return tuple(name for name, path in described.items() if path)
+
+    @cached_property
+    def openapi(self) -> dict[str, Any]:
+        """The OpenAPI document; empty where there is none.
+
+        Raises:
+            ContractError: the file is neither YAML nor JSON, or no object.
+        """
+        if self.openapi_path is None:
+            return {}
+        try:
+            document = yaml.load(self.openapi_path.read_text(encoding="utf-8"), _LOADER)  # noqa: S506 - a safe one
+        except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
+            raise ContractError(f"{self.openapi_path} cannot be read: {error}") from error
+        if not isinstance(document, dict) or "paths" not in document:
+            raise ContractError(f"{self.openapi_path} is no OpenAPI description: it has no 'paths'")
+        # Through JSON, so that YAML's dates and sharing are gone and what is left is what a device can be asked for.
+        plain: dict[str, Any] = json.loads(json.dumps(document, default=str))
+        return plain
+
+    @cached_property
+    def ledger(self) -> dict[str, Requirement]:
+        """The requirements that apply, by id, class by class: the generic suite's first, then the pack's own.
+
+        Raises:
+            ContractError: a ledger cannot be read, states an id twice, or lacks one of ``only``.
+        """
+        generic = {id_: item for id_, item in generic_ledger().items() if item.class_ in self.classes}
+        own: dict[str, Requirement] = {}
+        path = self.directory / LEDGER
+        if path.is_file():
+            try:
+                own = load_ledger(path, self.classes)
+            except LedgerError as error:
+                raise ContractError(str(error)) from error
+        if twice := sorted(set(own) & set(generic)):
+            raise ContractError(f"{path}: {twice[0]} is a requirement of the generic suite already")
+        both = {**generic, **own}
+        if unknown := set(self.only) - set(both):
+            raise ContractError(f"{self.name} has no requirement {min(unknown)!r}")
+        ranked = sorted(both.values(), key=lambda item: list(self.classes).index(item.class_))
+        return {item.id: item for item in ranked if not self.only or item.id in self.only}
+
+    @cached_property
+    def cited_sections(self) -> dict[str, Section]:
+        """The sections of the contract's text that its requirements cite, by anchor.
+
+        Raises:
+            ContractError: the text cannot be read.
+        """
+        path = self.directory / TEXT_NAME
+        if not path.is_file():
+            return {}
+        try:
+            sections = sections_of(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise ContractError(f"{path} cannot be read: {error}") from error
+        cited = cited_in(requirement.source for requirement in self.ledger.values())
+        return {anchor: section for anchor, section in sections.items() if anchor in cited}
+
+    @cached_property
+    def plugin(self) -> ModuleType | None:
+        """The pack's Python module, which knows its device; None where it has none.
+
+        Raises:
+            ContractError: it cannot be imported.
+        """
+        if self.manifest is None or self.manifest.plugin is None:
+            return None
+        named = self.manifest.plugin
+        try:
+            return _module_of(self.directory / named) if named.endswith(".py") else import_module(named)
+        except (ImportError, OSError, SyntaxError) as error:
+            raise ContractError(
+                f"{self.directory / MANIFEST}: the plugin {named} cannot be imported: {error}"
+            ) from error
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that make up the contract: all in the pack's folder but Python modules."""
+        return tuple(sorted(path for path in self.directory.iterdir() if path.is_file() and path.suffix != ".py"))
+
+    @property
+    def rules(self) -> tuple[Path, ...]:
+        """The folders with the checks that judge by this contract: the generic suite's, then the pack's own."""
+        own = self.directory / "rules"
+        return (GENERIC_RULES, own) if own.is_dir() else (GENERIC_RULES,)
+
+
+def built_in_packs() -> tuple[str, ...]:
+    """Return the names of the packs that come with the suite."""
+    return tuple(sorted(path.parent.name for path in _BUILT_IN.glob(f"*/{MANIFEST}")))
+
+
+@cache
+def generic_classes() -> dict[str, ConformanceClass]:
+    """Return the conformance classes that any web API can be judged by, by name."""
+    entries = read_toml(GENERIC_RULES / "classes.toml", _Classes, ContractError).class_
+    return {
+        item.name: ConformanceClass(item.name, item.title or "", item.interfaces or (), item.one_is_enough)
+        for item in entries
+    }
+
+
+@cache
+def generic_ledger() -> dict[str, Requirement]:
+    """Return the requirements that bind every web API, by id."""
+    return load_ledger(GENERIC_RULES / LEDGER, generic_classes())
+
+
+def _folder(pack: Path | str) -> Path:
+    """Return the folder of a pack.
+
+    Raises:
+        ContractError: there is none.
+    """
+    name = str(pack)
+    if name in built_in_packs():
+        return _BUILT_IN / name
+    if Path(pack).is_dir():
+        return Path(pack)
+    for entry in entry_points(group=ENTRY_POINTS, name=name):
+        found = importlib.util.find_spec(entry.module)
+        if found is not None and found.submodule_search_locations:
+            return Path(next(iter(found.submodule_search_locations)))
+    installed = sorted(entry.name for entry in entry_points(group=ENTRY_POINTS))
+    raise ContractError(
+        f"{name} is neither a folder nor a contract pack; --contract takes a folder with openapi.yaml and/or *.wsdl "
+        f"in it, or one of {', '.join([*built_in_packs(), *installed])}"
+    )
+
+
+def _module_of(path: Path) -> ModuleType:
+    """Import a module from its file, once in a process."""
+    name = f"roaas_pack_{path.resolve().parent.name}_{path.stem}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} is no Python module")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module

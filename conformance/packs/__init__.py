@@ -1,0 +1,1 @@
+"""The contract packs that come with the suite, one folder each."""

@@ -1,0 +1,133 @@
+"""Bodies that say where they are, how fast, or when, otherwise than it is."""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from conformance.packs.table1.independent_robots.body import Body, stamp, twist, wrapped
+
+_Message = dict[str, Any]
+
+
+def _saying(changed: Callable[[_Message, float], None]) -> type[Body]:
+    """A body whose odometry is changed, given how long it has run, s."""
+
+    class Saying(Body):
+        def __post_init__(self) -> None:
+            super().__post_init__()
+            self._born = time.time()
+
+        def odometry(self) -> _Message:
+            """See Body."""
+            message = super().odometry()
+            changed(message, time.time() - self._born)
+            return message
+
+    return Saying
+
+
+def _timed(off: Callable[[float, float], float]) -> type[Body]:
+    """A body whose stamps are off by so many seconds, given the time and how long it has run, s."""
+
+    def changed(message: _Message, age: float) -> None:
+        shown = message["header"]["stamp"]
+        now = shown["sec"] + shown["nanosec"] / 1e9
+        message["header"]["stamp"] = stamp(now + off(now, age))
+
+    return _saying(changed)
+
+
+def _micro(message: _Message, _age: float) -> None:
+    message["header"]["stamp"]["nanosec"] //= 1000
+
+
+def _long(message: _Message, _age: float) -> None:
+    orientation = message["pose"]["pose"]["orientation"]
+    for axis in orientation:
+        orientation[axis] *= 1.004
+
+
+class _Late:
+    """What was read some time ago."""
+
+    def __init__(self, late_s: float) -> None:
+        self._late_s = late_s
+        self._read: deque[tuple[float, _Message]] = deque()
+
+    def of(self, message: _Message) -> _Message:
+        """The message of then, given that of now."""
+        now = time.time()
+        self._read.append((now, message))
+        while len(self._read) > 1 and self._read[1][0] < now - self._late_s:
+            self._read.popleft()
+        return self._read[0][1]
+
+
+class _LateOdometry(Body):
+    """Says where it was 0.7 s ago."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._late = _Late(0.7)
+
+    def odometry(self) -> _Message:
+        """See Body."""
+        return self._late.of(super().odometry())
+
+
+class _LateVelocity(Body):
+    """Says how fast it was half a second ago."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._late = _Late(0.5)
+
+    def velocity(self) -> _Message:
+        """See Body."""
+        return self._late.of(super().velocity())
+
+
+class _CommandedVelocity(Body):
+    """Says the velocity that it was asked for, not the one that it has."""
+
+    def velocity(self) -> _Message:
+        """See Body."""
+        with self._lock:
+            self._advance()
+            held = self._until > self._tick
+            return twist(*(self._command if held else (self._state.v, self._state.w)))
+
+
+class _ScaledBack(Body):
+    """Moves a third farther than its velocity says, backwards."""
+
+    def _advance(self) -> None:
+        x, y = self._state.x, self._state.y
+        super()._advance()
+        if self._state.v < 0:
+            self._state.x += 0.3 * (self._state.x - x)
+            self._state.y += 0.3 * (self._state.y - y)
+
+
+class _ScaledYaw(Body):
+    """Turns a quarter farther than its velocity says."""
+
+    def _advance(self) -> None:
+        yaw = self._state.yaw
+        super()._advance()
+        self._state.yaw = wrapped(self._state.yaw + 0.25 * wrapped(self._state.yaw - yaw))
+
+
+READINGS: dict[str, type[Body]] = {
+    "clock-fast": _timed(lambda _now, age: 0.15 * age),
+    "clock-slow": _timed(lambda _now, age: -0.2 * age),
+    "clock-steps-back": _timed(lambda now, _age: -0.4 if int(now) % 3 == 0 else 0.0),
+    "nanosec-is-microseconds": _saying(_micro),
+    "quaternion-long": _saying(_long),
+    "odometry-late": _LateOdometry,
+    "velocity-late": _LateVelocity,
+    "velocity-commanded": _CommandedVelocity,
+    "back-scaled": _ScaledBack,
+    "yaw-scaled": _ScaledYaw,
+}

@@ -1,0 +1,87 @@
+"""Bodies that take a velocity and drive another one, or that one for another time."""
+
+import math
+from collections.abc import Callable
+
+from conformance.packs.table1.independent_robots.body import TICK_S, Body
+
+# What a body makes of the velocity that it was asked for (linear, angular).
+_Driven = Callable[[float, float], tuple[float, float]]
+
+
+def _holding(factor: Callable[[float, float | None], float]) -> type[Body]:
+    """A body that holds a velocity so many times as long as it should; the angular part is None for a linear PUT."""
+
+    class Holding(Body):
+        def drive(self, v: float, w: float | None) -> float:
+            """See Body."""
+            with self._lock:
+                kept = super().drive(v, w)
+                self._until = self._tick + round(factor(v, w) * self.build.hold_s / TICK_S)
+                return kept
+
+    return Holding
+
+
+class _RenewedByChange(Body):
+    """Takes the same velocity for the same command: it renews nothing."""
+
+    def drive(self, v: float, w: float | None) -> float:
+        """See Body."""
+        with self._lock:
+            self._advance()
+            before, until = self._command, self._until
+            kept = super().drive(v, w)
+            if before == self._command and until > self._tick:
+                self._until = until
+            return kept
+
+
+def _driving(driven: _Driven) -> type[Body]:
+    """A body that drives another velocity than it was asked to, where no goal is active."""
+
+    class Driving(Body):
+        def _aim(self) -> tuple[float, float]:
+            commanded = self.goal is None
+            aim = super()._aim()
+            return driven(*aim) if commanded else aim
+
+    return Driving
+
+
+class _SlowReversal(Body):
+    """Hardly brakes when it is asked to turn round."""
+
+    def _aim(self) -> tuple[float, float]:
+        commanded, now = self.goal is None, self._state.v
+        v, w = super()._aim()
+        if commanded and v * now < 0 and abs(v - now) > 0.4:  # noqa: PLR2004 - m/s
+            return now - math.copysign(0.001, now), w
+        return v, w
+
+
+_LINEAR, _ANGULAR = 0.25, 1.2  # what is fast for the robot, m/s and rad/s
+_SLOW, _SLOW_TURN = 0.1, 0.6
+_DEAD, _DEAD_TURN = 0.06, 0.25  # what is too slow for its motors
+_STEP = 0.1
+_MOST_BACK, _MOST_TURN = 0.2, 1.3
+
+VELOCITIES: dict[str, type[Body]] = {
+    "hold-long": _holding(lambda _v, _w: 1.7),
+    "hold-short": _holding(lambda _v, _w: 0.7),
+    "hold-long-linear": _holding(lambda v, w: 2.0 if v and w is None else 1.0),
+    "hold-forever-linear": _holding(lambda v, w: 40.0 if v and w is None else 1.0),
+    "hold-long-slow": _holding(lambda v, w: 2.0 if w and abs(w) < _SLOW_TURN and abs(v) < _SLOW else 1.0),
+    "hold-short-fast": _holding(lambda v, _w: 0.5 if abs(v) > _LINEAR else 1.0),
+    "renewed-by-change": _RenewedByChange,
+    "back-capped": _driving(lambda v, w: (max(v, -_MOST_BACK), w)),
+    "left-capped": _driving(lambda v, w: (v, min(w, _MOST_TURN))),
+    "right-capped": _driving(lambda v, w: (v, max(w, -_MOST_TURN))),
+    "both-capped": _driving(lambda v, w: (v, 0.6 * w if abs(v) > _LINEAR and abs(w) > _ANGULAR else w)),
+    "deadband": _driving(lambda v, w: (v if abs(v) > _DEAD else 0.0, w)),
+    "deadband-angular": _driving(lambda v, w: (v, w if abs(w) > _DEAD_TURN else 0.0)),
+    "steps": _driving(lambda v, w: (round(v / _STEP) * _STEP, w)),
+    "mirrored-back": _driving(lambda v, w: (v, -w if v < 0 else w)),
+    "drift": _driving(lambda v, w: (v, 0.12 if v and not w else w)),
+    "slow-reversal": _SlowReversal,
+}

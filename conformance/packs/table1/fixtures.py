@@ -1,0 +1,69 @@
+"""What goes along with every check of the paper's robot: its clock, the ROS probe, and the robot itself."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+import pytest
+
+from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.plugin import Device
+from conformance.packs.table1.robot.clock import Clock
+from conformance.packs.table1.robot.probe.client import RosProbe
+from conformance.packs.table1.robot.robot import Robot
+from conformance.packs.table1.robot.standstill import Standstill
+from conformance.packs.table1.robot.stopping import bring_to_rest
+from conformance.packs.table1.statement import said_of
+from conformance.transport.exchange import NoAnswerError
+from conformance.verdict.run import Run
+
+
+@pytest.fixture
+def clock(api: RestInterface) -> Clock:
+    """The robot's clock, read by the way in the whole of the run."""
+    if not isinstance(api.device, Device):
+        raise TypeError("the run judges another kind of device")
+    return api.device.clock
+
+
+@pytest.fixture(scope="session", autouse=True)
+def probe(run: Run) -> Iterator[RosProbe]:
+    """The ROS probe, started before it is needed where a domain is given."""
+    started = RosProbe(said_of(run).ros)
+    started.start()
+    yield started
+    started.close()
+
+
+@pytest.fixture(scope="session")
+def _standstills() -> list[Standstill]:
+    """The one of the run, once it is known that the robot has a REST interface."""
+    return []
+
+
+@pytest.fixture
+def standstill(api: RestInterface, _standstills: list[Standstill]) -> Standstill:
+    """What was tried and has to leave the robot at rest."""
+    if not _standstills:
+        _standstills.append(Standstill(api))
+    return _standstills[0]
+
+
+@pytest.fixture(autouse=True)
+def _looked_at(_standstills: list[Standstill]) -> Iterator[None]:
+    """Behind a check that only reads: the robot stays at rest, where it was tried to move it just before."""
+    yield
+    for one in _standstills:
+        with suppress(NoAnswerError):  # whoever asks next finds that out as well, and judges it
+            one.look()
+
+
+@pytest.fixture
+def robot(request: pytest.FixtureRequest, api: RestInterface, standstill: Standstill) -> Robot:
+    """The robot; at rest for a check that moves it."""
+    if not request.node.get_closest_marker("motion") or standstill.lasts:
+        return Robot(api)
+    standstill.judge()
+    reason = bring_to_rest(api)
+    if reason:
+        pytest.skip(reason)
+    return Robot(api)

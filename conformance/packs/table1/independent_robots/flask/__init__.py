@@ -1,0 +1,31 @@
+"""A robot on Flask behind gunicorn, one process with threads because its state is in memory.
+
+Flask redirects what lacks its slash or has two in a row; gunicorn, with its defaults, refuses heads by pages of its
+own. It takes request lines of 4,094 octets, and what came of a chunked request whose client vanished counts as whole:
+`http/target-length` and `safety/client-vanished`, both SHOULD, warn of that, and the robot conforms all the same.
+"""
+
+import subprocess
+import sys
+from collections.abc import Callable
+
+from conformance.packs.table1.independent_robots.routing import bound
+
+_THREADS = 16
+
+
+def serve(rest_port: int, _soap_port: int) -> tuple[str, str, Callable[[], None]]:
+    """Start the robot. Returns REST's base URL, no WSDL and what stops it."""
+    sock, rest = bound(rest_port)
+    command = [sys.executable, "-m", "gunicorn", "--bind", f"fd://{sock.fileno()}", "--threads", str(_THREADS)]
+    command += ["--log-level", "critical"]
+    command += [f"{__name__}.application:application"]
+    # This interpreter, with arguments made above.
+    process = subprocess.Popen(command, pass_fds=[sock.fileno()])  # noqa: S603
+    sock.close()
+
+    def stop() -> None:
+        process.terminate()
+        process.wait()
+
+    return rest, "", stop

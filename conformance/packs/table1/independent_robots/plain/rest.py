@@ -1,0 +1,295 @@
+"""The resources of Table 1 and the delivery, without the list of deliveries."""
+
+import json
+import re
+from collections.abc import Callable
+from email.message import Message
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl, unquote, urlsplit
+
+import yaml
+
+import conformance.contract
+from conformance.packs.table1.independent_robots.body import Body, BusyError, ConflictError, Goal, NoPlanError, stamp
+from conformance.packs.table1.independent_robots.plain import reading
+from conformance.packs.table1.independent_robots.plain.reading import RefusedError
+from conformance.packs.table1.independent_robots.plain.server import Answer
+from conformance.packs.table1.independent_robots.plain.writing import as_json, choose, element, written
+
+_FRAMES = ("map", "odom")
+# The contract's own descriptions: what a vendor who builds contract-first serves.
+_CONTRACT = Path(conformance.contract.__file__).parent
+SENSORS = [
+    {"name": "lidar", "topic": "/scan", "type": "sensor_msgs/msg/LaserScan"},
+    {"name": "imu", "topic": "/imu", "type": "sensor_msgs/msg/Imu"},
+]
+SERVICES = [
+    {"name": "/get_plan", "type": "nav_msgs/srv/GetPlan"},
+    {"name": "/navigate_to_pose", "type": "nav2_msgs/action/NavigateToPose"},
+]
+_DELIVERY = re.compile(
+    "/robot/app/delivery/([^/]*)/depot_x/([^/]*)/depot_y/([^/]*)/dest_x/([^/]*)/dest_y/([^/]*)"
+    "/source_x/([^/]*)/source_y/([^/]*)"
+)
+_ORDER = ("depot_x", "depot_y", "destination_x", "destination_y", "source_x", "source_y")
+Handler = Callable[[Message, bytes, str], Answer]
+# The path of the delivery, for routers that know parameters in braces.
+DELIVERY = (
+    "/robot/app/delivery/{code}/depot_x/{depot_x}/depot_y/{depot_y}/dest_x/{dest_x}/dest_y/{dest_y}"
+    "/source_x/{source_x}/source_y/{source_y}"
+)
+
+
+class Rest:
+    """Answers REST requests for one body.
+
+    Attributes:
+        resources: by path without parameters, by method: what answers headers, body and target, or raises RefusedError.
+    """
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        get, put, delete = "GET", "PUT", "DELETE"
+        self.resources: dict[str, dict[str, Handler]] = {
+            "/robot/pose/": {get: self._reads("Odometry", body.odometry)},
+            "/robot/velocity/": {get: self._reads("Twist", body.velocity), put: self._put_velocity},
+            "/robot/velocity/linear/": {
+                get: self._reads("Vector3", lambda: body.velocity()["linear"]),
+                put: self._put_linear,
+            },
+            "/robot/sensors/": {get: self._reads("Sensors", lambda: SENSORS)},
+            "/robot/navigation/services/": {get: self._reads("NavigationServices", lambda: SERVICES)},
+            "/robot/navigation/action/goal/": {get: self._get_goal, put: self._put_goal, delete: self._delete_goal},
+            "/robot/navigation/service/plan": {get: self._get_plan},
+            "/openapi.json": {get: self._openapi},
+            "/application.wadl": {get: self._wadl},
+        }
+
+    def answer(self, method: str, target: str, headers: Message, body: bytes) -> Answer:
+        """Answer one request; what is refused becomes a problem."""
+        try:
+            answer = self._answer(method, target, headers, body)
+        except RefusedError as refused:
+            answer = refusal(refused, headers)
+            if refused.status == 405:  # noqa: PLR2004 - RFC 9110 15.5.6
+                answer.fields["Allow"] = ", ".join(self._allowed(target))
+        return answer
+
+    def _methods(self, path: str) -> dict[str, Handler] | None:
+        if path in self.resources:
+            return self.resources[path]
+        return {"PUT": self.deliver} if _DELIVERY.fullmatch(path) else None
+
+    def _allowed(self, target: str) -> list[str]:
+        methods = self._methods(urlsplit(target).path) or {}
+        return [*methods, *(["HEAD"] if "GET" in methods else []), "OPTIONS"]
+
+    def _answer(self, method: str, target: str, headers: Message, body: bytes) -> Answer:
+        if target == "*":
+            return Answer(204, fields={"Allow": "GET, HEAD, PUT, DELETE, OPTIONS"})
+        path, _, query = target.partition("?")
+        methods = self._methods(path)
+        if methods is None:
+            if path + "/" in self.resources:
+                return Answer(308, fields={"Location": path + "/" + ("?" + query if query else "")})
+            raise RefusedError(404, f"there is no {path[:200]!r}")
+        if method == "OPTIONS":
+            return Answer(204, fields={"Allow": ", ".join(self._allowed(target))})
+        handler = methods.get("GET" if method == "HEAD" else method)
+        if handler is None:
+            raise RefusedError(405, f"there is no {method[:40]} here")
+        return handler(headers, body, target)
+
+    def _reads(self, root: str, value: Callable[[], Any]) -> Callable[[Message, bytes, str], Answer]:
+        def read(headers: Message, _body: bytes, _target: str) -> Answer:
+            return _shown(200, value(), root, headers)
+
+        return read
+
+    def _input(self, headers: Message, body: bytes, root: str, shape: Any) -> Any:
+        media_type = headers.get_content_type() if "Content-Type" in headers else ""
+        charset = str(headers.get_param("charset", "utf-8") or "").lower()
+        if media_type not in {"application/json", "application/xml"} or charset not in {"utf-8", "utf8", "us-ascii"}:
+            raise RefusedError(415, f"Content-Type: {headers.get('Content-Type', 'none')!r} is not taken")
+        if media_type == "application/json":
+            return reading.fit(reading.parse_json(body), shape)
+        top = reading.parse_xml(body)
+        if top.name != root:
+            raise RefusedError(422, f"{top.name[:200]!r} is not {root!r}")
+        return reading.fit_element(top, shape, root, ordered=False)
+
+    def _put_velocity(self, headers: Message, body: bytes, _target: str) -> Answer:
+        twist = self._input(headers, body, "Twist", reading.TWIST)
+        for part, axis in (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y")):
+            if twist[part][axis]:
+                raise RefusedError(422, f"{part}.{axis}: {twist[part][axis]!r} cannot be actuated, it must be 0")
+        return self._drive(twist["linear"]["x"], twist["angular"]["z"])
+
+    def _put_linear(self, headers: Message, body: bytes, _target: str) -> Answer:
+        vector = self._input(headers, body, "Vector3", reading.VECTOR3)
+        for axis in ("y", "z"):
+            if vector[axis]:
+                raise RefusedError(422, f"{axis}: {vector[axis]!r} cannot be actuated, it must be 0")
+        return self._drive(vector["x"], None)
+
+    def _drive(self, v: float, w: float | None) -> Answer:
+        limits = self._body.build
+        if abs(v) > limits.linear_m_s:
+            raise RefusedError(422, f"{'x' if w is None else 'linear.x'}: {v!r} is beyond {limits.linear_m_s} m/s")
+        if w is not None and abs(w) > limits.angular_rad_s:
+            raise RefusedError(422, f"angular.z: {w!r} is beyond {limits.angular_rad_s} rad/s")
+        try:
+            self._body.drive(v, w)
+        except BusyError:
+            raise RefusedError(409, "a goal is active") from None
+        return Answer(204)
+
+    def _get_goal(self, headers: Message, _body: bytes, _target: str) -> Answer:
+        goal = self._body.current()
+        if goal is None:
+            raise RefusedError(404, "there is no goal")
+        return _shown(200, goal_value(goal), "MoveBaseActionGoal", headers)
+
+    def _put_goal(self, headers: Message, body: bytes, _target: str) -> Answer:
+        _format(headers)  # before anything is done
+        given = self._input(headers, body, "MoveBaseActionGoal", reading.GOAL)
+        target = given["goal"]["target_pose"]
+        where = "goal.target_pose"
+        frame, q, at = target["header"]["frame_id"], target["pose"]["orientation"], target["pose"]["position"]
+        if frame not in _FRAMES:
+            raise RefusedError(422, f"{where}.header.frame_id: {frame!r} is no frame of this robot")
+        length = sum(part * part for part in q.values()) ** 0.5
+        if not abs(length - 1) <= 1e-3:  # noqa: PLR2004 - contract, fine print
+            raise RefusedError(422, f"{where}.pose.orientation: {json.dumps(q)} is {length!r} long")
+        if not self._body.knows(at["x"], at["y"]):
+            raise RefusedError(422, f"{where}.pose.position: {at['x']!r}, {at['y']!r} is not on the map")
+        try:
+            goal, new = self._body.send(given.get("goal_id", {}).get("id"), target["pose"], frame)
+        except ConflictError:
+            raise RefusedError(409, f"goal_id.id: {given['goal_id']['id']!r} has another pose") from None
+        return _shown(202, goal_value(goal), "MoveBaseActionGoal", headers) if new else Answer(204)
+
+    def _delete_goal(self, _headers: Message, _body: bytes, _target: str) -> Answer:
+        if not self._body.cancel():
+            raise RefusedError(404, "there is no goal")
+        return Answer(204)
+
+    def _get_plan(self, headers: Message, _body: bytes, target: str) -> Answer:
+        given: dict[str, Any] = {}
+        for name, text in parse_qsl(target.partition("?")[2], keep_blank_values=True):
+            kind = reading.PLAN.get(name) or reading.PLAN.get(name + "?")
+            if kind:
+                given[name] = text if kind == "string" else reading.number(text, name)
+        for name in ("x", "y"):
+            if name not in given:
+                raise RefusedError(422, f"{name}: missing in the query")
+        return _shown(200, plan_value(self._body, given), "GetPlan", headers)
+
+    def deliver(self, _headers: Message, _body: bytes, target: str) -> Answer:
+        """Accept a delivery.
+
+        Raises:
+            RefusedError: its path has something that is no number, or no code.
+        """
+        found = _DELIVERY.fullmatch(target.partition("?")[0])
+        code, *texts = [unquote(text) for text in (found.groups() if found else ())]
+        deliver(
+            self._body,
+            "rest",
+            reading.number(code, "code", integer=True),
+            [reading.number(text, name) for name, text in zip(_ORDER, texts, strict=True)],
+        )
+        return Answer(204)
+
+    def _openapi(self, _headers: Message, _body: bytes, _target: str) -> Answer:
+        document = yaml.safe_load((_CONTRACT / "openapi.yaml").read_text(encoding="utf-8"))
+        document["servers"] = [{"url": "/"}]
+        return Answer(200, json.dumps(document, default=str).encode(), "application/json")
+
+    def _wadl(self, headers: Message, _body: bytes, _target: str) -> Answer:
+        wadl = (_CONTRACT / "robot.wadl").read_bytes()
+        host = str(headers.get("Host", "")).encode()
+        return Answer(200, wadl.replace(b"127.0.0.1:7003", host), "application/vnd.sun.wadl+xml")
+
+
+def refusal(refused: RefusedError, headers: Message) -> Answer:
+    """A problem, in XML where the client wants that."""
+    document, fields = {"status": refused.status, "detail": str(refused)}, {"Vary": "Accept"}
+    if choose(_accept(headers)) == "application/xml":
+        document["detail"] = _printable(str(refused))
+        xml = element("problem", document).replace("<problem>", '<problem xmlns="urn:ietf:rfc:7807">', 1)
+        return Answer(refused.status, xml.encode(), "application/problem+xml", fields)
+    return Answer(refused.status, as_json(document), "application/problem+json", fields)
+
+
+def deliver(body: Body, interface: str, code: float, values: list[float]) -> None:
+    """Accept a delivery.
+
+    Raises:
+        RefusedError: there is no such code.
+    """
+    if code not in {3, 4}:
+        raise RefusedError(422, f"code: {code!r} is neither 3 nor 4")
+    body.deliver(interface, message_code=code, **dict(zip(_ORDER, values, strict=True)))
+
+
+def goal_value(goal: Goal) -> dict[str, Any]:
+    """A MoveBaseActionGoal."""
+    since, header = stamp(goal.stamp), {"stamp": stamp(goal.stamp), "frame_id": goal.frame}
+    return {
+        "header": header,
+        "goal_id": {"stamp": since, "id": goal.id},
+        "goal": {"target_pose": {"header": header, "pose": goal.pose}},
+        "status": {"code": 2, "text": ""},
+    }
+
+
+def plan_value(body: Body, given: dict[str, Any]) -> dict[str, Any]:
+    """A GetPlan response.
+
+    Raises:
+        RefusedError: the frame is not known, or there is no plan.
+    """
+    frame = given.get("frame_id", "map")
+    if frame not in _FRAMES:
+        raise RefusedError(422, f"frame_id: {frame!r} is no frame of this robot")
+    if given.get("tolerance", 0.1) < 0:
+        raise RefusedError(422, f"tolerance: {given['tolerance']!r} is negative")
+    start = None
+    if "start_x" in given or "start_y" in given:
+        now = body.odometry()["pose"]["pose"]["position"]
+        start = given.get("start_x", now["x"]), given.get("start_y", now["y"]), given.get("start_yaw", 0.0)
+    try:
+        poses = body.path(start, given["x"], given["y"], given.get("yaw", 0.0))
+    except NoPlanError as none:
+        raise RefusedError(422, str(none)) from None
+    header = {"stamp": body.odometry()["header"]["stamp"], "frame_id": frame}
+    return {"plan": {"header": header, "poses": [{"header": header, "pose": pose} for pose in poses]}}
+
+
+def _format(headers: Message) -> str:
+    """What to answer in.
+
+    Raises:
+        RefusedError: nothing that the client would have.
+    """
+    format_ = choose(_accept(headers))
+    if format_ is None:
+        raise RefusedError(406, f"Accept: {headers.get('Accept')!r} has nothing of this robot's")
+    return format_
+
+
+def _shown(status: int, value: Any, root: str, headers: Message) -> Answer:
+    format_ = _format(headers)
+    media_type = format_ + ("; charset=utf-8" if format_ == "text/plain" else "")
+    return Answer(status, written(value, root, format_), media_type, {"Vary": "Accept"})
+
+
+def _accept(headers: Message) -> str | None:
+    fields = headers.get_all("Accept")
+    return None if fields is None else ", ".join(fields)
+
+
+def _printable(text: str) -> str:
+    return "".join(char if char.isprintable() else "?" for char in text)

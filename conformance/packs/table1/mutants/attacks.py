@@ -1,0 +1,254 @@
+"""Robots that fall for attacks by XML."""
+
+import re
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+from conformance.mutation.changes import Where, instead, plain, posted, rewritten
+from conformance.mutation.messages import Forward, Request, Response
+from conformance.mutation.mutant import of_class
+from conformance.packs.table1.mutants.paths import TNS
+from conformance.packs.table1.mutants.soap_responses import enveloped, fault
+
+_DOCTYPE = re.compile(rb"<!DOCTYPE[^\[>]*(\[.*?\]\s*)?>", re.DOTALL)
+_INTERNAL = re.compile(rb"<!ENTITY\s+([\w.-]+)\s+[\"']([^\"']*)[\"']\s*>")
+_EXTERNAL = re.compile(rb"<!ENTITY\s+([\w.-]+)\s+SYSTEM\s+[\"']([^\"']*)[\"']\s*>")
+_PARAMETER = re.compile(rb"<!ENTITY\s+%\s+[\w.-]+\s+SYSTEM\s+[\"']([^\"']*)[\"']\s*>")
+_EXTERNAL_SUBSET = re.compile(rb"<!DOCTYPE\s+\S+\s+SYSTEM\s+[\"']([^\"']*)[\"']")
+_URL = re.compile(rb"https?://(?:127\.0\.0\.1|localhost|\[::1\])[:/][^\s\"'<>]*")
+_REFERENCE = re.compile(rb"&([\w.-]+);")
+_INSTRUCTION = re.compile(rb"<\?(?!xml\s).*?\?>", re.DOTALL)
+_DONE = enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>')
+_LARGE = 10 * 1024 * 1024
+
+
+def _declared(request: Request) -> bool:
+    return posted(request) and b"<!DOCTYPE" in request.body
+
+
+def _undeclared(request: Request) -> None:
+    request.body = _REFERENCE.sub(
+        lambda found: found[0] if found[1] in {b"lt", b"gt", b"amp", b"quot", b"apos"} else b"1",
+        _DOCTYPE.sub(b"", request.body),
+    )
+
+
+def _plain_doctype(request: Request) -> None:
+    if b"<!ENTITY" not in request.body:
+        request.body = _DOCTYPE.sub(b"", request.body)
+
+
+def _expanded(request: Request) -> None:
+    """Internal entities, a few of them and not nested, are put in their places."""
+    entities = dict(_INTERNAL.findall(request.body))
+    if not entities or len(request.body) > 20_000 or any(b"&" in value for value in entities.values()):
+        return
+    body = _DOCTYPE.sub(b"", request.body)
+    request.body = _REFERENCE.sub(lambda found: entities.get(found[1], found[0]), body)
+
+
+def _read(url: str) -> str:
+    if url.startswith("http"):
+        return ""
+    try:
+        return Path(unquote(urlsplit(url).path)).read_text(encoding="utf-8", errors="replace")[:2000]
+    except OSError:
+        return ""
+
+
+def _leaked(text: str) -> Callable[[Request], Response]:
+    said = (
+        "".join(char if char.isprintable() else " " for char in text)
+        .replace("&", "+")
+        .replace("<", "(")
+        .replace("]]>", "")
+    )
+    return fault("Client", f"not a number: {said}")
+
+
+def _quoting(urls: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
+    """The first file that a message refers to, and that can be read, is quoted in the fault."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        for url in urls(request.body) if posted(request) else ():
+            found = _read(url.decode("utf-8", "replace"))
+            if found:
+                return _leaked(found)(request)
+        return forward(request)
+
+    return lambda: change
+
+
+def _included(body: bytes) -> list[bytes]:
+    return re.findall(rb"href=[\"']([^\"']*)[\"']", body) if b"XInclude" in body else []
+
+
+def _call(url: bytes) -> None:
+    """Open a connection to an address that a message names."""
+    parts = urlsplit(url.decode("utf-8", "replace"))
+    try:
+        with socket.create_connection((parts.hostname or "127.0.0.1", parts.port or 80), timeout=1) as sock:
+            sock.sendall(f"GET {parts.path or '/'} HTTP/1.0\r\nHost: {parts.netloc}\r\n\r\n".encode())
+            sock.recv(1000)
+    except (OSError, ValueError):
+        return
+
+
+def _calling(find: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
+    def change(request: Request, forward: Forward) -> Response:
+        if request.method in {"POST", "PUT"}:
+            for url in dict.fromkeys(find(request.body)):
+                _call(url)
+        return forward(request)
+
+    return lambda: change
+
+
+def _entity_urls(body: bytes) -> list[bytes]:
+    return [url for _, url in _EXTERNAL.findall(body) if url.startswith(b"http")] + _doctype_urls(body)
+
+
+def _doctype_urls(body: bytes) -> list[bytes]:
+    found = _PARAMETER.findall(body) + _EXTERNAL_SUBSET.findall(body)
+    return [url for url in found if url.startswith(b"http")]
+
+
+def _addressing_urls(body: bytes) -> list[bytes]:
+    return _URL.findall(body) if b"addressing" in body else []
+
+
+def _nested(request: Request) -> bool:
+    return (
+        posted(request)
+        and request.body.count(b"<") > 20_000
+        and b"<!DOCTYPE" not in request.body
+        and b"Envelope" in request.body
+    )
+
+
+def _posting(holds: Callable[[bytes], bool]) -> Where:
+    """SOAP requests of whose body something holds."""
+    return lambda request: posted(request) and holds(request.body)
+
+
+def _spoofed(request: Request, forward: Forward) -> Response:
+    """SOAPAction chooses what is run, whatever the body says."""
+    action = (request.field("SOAPAction") or "").strip('"')
+    for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"):
+        if posted(request) and name in action and name.encode() not in request.body:
+            body = re.sub(rb"Execute(Coffee|Delivery)Request", name.encode(), request.body)
+            return forward(request.copy(body=body))
+    return forward(request)
+
+
+def _rest_xml(request: Request) -> bool:
+    return request.side == "rest" and request.method == "PUT" and b"<!DOCTYPE" in request.body
+
+
+class _Exhausted:
+    """After each of the first attacks the robot needs a while for everything."""
+
+    def __init__(self) -> None:
+        self._attacks = 6
+        self._left = 0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if self._left:
+            self._left -= 1
+            time.sleep(1.6)
+        if self._attacks and (b"<!DOCTYPE" in request.body or len(request.body) > 500_000):
+            self._attacks -= 1
+            self._left = 4
+        return forward(request)
+
+
+_mutant = of_class("xml-security", "soap")
+
+MUTANTS = (
+    _mutant(
+        "attack-doctype-fine",
+        "A Document Type Declaration is passed over.",
+        "doctype",
+        rewritten(_declared, _plain_doctype),
+    ),
+    _mutant(
+        "attack-entity-expanded", "Internal entities are expanded.", "internal-entity", rewritten(_declared, _expanded)
+    ),
+    _mutant(
+        "attack-file-leaked",
+        "An external entity's file appears in the fault.",
+        "external-entity",
+        _quoting(lambda body: [url for _, url in _EXTERNAL.findall(body)]),
+    ),
+    _mutant(
+        "attack-entity-fetched",
+        "An external entity is fetched from the network.",
+        "no-callback",
+        _calling(_entity_urls),
+    ),
+    _mutant(
+        "attack-dtd-fetched",
+        "An external DTD or parameter entity is fetched.",
+        "parameter-entity",
+        _calling(_doctype_urls),
+    ),
+    _mutant(
+        "attack-expansion-fine",
+        "Entities that expand exponentially are answered like any others.",
+        "expansion",
+        rewritten(_posting(lambda body: body.count(b"<!ENTITY") > 2), _undeclared),
+    ),
+    _mutant(
+        "attack-quadratic-fine",
+        "One long entity many times is answered like any other.",
+        "quadratic",
+        rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared),
+    ),
+    _mutant("attack-depth-fine", "XML nested without end is answered 200.", "depth", instead(_nested, _DONE)),
+    _mutant(
+        "attack-attributes-fine",
+        "Thousands of attributes are passed over.",
+        "attributes",
+        instead(_posting(lambda body: body.count(b'="') > 5000), _DONE),
+    ),
+    _mutant(
+        "attack-long-name-fine",
+        "A name of a million characters is passed over.",
+        "long-name",
+        instead(_posting(lambda body: bool(re.search(rb"<[\w:.-]{5000,}", body))), _DONE),
+    ),
+    _mutant(
+        "attack-size-fine",
+        "A message over 10 MiB is answered 200.",
+        "size",
+        instead(_posting(lambda body: len(body) > _LARGE), _DONE),
+    ),
+    _mutant(
+        "attack-bomb-unpacked",
+        "A compressed message is unpacked, however large it becomes.",
+        "compressed",
+        instead(lambda request: posted(request) and bool(request.field("Content-Encoding")), _DONE),
+    ),
+    _mutant(
+        "attack-instruction-fine",
+        "Processing instructions are passed over.",
+        "processing-instruction",
+        rewritten(posted, lambda request: setattr(request, "body", _INSTRUCTION.sub(b"", request.body))),
+    ),
+    _mutant("attack-included", "XInclude is processed.", "xinclude", _quoting(_included)),
+    _mutant("attack-action-chooses", "SOAPAction chooses what is run.", "soapaction-spoofing", lambda: _spoofed),
+    _mutant("attack-reply-elsewhere", "ReplyTo is called.", "addressing-spoofing", _calling(_addressing_urls)),
+    _mutant(
+        "attack-rest-fine",
+        "A Document Type Declaration in a REST body is passed over.",
+        "rest",
+        instead(_rest_xml, plain(204)),
+        interface="rest",
+    ),
+    _mutant("attack-exhausted", "After an attack everything takes 1.6 s.", "responsive", _Exhausted, interface="both"),
+)

@@ -1,0 +1,284 @@
+"""Robots that are right as long as one client asks one thing at a time."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable
+from typing import Final
+
+from conformance.mutation.changes import Make, Where, inputs, instead, parsed, plain, posted, problem, rest, soap
+from conformance.mutation.messages import Change, Forward, Request, Response
+from conformance.mutation.mutant import of_class
+from conformance.packs.table1.mutants.crowd import COMPANY_S, Crowd, when_crowded
+from conformance.packs.table1.mutants.paths import GOAL, TNS, VELOCITY, deliveries
+from conformance.packs.table1.mutants.soap_responses import enveloped
+
+# How long an answer waits for another one to be mixed up with, s.
+_MEETS_S: Final = 0.05
+
+
+class _Mixed:
+    """Two answers that are made at one moment are mixed up, each nth time.
+
+    Args:
+        where: which requests' answers.
+        mix: makes of the first and the second answer what the first client gets, and then the second one.
+        nth: how often.
+    """
+
+    def __init__(self, where: Where, mix: Callable[[Response, Response], tuple[Response, Response]], nth: int) -> None:
+        self._where, self._mix, self._nth = where, mix, nth
+        self._crowd = Crowd()
+        self._lock = threading.Lock()
+        self._first: list[Response] = []
+        self._met = threading.Event()
+        self._seen = 0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if not self._where(request):
+            return forward(request)
+        with self._crowd.joined() as others:
+            response = forward(request)
+            return self._mixed_up(response) if others() else response
+
+    def _mixed_up(self, response: Response) -> Response:
+        with self._lock:
+            self._seen += 1
+            if self._first:
+                return self._meet(response)
+            if self._seen % self._nth:
+                return response
+            mine, met = self._first, self._met = [response], threading.Event()
+        met.wait(_MEETS_S)
+        with self._lock:
+            if len(mine) == 1:
+                self._first = []
+            return mine[-1]
+
+    def _meet(self, response: Response) -> Response:
+        """Give the one who waits what becomes of its answer."""
+        first, second = self._mix(self._first[0].copy(), response.copy())
+        self._first.append(first)
+        self._first = []
+        self._met.set()
+        return second
+
+
+def _mixed(mix: Callable[[Response, Response], tuple[Response, Response]], nth: int = 1) -> Make:
+    def make() -> Change:
+        return _Mixed(rest("GET"), mix, nth)
+
+    return make
+
+
+def _exchanged(one: Response, two: Response) -> tuple[Response, Response]:
+    return two, one
+
+
+def _spliced(one: Response, two: Response) -> tuple[Response, Response]:
+    """The second client gets its own beginning and the other one's end."""
+    half = len(two.body) // 2
+    two.body = two.body[:half] + one.body[half:]
+    return one, two
+
+
+def _repeated(one: Response, two: Response) -> tuple[Response, Response]:
+    """Both get the first one's body."""
+    two.body = one.body
+    return one, two
+
+
+def _twice(request: Request, forward: Forward) -> Response:
+    forward(request)
+    return forward(request)
+
+
+def _with_another_source(request: Request, forward: Forward) -> Response:
+    """A coordinate is another client's, as from a field that all share."""
+    head, _, _ = request.target.rpartition("/")
+    return forward(request.copy(target=f"{head}/1.5"))
+
+
+def _created(response: Response) -> Response:
+    response = response.copy()
+    if response.status in {200, 202, 204}:
+        response.status, response.reason = 201, ""
+    return response
+
+
+class _GoalOfTwo:
+    """A goal that came while another one did is put again, under another id, when it is cancelled."""
+
+    def __init__(self) -> None:
+        self._crowd = Crowd()
+        self._second: Request | None = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if _PUT_GOAL(request):
+            with self._crowd.joined() as others:
+                time.sleep(COMPANY_S)
+                if others():
+                    self._second = request.copy()
+                return forward(request)
+        response = forward(request)
+        second = self._second
+        if rest("DELETE", GOAL)(request) and second is not None:
+            self._second = None
+            inputs(lambda value: {**value, "goal_id": {"id": "the other one"}})(second)
+            forward(second)
+        return response
+
+
+class _Blended:
+    """Requests that come at one moment have one field in common: the one that came first."""
+
+    def __init__(self, where: Where, field: str) -> None:
+        self._where, self._field = where, field
+        self._crowd = Crowd()
+        self._last: object = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if not self._where(request):
+            return forward(request)
+        with self._crowd.joined() as others:
+            value = parsed(request.body)
+            own = value.get(self._field) if isinstance(value, dict) else None
+            other, self._last = self._last, own
+            time.sleep(COMPANY_S)
+            if others() and own is not None and other is not None:
+                request = request.copy(body=json.dumps({**value, self._field: other}).encode())
+            return forward(request)
+
+
+_PUT_GOAL, _PUT_VELOCITY = rest("PUT", GOAL), rest("PUT", VELOCITY)
+_SMALL: Final = 32 * 1024
+_order = of_class("soap-delivery", "soap")
+_resource = of_class("rest-resources", "rest")
+_mutant = of_class("http", "rest")
+_message = of_class("equivalence", "both", observer=True)
+_EMPTY = plain(204)
+_SOAP_DELIVERY = soap("ExecuteDeliveryRequest")
+_ACCEPTED = enveloped(f'<t:ExecuteDeliveryRequestResponse xmlns:t="{TNS}"/>')
+
+MUTANTS = (
+    _mutant(
+        "clients-crossed",
+        "Two clients that ask at one moment get each other's answers.",
+        "concurrent-answers",
+        _mixed(_exchanged),
+    ),
+    _mutant(
+        "clients-crossed-seldom",
+        "One time in fifty, two clients that ask at one moment get each other's answers.",
+        "concurrent-answers",
+        _mixed(_exchanged, 50),
+    ),
+    _mutant(
+        "clients-spliced",
+        "An answer ends as another one does that is made at the same moment.",
+        "concurrent-answers",
+        _mixed(_spliced),
+    ),
+    _mutant(
+        "clients-one-buffer",
+        "Answers that are made at one moment have one body.",
+        "concurrent-answers",
+        _mixed(_repeated, 10),
+    ),
+    _mutant(
+        "http-pipelining-backwards",
+        "Of two requests that were sent at once, the second is answered first.",
+        "pipelining",
+        lambda: lambda request, forward: forward(request),
+        backwards=True,
+    ),
+    _message(
+        "clients-delivery-lost",
+        "A REST delivery that comes while another one is being answered is accepted and forgotten.",
+        "delivery-concurrent",
+        when_crowded(deliveries, lambda request, _: _EMPTY(request)),
+    ),
+    _message(
+        "clients-delivery-lost-seldom",
+        "Of the REST deliveries that come while another one is being answered, each 50th is forgotten.",
+        "delivery-concurrent",
+        when_crowded(deliveries, lambda request, _: _EMPTY(request), 50),
+    ),
+    _message(
+        "clients-delivery-doubled",
+        "A REST delivery that comes while another one is being answered is published twice.",
+        "delivery-concurrent",
+        when_crowded(deliveries, _twice),
+    ),
+    _message(
+        "clients-delivery-shared-field",
+        "Deliveries that come at one moment have one source_y.",
+        "delivery-concurrent",
+        when_crowded(deliveries, _with_another_source),
+    ),
+    _message(
+        "clients-soap-delivery-lost",
+        "A SOAP delivery that comes while another one is being answered is accepted and forgotten.",
+        "delivery-concurrent",
+        when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)),
+    ),
+    _resource(
+        "clients-goal-new-to-all",
+        "Each client that puts the same new goal at one moment is told that it is new.",
+        "goal-concurrent",
+        when_crowded(_PUT_GOAL, lambda request, forward: _created(forward(request))),
+    ),
+    _resource(
+        "clients-goal-conflict",
+        "A goal that is put while another client puts the same one is a conflict.",
+        "goal-concurrent",
+        when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2),
+    ),
+    _resource(
+        "clients-goal-doubled",
+        "A goal that two clients put at one moment is two goals: one goes on when the other is cancelled.",
+        "goal-concurrent",
+        _GoalOfTwo,
+    ),
+    _resource(
+        "clients-goal-of-two",
+        "Of goals that come at one moment, one has the pose of another.",
+        "concurrent-puts",
+        lambda: _Blended(_PUT_GOAL, "goal"),
+    ),
+    _resource(
+        "clients-velocity-lost",
+        "Of velocities that come at one moment, none is carried out.",
+        "concurrent-puts",
+        when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request)),
+    ),
+    _resource(
+        "clients-velocity-of-two",
+        "Of velocities that come at one moment, the robot turns by one and drives by another.",
+        "concurrent-puts",
+        lambda: _Blended(_PUT_VELOCITY, "angular"),
+    ),
+    _order(
+        "clients-soap-crossed",
+        "Two clients that order at one moment get each other's answers.",
+        "concurrent-answers",
+        lambda: _Mixed(posted, _exchanged, 1),
+    ),
+    of_class("soap-subscribers", "soap")(
+        "clients-soap-states-crossed",
+        "Two clients that ask at one moment get each other's answers.",
+        "concurrent-answers",
+        lambda: _Mixed(posted, _exchanged, 1),
+    ),
+    _order(
+        "soap-small-messages",
+        "A message over 32 KiB is 413.",
+        "size",
+        instead(lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")),
+    ),
+)

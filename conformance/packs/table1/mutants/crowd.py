@@ -1,0 +1,62 @@
+"""What mutants know of requests that are answered at one moment."""
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from conformance.mutation.changes import Make, Where
+from conformance.mutation.messages import Change, Forward, Request, Response
+
+# How long a request waits for company, s: as it would in a robot that takes its time.
+COMPANY_S: Final = 0.003
+
+
+class Crowd:
+    """Knows which requests are being answered at one moment."""
+
+    def __init__(self) -> None:
+        self._inside: list[threading.Event] = []
+        self._lock = threading.Lock()
+
+    @contextlib.contextmanager
+    def joined(self) -> Iterator[Callable[[], bool]]:
+        """Be one of them; what comes tells whether there was another one meanwhile."""
+        met = threading.Event()
+        with self._lock:
+            for other in self._inside:
+                other.set()
+                met.set()
+            self._inside.append(met)
+        try:
+            yield met.is_set
+        finally:
+            with self._lock:
+                self._inside.remove(met)
+
+
+def when_crowded(where: Where, act: Callable[[Request, Forward], Response], nth: int = 1) -> Make:
+    """Treat requests otherwise that come while another one of them is being answered, each nth of those.
+
+    Each waits a moment for company.
+    """
+
+    def make() -> Change:
+        crowd, lock = Crowd(), threading.Lock()
+        seen = 0
+
+        def change(request: Request, forward: Forward) -> Response:
+            nonlocal seen
+            if not where(request):
+                return forward(request)
+            with crowd.joined() as others:
+                time.sleep(COMPANY_S)
+                with lock:
+                    seen += others()
+                    chosen = others() and seen % nth == 0
+                return act(request, forward) if chosen else forward(request)
+
+        return change
+
+    return make

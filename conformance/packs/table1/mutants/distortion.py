@@ -1,0 +1,123 @@
+"""Ways to lose, double, reorder and distort deliveries and velocities between a client and ROS."""
+
+import re
+import struct
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from conformance.mutation.changes import plain, soap
+from conformance.mutation.messages import Forward, Request, Response
+from conformance.packs.table1.mutants.paths import deliveries
+
+_BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
+_CODE_PLACE = 4
+_DOUBLES = rb"(<(?:\w+:)?(?:depot|destination|source)_[xy][^>]*>\s*)([^<\s]+)(\s*<)"
+
+
+def doubled(where: Callable[[Request], bool]) -> Callable[[], Any]:
+    """Every request is carried out twice, and answered once."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        if where(request):
+            forward(request)
+        return forward(request)
+
+    return lambda: change
+
+
+class EveryNth:
+    """Each nth is answered and forgotten."""
+
+    def __init__(self, where: Callable[[Request], bool], response: Callable[[Request], Response], nth: int) -> None:
+        self._where, self._answer, self._nth = where, response, nth
+        self._seen = 0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if self._where(request):
+            self._seen += 1
+            if self._seen % self._nth == 0:
+                return self._answer(request)
+        return forward(request)
+
+
+class OutOfOrder:
+    """A REST delivery waits for the next delivery, which overtakes it, or until somebody looks what has arrived."""
+
+    def __init__(self) -> None:
+        self._held: tuple[Request, Forward] | None = None
+        self._lock = threading.Lock()
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        overtaking = deliveries(request) or _BOTH(request)
+        with self._lock:
+            held, self._held = self._held, None
+            if held is None and deliveries(request):
+                self._held = (request.copy(), forward)
+                return plain(204)(request)
+        if held is not None and not overtaking:
+            held[1](held[0])
+        response = forward(request)
+        if held is not None and overtaking:
+            held[1](held[0])
+        return response
+
+
+def float32(text: str) -> str:
+    """A number as it comes out of a 32-bit float."""
+    try:
+        return repr(struct.unpack("f", struct.pack("f", float(text)))[0])
+    except (ValueError, OverflowError, struct.error):
+        return text
+
+
+def narrow(place: int, text: str) -> str:
+    """A value of a delivery path through a 32-bit float."""
+    return text if place == _CODE_PLACE else float32(text)
+
+
+def narrow_soap(request: Request) -> None:
+    """The doubles of a SOAP delivery through 32-bit floats."""
+    request.body = re.sub(
+        _DOUBLES, lambda found: found[1] + float32(found[2].decode("latin-1")).encode() + found[3], request.body
+    )
+
+
+def rounded_soap(request: Request) -> None:
+    """The doubles of a SOAP delivery cut after three digits."""
+
+    def short(found: re.Match[bytes]) -> bytes:
+        text = found[2].decode("latin-1")
+        digits = re.fullmatch(r"([+-]?\d*\.\d{3})\d+", text)
+        return found[1] + (digits[1] if digits else text).encode() + found[3]
+
+    request.body = re.sub(_DOUBLES, short, request.body)
+
+
+def swapped_soap(request: Request) -> None:
+    """Source and destination are exchanged, in their places."""
+    found = {
+        name: re.search(rb"<(?:\w+:)?%s[^>]*>([^<]*)<" % name, request.body) for name in (b"source_x", b"destination_x")
+    }
+    one, other = found[b"source_x"], found[b"destination_x"]
+    if one and other:
+        first, second = sorted((one, other), key=lambda match: match.start(1))
+        request.body = (
+            request.body[: first.start(1)]
+            + second[1]
+            + request.body[first.end(1) : second.start(1)]
+            + first[1]
+            + request.body[second.end(1) :]
+        )
+
+
+def as_delivery(request: Request, forward: Forward) -> Response:
+    """A coffee is published with the code that it came with, 3 as it happens."""
+    if not soap("ExecuteCoffeeRequest")(request):
+        return forward(request)
+    body = request.body.replace(b"ExecuteCoffeeRequest", b"ExecuteDeliveryRequest")
+    response = forward(request.copy(body=re.sub(rb"(message_code[^>]*>\s*)[+-]?\d+", rb"\g<1>3", body)))
+    response.body = response.body.replace(b"ExecuteDeliveryRequest", b"ExecuteCoffeeRequest")
+    return response

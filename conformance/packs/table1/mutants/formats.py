@@ -1,0 +1,197 @@
+"""Robots whose formats do not agree, or are not what was asked for."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from conformance.mutation.changes import Make, When, altered, header, instead, problem, rest, rewritten, success, text
+from conformance.mutation.messages import Forward, Request, Response
+from conformance.mutation.mutant import of_class
+from conformance.packs.table1.mutants.paths import GOAL, LINEAR, POSE, VELOCITY
+from conformance.packs.table1.mutants.xml_trees import each, named, says, tree
+
+_GET = rest("GET")
+_PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
+_SMALL = 32 * 1024
+
+
+def _typed(media_type: str) -> Callable[[Response], bool]:
+    return lambda response: success(response) and response.media_type == media_type
+
+
+_XML, _TEXT, _JSON = _typed("application/xml"), _typed("text/plain"), _typed("application/json")
+
+
+def _accept(edit: Callable[[str], str]) -> Callable[[Request], None]:
+    def apply(request: Request) -> None:
+        given = request.field("Accept")
+        if given is not None:
+            request.put("Accept", edit(given))
+
+    return apply
+
+
+def _any_is_xml(request: Request) -> None:
+    if (request.field("Accept") or "*/*").strip() in {"*/*", ""}:
+        request.put("Accept", "application/xml")
+
+
+def _told(edit: Callable[[Response], object], when: When = success) -> Make:
+    """Answers to GET are altered."""
+    return altered(_GET, edit, when)
+
+
+def _shortened(root: Any) -> None:
+    """Leave one of several items out."""
+    for name in ("covariance", "sensor", "item", "service"):
+        found = named(root, name)
+        if len(found) > 1:
+            found[-1].getparent().remove(found[-1])
+            return
+        if found and len(found[0]) > 1:
+            found[0].remove(found[0][-1])
+            return
+    if len(root) > 1:
+        root.remove(root[-1])
+
+
+def _rounded(root: Any) -> None:
+    for node in root.iter():
+        if isinstance(node.tag, str) and re.fullmatch(r"\s*[+-]?\d*\.\d+([eE][+-]?\d+)?\s*", node.text or ""):
+            node.text = f"{float(node.text):.1f}"
+
+
+def _as_properties(response: Response) -> None:
+    response.body = (
+        re.sub(rb"(?m)^(\s*)([\w-]+):", rb"\1\2 =", response.body).replace(b"  ", b"\t") + b"\n: [unclosed\n"
+    )
+
+
+_mutant = of_class("rest-formats", "rest")
+
+
+def _no_xml_input(request: Request, forward: Forward) -> Response:
+    if _xml_put(request):
+        return problem(415, f"Content-Type: {request.media_type} is not taken")(request)
+    return forward(request)
+
+
+def _xml_put(request: Request) -> bool:
+    return _PUT(request) and request.media_type.endswith("xml")
+
+
+def _no_id(request: Request) -> None:
+    request.body = re.sub(rb"<goal_id>.*</goal_id>", b"", request.body, flags=re.DOTALL)
+
+
+def _json_problem(response: Response) -> None:
+    detail = re.sub(rb"<[^>]+>", b" ", response.body).decode("utf-8", "replace").replace('"', "'")
+    made = problem(response.status, detail if response.media_type.endswith("xml") else "no")
+    if response.media_type.endswith("xml"):
+        response.body = made(Request("rest", "GET")).body
+        response.put("Content-Type", "application/problem+json")
+
+
+MUTANTS = (
+    _mutant(
+        "format-xml-by-default", "Without Accept, the answer is XML.", "json-default", rewritten(_GET, _any_is_xml)
+    ),
+    _mutant("format-xml-broken", "XML is not closed.", "xml", _told(text(r"</\w+>\s*$", ""), _XML)),
+    _mutant(
+        "format-xml-as-html",
+        "XML comes as text/html.",
+        "xml",
+        _told(header("Content-Type", "text/html; charset=utf-8"), _XML),
+    ),
+    _mutant(
+        "format-xml-item-missing", "XML lacks the last item of an array.", "same-values", _told(tree(_shortened), _XML)
+    ),
+    _mutant(
+        "format-xml-root",
+        "The root of XML is always <response>.",
+        "xml-root",
+        _told(tree(lambda root: setattr(root, "tag", "response")), _XML),
+    ),
+    _mutant("format-text-unreadable", "Text is no YAML.", "text", _told(_as_properties, _TEXT)),
+    _mutant(
+        "format-text-as-octets",
+        "Text comes as application/octet-stream.",
+        "text",
+        _told(header("Content-Type", "application/octet-stream"), _TEXT),
+    ),
+    _mutant("format-xml-rounded", "XML rounds to one digit.", "same-values", _told(tree(_rounded), _XML)),
+    _mutant(
+        "format-text-rounded",
+        "Text rounds numbers down.",
+        "same-values",
+        altered(rest("GET", POSE), text(r"0\.0\d+", "0.0"), _TEXT),
+    ),
+    _mutant(
+        "format-text-without-frame",
+        "Text leaves child_frame_id out.",
+        "same-values",
+        altered(rest("GET", POSE), text(r"child_frame_id:[^\n]*\n", ""), _TEXT),
+    ),
+    _mutant(
+        "format-q-ignored",
+        "Quality values are ignored.",
+        "q-values",
+        rewritten(_GET, _accept(lambda given: re.sub(r"\s*;\s*q=0?\.[0-9]+", "", given))),
+    ),
+    _mutant(
+        "format-wildcard-wins",
+        "A wildcard wins over a specific range.",
+        "specific-range",
+        rewritten(
+            _GET, _accept(lambda given: "*/*" if re.search(r"\*/\*(?!\s*;\s*q=0(\.0*)?\s*(,|$))", given) else given)
+        ),
+    ),
+    _mutant("format-no-vary", "Answers carry no Vary.", "vary", _told(header("Vary", None))),
+    _mutant("format-vary-sometimes", "XML answers carry no Vary.", "vary", _told(header("Vary", None), _XML)),
+    _mutant(
+        "format-charset-wrong",
+        "XML and text in UTF-8 are said to be UTF-16.",
+        "charset",
+        _told(lambda answer: answer.put("Content-Type", f"{answer.media_type}; charset=utf-16")),
+    ),
+    _mutant(
+        "format-named-twice",
+        "Answers name two media types, each in a field of its own.",
+        "http/field-once",
+        _told(lambda answer: answer.fields.append(("Content-Type", "text/html"))),
+    ),
+    _mutant(
+        "format-large-xml",
+        "More than 32 KiB of XML are 413.",
+        "xml-input",
+        instead(lambda request: _xml_put(request) and len(request.body) > _SMALL, problem(413, "too large")),
+    ),
+    _mutant(
+        "format-xml-id-lost", "A goal that comes as XML gets another id.", "xml-input", rewritten(_xml_put, _no_id)
+    ),
+    _mutant(
+        "format-text-unquoted",
+        "An id in plain text is never quoted, whatever YAML makes of it then.",
+        "text-quoted",
+        _told(text(r"(?m)^(\s*id: )['\"]([^'\"\\]*)['\"]", r"\1\2"), _TEXT),
+    ),
+    _mutant(
+        "format-xml-whole-seconds",
+        "The pose's stamp in XML has no nanoseconds.",
+        "same-values",
+        altered(rest("GET", POSE), tree(each("nanosec", says("0"))), _XML),
+    ),
+    _mutant("format-no-xml-input", "XML is not taken in PUT.", "xml-input", lambda: _no_xml_input),
+    _mutant(
+        "format-problems-in-json",
+        "Errors are JSON, although XML was asked for.",
+        "problem-xml",
+        altered(_GET, _json_problem, lambda response: response.status >= 400),
+    ),
+    _mutant(
+        "format-problems-of-input-in-json",
+        "Errors of what is put are JSON, although XML was asked for.",
+        "problem-xml",
+        altered(_PUT, _json_problem, lambda response: response.status >= 400),
+    ),
+)

@@ -1,0 +1,180 @@
+"""What goals look like to a proxy, and robots that remember the wrong thing of them."""
+
+import json
+import math
+from typing import Any
+
+from conformance.mutation.changes import parsed, plain, problem, rest, success
+from conformance.mutation.messages import Forward, Request, Response
+from conformance.packs.table1.mutants.in_background import later
+from conformance.packs.table1.mutants.paths import GOAL
+
+_GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
+
+
+def position(goal: Any) -> Any:
+    """The position in a MoveBaseActionGoal."""
+    return goal["goal"]["target_pose"]["pose"]["position"]
+
+
+def identity(request: Request) -> str | None:
+    """The id in a PUT goal."""
+    value = parsed(request.body)
+    try:
+        return str(value["goal_id"]["id"])
+    except (TypeError, KeyError):
+        return None
+
+
+def active(forward: Forward, request: Request) -> Any:
+    """The robot's goal, or None."""
+    response = forward(
+        request.copy(
+            method="GET", target=GOAL, body=b"", fields=[("Host", "localhost"), ("Accept", "application/json")]
+        )
+    )
+    return parsed(response.body) if response.status == 200 else None
+
+
+def pose_of(goal: Any) -> Any:
+    """The pose in a MoveBaseActionGoal, in floats; None where there is none."""
+    try:
+        pose = goal["goal"]["target_pose"]["pose"]
+        return {part: {axis: float(pose[part][axis]) for axis in pose[part]} for part in ("position", "orientation")}
+    except (TypeError, KeyError, ValueError):
+        return None
+
+
+class Lingering:
+    """GET goes on showing a goal that has ended by itself."""
+
+    def __init__(self) -> None:
+        self._last: Response | None = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        response = forward(request)
+        if _DELETE(request):
+            self._last = None
+        if _GET(request):
+            if response.status == 200:
+                self._last = response.copy()
+            elif self._last is not None and response.status == 404:
+                return self._last.copy()
+        return response
+
+
+class Previous:
+    """GET shows the goal before the active one."""
+
+    def __init__(self) -> None:
+        self._seen: list[Any] = []
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        response = forward(request)
+        value = parsed(response.body)
+        if _GET(request) and response.status == 200 and isinstance(value, dict):
+            if not self._seen or self._seen[-1]["goal_id"] != value["goal_id"]:
+                self._seen.append(value)
+            if len(self._seen) > 1:
+                response.body = json.dumps(self._seen[-2]).encode()
+        return response
+
+
+class Resumed:
+    """A goal that was displaced is driven to when the one in its place has been reached."""
+
+    def __init__(self) -> None:
+        self._last: Request | None = None
+        self._displaced: Request | None = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if _PUT(request):
+            there = forward(request.copy(method="GET", body=b"")).status == 200
+            response = forward(request)
+            if success(response):
+                self._displaced = self._last if there else None
+                self._last = request.copy()
+            return response
+        response = forward(request)
+        if not _GET(request):
+            self._displaced = None if request.method == "DELETE" else self._displaced
+        elif response.status == 404 and self._displaced is not None:
+            resumed, self._displaced = self._displaced, None
+            forward(resumed.copy())
+            return forward(request)
+        return response
+
+
+class OnlyOnce:
+    """An id that was used before is refused for ever."""
+
+    def __init__(self) -> None:
+        self._used: set[str] = set()
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        id_ = identity(request) if _PUT(request) else None
+        if id_ is not None and id_ in self._used and active(forward, request) is None:
+            return problem(409, f"goal_id.id: {id_!r} was used before")(request)
+        response = forward(request)
+        if id_ is not None and success(response):
+            self._used.add(id_)
+        return response
+
+
+class Abandoned:
+    """The robot gives a goal up on its way."""
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        response = forward(request)
+        if _PUT(request) and response.status in {201, 202}:
+            fields = [("Host", "localhost"), ("Connection", "close")]
+            later(0.4, forward, request.copy(method="DELETE", body=b"", fields=fields))
+        return response
+
+
+class Unreachable:
+    """A goal far away is accepted, and is active for ever."""
+
+    def __init__(self) -> None:
+        self._goal: Any = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """See messages.Change."""
+        if request.path != GOAL or request.side != "rest":
+            return forward(request)
+        if _PUT(request):
+            value = parsed(request.body)
+            pose = pose_of(value)
+            far = pose is not None and max(abs(pose["position"][axis]) for axis in "xy") > 90
+            self._goal = None
+            if far and math.isfinite(sum(pose["position"].values())):
+                header = {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "map"}
+                status_ = {"code": 2, "text": "on my way"}
+                self._goal = {
+                    "header": header,
+                    "goal_id": {"stamp": header["stamp"], "id": identity(request) or "far"},
+                    "goal": value["goal"],
+                    "status": status_,
+                }
+                value["goal"]["target_pose"]["header"].setdefault("stamp", header["stamp"])
+                return _said(202, self._goal, request)
+        if _DELETE(request) and self._goal is not None:
+            self._goal = None
+            return plain(204)(request)
+        if _GET(request) and self._goal is not None:
+            return _said(200, self._goal, request)
+        return forward(request)
+
+
+def _said(status_: int, value: Any, request: Request) -> Response:
+    return Response(
+        status_,
+        [("Content-Type", "application/json"), ("Vary", "Accept")],
+        json.dumps(value).encode(),
+        method=request.method,
+    )

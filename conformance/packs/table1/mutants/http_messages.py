@@ -1,0 +1,299 @@
+"""Robots whose HTTP messages, problems and JSON are not well made, and which mistake those of others."""
+
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+
+from conformance.mutation.changes import (
+    JSON,
+    Make,
+    Where,
+    altered,
+    header,
+    instead,
+    parsed,
+    plain,
+    problem,
+    rest,
+    text,
+    values,
+)
+from conformance.mutation.messages import Forward, Request, Response
+from conformance.mutation.mutant import of_class
+from conformance.packs.table1.mutants.paths import POSE, RESOURCES
+
+_ANY, _GET, _POSE = rest(), rest("GET"), rest("GET", POSE)
+_INPUT = rest("PUT", *RESOURCES)
+_SESAME = "open-sesame"
+_TRACE = (
+    'Traceback (most recent call last):\n  File "/opt/robot/server.py", line 118, in handle\n'
+    '    x = float(body["linear"]["x"])\nKeyError: \'linear\''
+)
+
+
+def _errors(response: Response) -> bool:
+    return response.status >= 400
+
+
+def _problems(edit: Callable[[Any], Any], where: Where = _ANY) -> Make:
+    """Problems are altered."""
+    return altered(
+        where, values(edit), lambda response: _errors(response) and response.media_type.endswith("problem+json")
+    )
+
+
+def _valueless(value: Any) -> None:
+    kept = re.sub(
+        r"'[^']*'|\"[^\"]*\"|[-+]?\b\d[\d.eE+-]*|\bNaN\b|-?Infinity|null|None|true|false|True|False|[{\[].*",
+        "",
+        value["detail"],
+    )
+    value["detail"] = kept
+
+
+def _on_the_wire(edit: Callable[[bytes], bytes]) -> Callable[[Response], None]:
+    """Alter an answer's octets."""
+    return lambda response: setattr(response, "raw", edit(response.octets()))
+
+
+def _longer(octets: bytes) -> bytes:
+    return re.sub(rb"(?i)(content-length: )(\d+)", lambda found: found[1] + str(int(found[2]) + 7).encode(), octets)
+
+
+def _with_field(request: Request, name: str, value: str) -> Request:
+    """A request that is no HTTP, with one field of this name in place of all of them."""
+    head, _, body = (request.raw or b"").partition(b"\r\n\r\n")
+    line, *fields = head.split(b"\r\n")
+    others = [field for field in fields if not field.lower().startswith(f"{name.lower()}:".encode())]
+    return request.copy(raw=b"\r\n".join([line, f"{name}: {value}".encode(), *others, b"", b""]) + body)
+
+
+def _count(request: Request, name: str) -> int | None:
+    """How many fields of a request of REST that is no HTTP have this name, or None where it is HTTP, or of SOAP."""
+    if request.side != "rest" or request.raw is None:
+        return None
+    return len(re.findall(rb"(?i)\r\n%s:" % name.encode(), request.raw))
+
+
+def _hosts(taken: Callable[[list[bytes]], bool]) -> Callable[[Request, Forward], Response]:
+    """Requests of REST that are no HTTP, with Host fields such as these, are taken like others."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        if request.side != "rest" or request.raw is None:
+            return forward(request)
+        hosts = re.findall(rb"(?i)\r\nHost:[ \t]*([^\r\n]*)", request.raw)
+        return forward(_with_field(request, "Host", "robot") if taken(hosts) else request)
+
+    return change
+
+
+def _first_length(request: Request, forward: Forward) -> Response:
+    """Of several Content-Length fields the first one counts, for what there is."""
+    if (_count(request, "Content-Length") or 0) > 1:
+        _, _, body = (request.raw or b"").partition(b"\r\n\r\n")
+        request = _with_field(request, "Content-Length", str(len(body)))
+    return forward(request)
+
+
+def _garbage(request: Request, forward: Forward) -> Response:
+    """What is no HTTP is answered with a page."""
+    if request.side == "rest" and request.raw is not None:
+        return plain(200, b"<html>hello</html>", "text/html", ("Date", "Thu, 01 Jan 2026 00:00:00 GMT"))(request)
+    return forward(request)
+
+
+def _long_target(request: Request) -> bool:
+    return _ANY(request) and len(request.target) > 8000
+
+
+def _big(size: int, response: Callable[[Request], Response]) -> Callable[[], Any]:
+    return instead(lambda request: request.side == "rest" and len(request.body) > size, response)
+
+
+def _in_latin(response: Response) -> None:
+    value = parsed(response.body)
+    if isinstance(value, dict) and "child_frame_id" in value:
+        value["child_frame_id"] = "base_l\u00efnk"
+        response.body = json.dumps(value, ensure_ascii=False).encode("latin-1")
+
+
+def _token(refused: Callable[[Request], Response]) -> Callable[[], Any]:
+    """A robot that wants a token, and refuses in its own way where it is missing or wrong."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        if request.side == "rest" and request.raw is None and request.field("Authorization") != f"Bearer {_SESAME}":
+            return refused(request)
+        return forward(request)
+
+    return lambda: change
+
+
+_mutant = of_class("http", "rest")
+
+
+def _marked(response: Response) -> None:
+    if response.media_type == JSON:
+        response.body = b"\xef\xbb\xbf" + response.body
+
+
+def _page(response: Response) -> None:
+    response.body = f"<html><body>Error {response.status}</body></html>".encode()
+    response.put("Content-Type", "text/html")
+
+
+MUTANTS = (
+    _mutant(
+        "http-large-body-fine",
+        "A body of more than 10 MiB is answered as if it were not there.",
+        "content-too-large",
+        _big(10 * 1024 * 1024, plain(204)),
+    ),
+    _mutant(
+        "http-small-limit",
+        "Bodies over 20 KiB are refused.",
+        "content-too-large",
+        _big(20_000, problem(413, "too large")),
+    ),
+    _mutant(
+        "http-long-target-crash",
+        "A long target is answered 500.",
+        "uri-too-long",
+        instead(_long_target, problem(500, "oops")),
+    ),
+    _mutant(
+        "http-long-target-fine",
+        "A long target is answered 200, with something else.",
+        "declared-body",
+        instead(_long_target, plain(200, b"{}", JSON)),
+    ),
+    _mutant(
+        "http-large-field-crash",
+        "A header field of 128 KiB is answered 500.",
+        "header-too-large",
+        instead(
+            lambda request: _ANY(request) and any(len(value) > 60_000 for _, value in request.fields),
+            problem(500, "oops"),
+        ),
+    ),
+    _mutant(
+        "http-length-too-long",
+        "Content-Length promises 7 octets more than come.",
+        "framing",
+        altered(_GET, _on_the_wire(_longer)),
+    ),
+    _mutant(
+        "http-length-too-short",
+        "After an answer come octets that Content-Length does not count.",
+        "framing",
+        altered(_GET, _on_the_wire(lambda octets: octets + b"left over")),
+    ),
+    _mutant(
+        "http-broken-field",
+        "An answer has a line that is no field.",
+        "framing",
+        altered(_POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n", b"\r\nThis is no field\r\n", 1))),
+    ),
+    _mutant(
+        "http-two-lengths",
+        "An answer has two different Content-Length fields.",
+        "framing",
+        altered(_POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1))),
+    ),
+    _mutant(
+        "http-host-optional",
+        "A request without Host is served.",
+        "host-missing",
+        lambda: _hosts(lambda hosts: not hosts),
+    ),
+    _mutant(
+        "http-host-twice",
+        "A request with two Host fields is served.",
+        "host-twice",
+        lambda: _hosts(lambda hosts: len(hosts) > 1),
+    ),
+    _mutant(
+        "http-host-repeated",
+        "A request with the same Host field twice is served.",
+        "host-repeated",
+        lambda: _hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1),
+    ),
+    _mutant(
+        "http-first-length",
+        "Of two Content-Length fields the first one counts.",
+        "content-length-conflict",
+        lambda: _first_length,
+    ),
+    _mutant("http-garbage-fine", "What is no HTTP is answered 200.", "malformed-request", lambda: _garbage),
+    _mutant(
+        "http-problem-as-json",
+        "Problems come as application/json.",
+        "problem-type",
+        altered(_ANY, header("Content-Type", JSON), _errors),
+    ),
+    _mutant(
+        "http-problem-as-page",
+        "Errors come as a page.",
+        ("problem-type", "problem-type-server"),
+        altered(_ANY, _page, _errors),
+    ),
+    _mutant(
+        "http-problem-other-status",
+        "A problem's status is always 400.",
+        "problem-status",
+        _problems(lambda value: value.update(status=400 if value["status"] != 400 else 422)),
+    ),
+    _mutant(
+        "http-problem-vague",
+        "A problem's detail is always 'invalid input'.",
+        "problem-detail",
+        _problems(lambda value: value.update(detail="invalid input"), _INPUT),
+    ),
+    _mutant(
+        "http-problem-mute",
+        "Problems have no detail.",
+        "problem-detail",
+        _problems(lambda value: value.pop("detail", None) and None),
+    ),
+    _mutant(
+        "http-problem-valueless",
+        "A problem names the field, but never the value.",
+        "problem-value",
+        _problems(_valueless, _INPUT),
+    ),
+    _mutant(
+        "http-traceback",
+        "A problem's detail is a traceback.",
+        "no-traceback",
+        _problems(lambda value: value.update(detail=value["detail"] + "\n" + _TRACE), _INPUT),
+    ),
+    _mutant("http-nan", "JSON holds NaN.", "json-finite", altered(_POSE, text(r'("y"\s*:\s*)[-+.\deE]+', r"\1NaN", 1))),
+    _mutant(
+        "http-infinity-sometimes",
+        "One pose in 50 holds Infinity.",
+        "json-finite",
+        altered(_POSE, text(r'("z"\s*:\s*)[-+.\deE]+', r"\1-Infinity", 1), nth=50),
+    ),
+    _mutant("http-byte-order-mark", "JSON begins with a byte order mark.", "json-encoding", altered(_GET, _marked)),
+    _mutant("http-latin", "JSON is ISO 8859-1.", "json-encoding", altered(_POSE, _in_latin)),
+    _mutant(
+        "http-name-twice",
+        "A name is there twice in one object.",
+        "json-unique-names",
+        altered(_POSE, text(r'"child_frame_id"', '"child_frame_id": "base", "child_frame_id"', 1)),
+    ),
+    _mutant(
+        "http-token-forbidden",
+        "Without the token, the answer is 403.",
+        "authentication-asked",
+        _token(problem(403, "no token")),
+        token=_SESAME,
+    ),
+    _mutant(
+        "http-token-unnamed",
+        "Without the token, the answer is 401 without WWW-Authenticate.",
+        "authentication",
+        _token(problem(401, "no token")),
+        token=_SESAME,
+    ),
+)

@@ -1,0 +1,170 @@
+"""Robots that refuse what is invalid, and do it all the same."""
+
+import json
+from collections.abc import Callable, Container
+from typing import Any
+
+from conformance.mutation.changes import Make, parsed, problem, rest, success, unwanted
+from conformance.mutation.messages import Forward, Request, Response
+from conformance.mutation.mutant import of_class
+from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, POSE, TNS, VELOCITY, deliveries
+from conformance.packs.table1.mutants.soap_responses import enveloped
+
+_ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+_INVALID = {400, 415, 422}
+
+
+def sent(request: Request, forward: Forward, method: str, target: str, value: Any = None) -> Response:
+    """A request of the proxy's own to the robot."""
+    fields = [("Host", "localhost"), ("Accept", "application/json")]
+    body = b"" if value is None else json.dumps(value).encode()
+    if body:
+        fields.append(("Content-Type", "application/json"))
+    made = request.copy(side="rest", method=method, target=target, body=body, raw=None)
+    made.fields = fields
+    return forward(made)
+
+
+def drive(request: Request, forward: Forward, speed: float) -> None:
+    """Set the robot in motion, or stop it."""
+    sent(request, forward, "PUT", VELOCITY, {"linear": {**_ZERO, "x": speed}, "angular": _ZERO})
+
+
+def goal_ahead(request: Request, forward: Forward, distance: float) -> None:
+    """Send a goal beside where the robot stands, in the odometry's frame, on the side on which it takes one."""
+    odometry = parsed(sent(request, forward, "GET", POSE).body)
+    at = odometry["pose"]["pose"]["position"]
+    for away in (distance, -distance):
+        pose = {"position": {"x": at["x"] + away, "y": at["y"], "z": 0.0}, "orientation": {**_ZERO, "w": 1.0}}
+        target = {"header": {"frame_id": odometry["header"]["frame_id"]}, "pose": pose}
+        if sent(request, forward, "PUT", GOAL, {"goal": {"target_pose": target}}).status in {200, 201, 202}:
+            return
+
+
+def _give_up(request: Request, forward: Forward) -> None:
+    sent(request, forward, "DELETE", GOAL)
+
+
+def after_refusal(
+    where: Callable[[Request], bool],
+    act: Callable[[Request, Forward], None],
+    statuses: Container[int] = frozenset(_INVALID),
+) -> Make:
+    """A request is refused, as invalid or with one of other statuses, and something is done."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if where(request) and response.status in statuses:
+            act(request, forward)
+        return response
+
+    return lambda: change
+
+
+def _deliver(request: Request, forward: Forward) -> None:
+    path = f"{DELIVERIES}3/depot_x/1/depot_y/2/dest_x/3/dest_y/4/source_x/5/source_y/6"
+    sent(request, forward, "PUT", path)
+
+
+def _delivered_in_vain(request: Request, forward: Forward) -> Response:
+    """A delivery is made, and its answer is lost because nothing that could be said is acceptable."""
+    response = forward(request)
+    in_vain = unwanted(deliveries)(request) and success(response)
+    return problem(406, "nothing that you would have")(request) if in_vain else response
+
+
+def _ordered_by(method: str) -> Make:
+    """A delivery by a method that the resource does not have is answered as ever, and made."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        if deliveries(request.copy(method="PUT")) and request.method == method:
+            forward(request.copy(method="PUT"))
+        return forward(request)
+
+    return lambda: change
+
+
+def _soap_refusal(request: Request, forward: Forward) -> Response:
+    """What is refused over SOAP is delivered all the same."""
+    response = forward(request)
+    if request.side == "soap" and b"Execute" in request.body and b"Fault" in response.body:
+        # Only SOAP's side is at hand here: a valid message in place of the refused one.
+        values = "".join(f"<{name}>1</{name}>" for name in ("depot_x", "depot_y", "destination_x", "destination_y"))
+        message = f"<arg0>{values}<message_code>3</message_code><source_x>1</source_x><source_y>1</source_y></arg0>"
+        envelope = enveloped(f'<t:ExecuteDeliveryRequest xmlns:t="{TNS}">{message}</t:ExecuteDeliveryRequest>')
+        made = request.copy(body=envelope(request).body)
+        made.put("Content-Type", "text/xml; charset=utf-8")
+        forward(made)
+    return response
+
+
+_mutant = of_class("strict-input", "rest")
+
+MUTANTS = (
+    _mutant(
+        "input-velocity-refused-and-driven",
+        "An invalid velocity is refused, and the robot drives.",
+        "velocity-refused",
+        after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)),
+    ),
+    _mutant(
+        "http-406-and-driven",
+        "A velocity is answered 406, and the robot drives.",
+        "http/not-acceptable-undone",
+        after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2), {406}),
+    ),
+    _mutant(
+        "http-406-and-goal",
+        "A goal is answered 406, and the robot has a goal.",
+        "http/not-acceptable-undone",
+        after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5), {406}),
+    ),
+    _mutant(
+        "http-406-and-delivered",
+        "A delivery is answered 406, and published.",
+        "http/not-acceptable-undone",
+        lambda: _delivered_in_vain,
+        observer=True,
+    ),
+    _mutant(
+        "input-goal-refused-and-taken",
+        "An invalid goal is refused, and the robot has a goal.",
+        "goal-refused",
+        after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)),
+    ),
+    _mutant(
+        "input-goal-refused-and-ended",
+        "An invalid goal is refused, and the active one is cancelled.",
+        "goal-refused",
+        after_refusal(rest("PUT", GOAL), _give_up),
+    ),
+    _mutant(
+        "input-delivery-refused-and-made",
+        "An invalid delivery is refused, and published.",
+        "delivery-refused",
+        after_refusal(deliveries, _deliver),
+        observer=True,
+    ),
+    _mutant(
+        "input-delivery-by-get",
+        "GET of what PUT orders is 405, and orders it.",
+        "delivery-refused",
+        _ordered_by("GET"),
+        observer=True,
+    ),
+    _mutant(
+        "input-delivery-by-options",
+        "OPTIONS of what PUT orders is answered, and orders it.",
+        "delivery-refused",
+        _ordered_by("OPTIONS"),
+        observer=True,
+    ),
+    _mutant(
+        "input-soap-refused-and-made",
+        "An invalid SOAP delivery is refused, and published.",
+        "delivery-refused",
+        lambda: _soap_refusal,
+        observer=True,
+        interface="soap",
+    ),
+)

@@ -1,0 +1,252 @@
+"""Robots that take garbage over REST: what is invalid is repaired before it is looked at."""
+
+import json
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+from urllib.parse import parse_qsl
+
+from conformance.mutation.changes import (
+    altered,
+    becomes,
+    parsed,
+    plain,
+    query,
+    refusal,
+    rest,
+    rewritten,
+    status,
+    success,
+)
+from conformance.mutation.messages import Forward, Request, Response
+from conformance.mutation.mutant import of_class
+from conformance.packs.table1.mutants.delivery import any_code, finite, lenient, segments
+from conformance.packs.table1.mutants.paths import GOAL, LINEAR, PLAN, VELOCITY, deliveries
+
+_PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
+_ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+_UNIT = {**_ZERO, "w": 1.0}
+_VECTORS = {VELOCITY: {"linear": _ZERO, "angular": _ZERO}, LINEAR: _ZERO}
+_GOAL = {"goal": {"target_pose": {"header": {"frame_id": "map"}, "pose": {"position": _ZERO, "orientation": _UNIT}}}}
+_TIME = {"sec": 0, "nanosec": 0}
+_OPTIONAL = {"header": {"stamp": _TIME, "frame_id": ""}, "goal_id": {"stamp": _TIME, "id": "x"}, "stamp": _TIME}
+
+
+def _pattern(request: Request) -> Any:
+    return _VECTORS.get(request.path, _GOAL)
+
+
+def _is_json(request: Request) -> bool:
+    return _PUT(request) and request.media_type == "application/json"
+
+
+def _repairing(repair: Callable[[Any, Any], Any]) -> Callable[[], Any]:
+    """JSON that is well-formed is made to fit by ``repair(value, pattern)``."""
+
+    def edit(request: Request) -> None:
+        value = parsed(request.body)
+        if isinstance(value, dict):
+            request.body = json.dumps(repair(value, _pattern(request))).encode()
+
+    return rewritten(_is_json, edit)
+
+
+def _filled(value: Any, pattern: Any) -> Any:
+    """Missing fields become zero."""
+    if not isinstance(pattern, dict) or not isinstance(value, dict):
+        return value
+    return {**value, **{key: _filled(value.get(key, pattern[key]), pattern[key]) for key in pattern}}
+
+
+def _known(value: Any, pattern: Any) -> Any:
+    """Unknown fields are left out."""
+    if not isinstance(pattern, dict) or not isinstance(value, dict):
+        return value
+    parts = {**_OPTIONAL, **pattern} if "goal" in pattern or "frame_id" in pattern or "id" in pattern else pattern
+    return {key: _known(part, parts[key]) for key, part in value.items() if key in parts}
+
+
+def _typed(value: Any, pattern: Any) -> Any:
+    """Values of another type are made numbers, as a lenient language does."""
+    if isinstance(pattern, dict):
+        given = value if isinstance(value, dict) else pattern
+        return {key: _typed(part, pattern[key]) if key in pattern else part for key, part in given.items()}
+    if isinstance(pattern, float) and not (isinstance(value, int | float) and not isinstance(value, bool)):
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            return pattern
+        return number if math.isfinite(number) else pattern
+    return str(value) if isinstance(pattern, str) and not isinstance(value, str) else value
+
+
+def _finite(value: Any, pattern: Any) -> Any:
+    """Numbers that are not finite become zero."""
+    if isinstance(value, dict):
+        return {key: _finite(part, pattern) for key, part in value.items()}
+    return 0.0 if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _bounded(value: Any, pattern: Any) -> Any:
+    """Values beyond the contract's bounds are cut to them."""
+    if isinstance(value, dict):
+        made = {key: _bounded(part, pattern) for key, part in value.items()}
+        if isinstance(made.get("id"), str):
+            made["id"] = (made["id"] or "x")[:255]
+        for key, low, high in (("sec", -(2**31), 2**31 - 1), ("nanosec", 0, 2**32 - 1)):
+            if isinstance(made.get(key), int | float):
+                made[key] = int(max(low, min(high, made[key])))
+        return made
+    return value
+
+
+def _swallowed(where: Callable[[Request], bool]) -> Callable[[], Any]:
+    """What is refused there is answered as if it were fine."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        return plain(204)(request) if where(request) and not success(response) and response.status != 409 else response
+
+    return lambda: change
+
+
+def _malformed(request: Request) -> bool:
+    return (
+        _is_json(request)
+        and bool(request.body)
+        and parsed(request.body) is None
+        and request.body.strip() != b"null"
+        and not _deep(request)
+    )
+
+
+def _deep(request: Request) -> bool:
+    return _is_json(request) and (request.body.count(b"[") > 1000 or request.body.count(b"{") > 1000)
+
+
+def _huge(request: Request) -> bool:
+    return _is_json(request) and bool(re.search(rb"\d{1000}", request.body))
+
+
+def _other_encoding(request: Request) -> bool:
+    if not _is_json(request):
+        return False
+    try:
+        request.body.decode("utf-8")
+    except UnicodeDecodeError:
+        return True
+    return request.body.startswith(b"\xef\xbb\xbf") or b"\x00" in request.body
+
+
+def _no_object(request: Request) -> bool:
+    return (
+        _is_json(request)
+        and not isinstance(parsed(request.body), dict)
+        and bool(request.body)
+        and (parsed(request.body) is not None or request.body.strip() == b"null")
+    )
+
+
+def _twice(request: Request) -> None:
+    value = parsed(request.body)
+    if isinstance(value, dict):
+        request.body = json.dumps(value).encode()
+
+
+def _xml(request: Request) -> bool:
+    return _PUT(request) and request.media_type.endswith("xml")
+
+
+def _numbers(given: dict[str, str]) -> None:
+    for name, text in given.items():
+        if name != "frame_id" and not re.fullmatch(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,2})?", text):
+            given[name] = "0"
+
+
+class _Remembered:
+    """A missing x or y is the one of the query before."""
+
+    def __init__(self) -> None:
+        self._last = {"x": "0", "y": "0"}
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if not rest("GET", PLAN)(request):
+            return forward(request)
+        request = request.copy()
+        query(lambda given: given.update({name: value for name, value in self._last.items() if name not in given}))(
+            request
+        )
+        response = forward(request)
+        if success(response):
+            self._last = {name: text for name, text in parse_qsl(request.query) if name in self._last}
+        return response
+
+
+def _path(request: Request) -> None:
+    for edit in (lenient, finite, any_code):
+        segments(edit)(request)
+
+
+_mutant = of_class("strict-input", "rest")
+
+MUTANTS = (
+    _mutant("input-malformed-fine", "JSON that is none is answered 204.", "json-malformed", _swallowed(_malformed)),
+    _mutant("input-missing-is-zero", "A missing field counts as zero.", "json-missing", _repairing(_filled)),
+    _mutant("input-unknown-ignored", "Unknown fields are ignored.", "json-unknown", _repairing(_known)),
+    _mutant(
+        "input-last-wins",
+        "Of a name that is there twice, the last one counts.",
+        "json-duplicate",
+        rewritten(_is_json, _twice),
+    ),
+    _mutant("input-coerced", "Strings, null and booleans count as numbers.", "json-type", _repairing(_typed)),
+    _mutant("input-nan-is-zero", "NaN and what overflows count as zero.", "json-non-finite", _repairing(_finite)),
+    _mutant("input-any-root", "A body that is no object is answered 204.", "json-root", _swallowed(_no_object)),
+    _mutant("input-deep-fine", "JSON nested deep is answered 204.", "json-depth", _swallowed(_deep)),
+    _mutant(
+        "input-huge-fine", "An integer of thousands of digits is answered 204.", "json-huge-number", _swallowed(_huge)
+    ),
+    _mutant(
+        "input-any-encoding", "A body that is not UTF-8 is answered 204.", "json-encoding", _swallowed(_other_encoding)
+    ),
+    _mutant(
+        "input-empty-fine",
+        "An empty body is answered 204.",
+        "json-empty",
+        _swallowed(lambda request: _is_json(request) and not request.body.strip()),
+    ),
+    _mutant("input-bounds-cut", "Values beyond their bounds are cut to them.", "json-bounds", _repairing(_bounded)),
+    _mutant(
+        "input-path-lenient",
+        "Whatever stands in a path counts as a number.",
+        "path-parameter",
+        rewritten(deliveries, _path),
+    ),
+    _mutant(
+        "input-query-lenient",
+        "What is no number in a query counts as 0.",
+        "query-parameter",
+        rewritten(rest("GET", PLAN), query(_numbers)),
+    ),
+    _mutant("input-query-complete", "A missing x or y is the one of the query before.", "query-missing", _Remembered),
+    _mutant("input-xml-fine", "XML of the wrong shape is answered 204.", "xml-body", _swallowed(_xml)),
+    _mutant(
+        "input-malformed-422",
+        "JSON that is none is 422.",
+        "status-malformed",
+        altered(_is_json, becomes(422), status(400)),
+    ),
+    _mutant(
+        "input-invalid-400",
+        "JSON of the wrong shape is 400.",
+        "status-invalid",
+        altered(_is_json, becomes(400), status(422)),
+    ),
+    _mutant(
+        "input-crash-sometimes",
+        "One refused body in 20 is answered 500.",
+        "json-type",
+        altered(_is_json, becomes(500), refusal, nth=20),
+    ),
+)

@@ -1,0 +1,190 @@
+"""Robots that take garbage over SOAP: each repairs one kind of it before it is looked at."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from lxml import etree
+
+from conformance.mutation.changes import SOAP, altered, becomes, page, rewritten, soap
+from conformance.mutation.messages import Request
+from conformance.mutation.mutant import Mutant, of_class
+from conformance.packs.table1.delivery import XSD_FIELDS
+from conformance.packs.table1.mutants.paths import TNS
+from conformance.packs.table1.mutants.soap_responses import is_fault
+from conformance.packs.table1.mutants.xml_trees import named, xml
+
+_ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
+_ANY = soap()
+_XSI = "http://www.w3.org/2001/XMLSchema-instance"
+_DOUBLE = re.compile(r"\s*([+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?INF|NaN)\s*", re.ASCII)
+_INT = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
+
+
+def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Request], None]:
+    """``edit`` gets the Body and the deliveryRequestMessage (or None)."""
+
+    def apply(request: Request) -> None:
+        root = xml(request.body)
+        body = root.find(f"{{{SOAP}}}Body") if root is not None else None
+        if body is None:
+            return
+        message = next(iter(named(body, "arg0")), None)
+        before = etree.tostring(root)
+        edit(body, message)
+        if etree.tostring(root) != before:
+            request.body = etree.tostring(root)
+
+    return apply
+
+
+def _children(message: Any) -> list[Any]:
+    return [child for child in message if isinstance(child.tag, str)] if message is not None else []
+
+
+def _neutral(name: str) -> str:
+    return "3" if name == "message_code" else "0"
+
+
+def _filled(body: Any, message: Any) -> None:
+    for wrapper in body if message is None else ():
+        if isinstance(wrapper.tag, str) and etree.QName(wrapper).localname.startswith("Execute") and not len(wrapper):
+            message = etree.SubElement(wrapper, "arg0")
+    if message is None:
+        return
+    there = [child.tag for child in _children(message)]
+    for place, name in enumerate(XSD_FIELDS):
+        if name not in there:
+            made = etree.Element(name)
+            made.text = _neutral(name)
+            message.insert(place, made)
+
+
+def _known(body: Any, message: Any) -> None:
+    for child in _children(message):
+        if etree.QName(child).localname not in XSD_FIELDS:
+            message.remove(child)
+    for wrapper in body:
+        for child in _children(wrapper):
+            if etree.QName(child).localname != "arg0":
+                wrapper.remove(child)
+
+
+def _once(_body: Any, message: Any) -> None:
+    seen: set[str] = set()
+    for child in _children(message):
+        if child.tag in seen:
+            message.remove(child)
+        seen.add(child.tag)
+    parent = message.getparent() if message is not None else None
+    if parent is not None:
+        for twin in parent.findall("arg0")[1:]:
+            parent.remove(twin)
+
+
+def _ordered(_body: Any, message: Any) -> None:
+    if message is not None:
+        message[:] = sorted(
+            message, key=lambda child: XSD_FIELDS.index(child.tag) if child.tag in XSD_FIELDS else len(XSD_FIELDS)
+        )
+
+
+def _renamed(body: Any, _message: Any) -> None:
+    for wrapper in body:
+        if isinstance(wrapper.tag, str):
+            wrapper.tag = f"{{{TNS}}}{etree.QName(wrapper).localname}"
+            for node in wrapper.iterdescendants():
+                if isinstance(node.tag, str):
+                    node.tag = etree.QName(node).localname
+
+
+def _lexical(_body: Any, message: Any) -> None:
+    for child in _children(message):
+        good = _INT if child.tag == "message_code" else _DOUBLE
+        if not good.fullmatch("".join(child.itertext())) or len(child):
+            child[:] = []
+            child.text = _neutral(child.tag)
+
+
+def _wrapped(_body: Any, message: Any) -> None:
+    for child in _children(message):
+        if child.tag == "message_code" and _INT.fullmatch(child.text or "") and abs(int(child.text)) >= 2**31:
+            child.text = "3"
+
+
+def _finite(_body: Any, message: Any) -> None:
+    for child in _children(message):
+        text = (child.text or "").strip()
+        if re.fullmatch(r"[+-]?INF|NaN", text) or re.fullmatch(r"[+-]?[\d.]+[eE]\+?\d{3,}", text):
+            child.text = "0"
+
+
+def _not_nil(_body: Any, message: Any) -> None:
+    for child in [message, *_children(message)] if message is not None else []:
+        if child.attrib.pop(f"{{{_XSI}}}nil", None) and child is not message and not (child.text or "").strip():
+            child.text = _neutral(child.tag)
+    if message is not None and not len(message):
+        _filled(None, message)
+
+
+def _alone(body: Any, _message: Any) -> None:
+    for child in list(body)[1:]:
+        body.remove(child)
+    if not len(body):
+        wrapper = etree.SubElement(body, f"{{{TNS}}}ExecuteCoffeeRequest")
+        _filled(None, etree.SubElement(wrapper, "arg0"))
+
+
+def _coded(_body: Any, message: Any) -> None:
+    for child in _children(message):
+        text = (child.text or "").strip()
+        if child.tag == "message_code" and _INT.fullmatch(text) and int(text) not in {3, 4} and abs(int(text)) < 2**31:
+            child.text = "3"
+
+
+_of_class = of_class("strict-input", "soap")
+
+
+def _mutant(name: str, says: str, id_: str, edit: Callable[[Any, Any], None]) -> Mutant:
+    return _of_class(name, says, id_, rewritten(soap("Execute[A-Z][A-Za-z]+", "Body"), _repaired(edit)))
+
+
+MUTANTS = (
+    _mutant(
+        "input-soap-missing-is-zero", "A missing element counts as zero, as JAX-WS RI has it.", "soap-missing", _filled
+    ),
+    _mutant("input-soap-unknown-ignored", "Unknown elements are ignored, as JAX-WS RI has it.", "soap-unknown", _known),
+    _mutant(
+        "input-soap-first-wins", "Of an element that is there twice, the first one counts.", "soap-duplicate", _once
+    ),
+    _mutant("input-soap-any-order", "Elements may come in any order.", "soap-order", _ordered),
+    _mutant("input-soap-any-namespace", "Namespaces are not looked at.", "soap-namespace", _renamed),
+    _mutant(
+        "input-soap-text-is-zero",
+        "Text in place of a number counts as zero, as JAX-WS RI has it.",
+        "soap-lexical",
+        _lexical,
+    ),
+    _mutant("input-soap-overflow", "An integer beyond its type is cut.", "soap-range", _wrapped),
+    _mutant("input-soap-inf-is-zero", "INF and NaN count as zero.", "soap-non-finite", _finite),
+    _mutant("input-soap-nil-is-zero", "What is nil counts as zero.", "soap-nil", _not_nil),
+    _mutant(
+        "input-soap-first-child",
+        "Of Body's children the first one counts, and an empty Body is a coffee.",
+        "soap-body",
+        _alone,
+    ),
+    _mutant("input-soap-any-code", "Every code counts as 3.", "soap-code", _coded),
+    _of_class(
+        "input-soap-fault-200",
+        "What is refused over SOAP is refused with status 200.",
+        "soap-fault",
+        altered(_ANY, becomes(200), is_fault),
+    ),
+    _of_class(
+        "input-soap-no-fault",
+        "What is refused over SOAP is 500 without a fault.",
+        "soap-fault",
+        altered(_ACT, page(500, b"refused", "text/plain"), is_fault),
+    ),
+)

@@ -1,0 +1,254 @@
+"""Robots that are dangerous: they go on, go too fast, or start by themselves."""
+
+import time
+from typing import Any
+
+from conformance.mutation.changes import (
+    altered,
+    guarded,
+    inputs,
+    parsed,
+    plain,
+    problem,
+    rest,
+    rewritten,
+    success,
+    values,
+)
+from conformance.mutation.messages import Forward, Request, Response, unchanged
+from conformance.mutation.mutant import of_class
+from conformance.packs.table1.mutants.goal_memory import active
+from conformance.packs.table1.mutants.in_background import later
+from conformance.packs.table1.mutants.input_effects import after_refusal, drive, goal_ahead, sent
+from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
+
+_PUT = rest("PUT", VELOCITY)
+_PUTS = rest("PUT", VELOCITY, LINEAR)
+_DELETE = rest("DELETE", GOAL)
+_ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+_AXES = (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y"))
+
+
+def moving(request: Request) -> bool:
+    """Whether a velocity is asked for that is not zero."""
+    value = parsed(request.body)
+    try:
+        return bool(value["linear"]["x"] or value["angular"]["z"])
+    except (TypeError, KeyError):
+        return False
+
+
+class _Relentless:
+    """A velocity is renewed by the robot itself, for ten seconds, until another one comes."""
+
+    def __init__(self) -> None:
+        self._turn = 0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if (_PUT(request) or rest("PUT", GOAL)(request)) and success(response):
+            self._turn += 1
+            if _PUT(request) and moving(request):
+                later(0.15, self._renew, self._turn, request.copy(), forward)
+        return response
+
+    def _renew(self, turn: int, request: Request, forward: Forward) -> None:
+        until = time.monotonic() + 10
+        value = parsed(request.body)
+        while time.monotonic() < until and self._turn == turn:
+            sent(request, forward, "PUT", VELOCITY, value)
+            time.sleep(0.15)
+
+
+class _LongWinded:
+    """A velocity is renewed by the robot itself, once, after half of its hold time."""
+
+    def __init__(self) -> None:
+        self._turn = 0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if (_PUT(request) or rest("PUT", GOAL)(request)) and success(response):
+            self._turn += 1
+            if moving(request):
+                later(0.55, self._renew, self._turn, request.copy(), forward)
+        return response
+
+    def _renew(self, turn: int, request: Request, forward: Forward) -> None:
+        if self._turn == turn:
+            sent(request, forward, "PUT", VELOCITY, parsed(request.body))
+
+
+class _ShortOfBreath:
+    """A velocity ends after 0.15 s."""
+
+    def __init__(self) -> None:
+        self._turn = 0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if _PUT(request) and success(response):
+            self._turn += 1
+            later(0.15, self._end, self._turn, request.copy(), forward)
+        return response
+
+    def _end(self, turn: int, request: Request, forward: Forward) -> None:
+        if self._turn == turn:
+            drive(request, forward, 0.0)
+
+
+class _Once:
+    """The same velocity again is answered, and not passed on."""
+
+    def __init__(self) -> None:
+        self._last: Any = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if not _PUT(request):
+            return forward(request)
+        value = parsed(request.body)
+        if value is not None and value == self._last and moving(request):
+            return plain(204)(request)
+        response = forward(request)
+        self._last = value if success(response) else self._last
+        return response
+
+
+class _SlowCancel:
+    """A cancelled goal is gone at once, and the robot drives on for three seconds."""
+
+    def __init__(self) -> None:
+        self._until = 0.0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        gone = time.monotonic() < self._until
+        if _DELETE(request) and not gone and active(forward, request) is not None:
+            self._until = time.monotonic() + 3.0
+            later(3.0, sent, request.copy(), forward, "DELETE", GOAL)
+            return plain(204)(request)
+        if gone and rest("GET DELETE", GOAL)(request):
+            return problem(404, "there is no goal")(request)
+        return forward(request)
+
+
+def _second_wind(request: Request, forward: Forward) -> Response:
+    """A second after its goal was cancelled, the robot drives again."""
+    response = forward(request)
+    if _DELETE(request) and response.status == 204:
+        later(1.0, goal_ahead, request.copy(), forward, 0.8)
+    return response
+
+
+def _clamped(value: Any) -> None:
+    for vector, axis, limit in ((value.get("linear", value), "x", 0.25), (value.get("angular", {}), "z", 1.0)):
+        if isinstance(vector.get(axis), int | float):
+            vector[axis] = max(-limit, min(limit, vector[axis]))
+
+
+def _two_wheeled(twist: Any) -> None:
+    for part, axis in _AXES:
+        if isinstance(twist[part][axis], int | float):
+            twist[part][axis] = 0.0
+
+
+def _too_fast(twist: Any) -> None:
+    """What is measured is four times what is driven, above a crawl."""
+    for part, axis in (("linear", "x"), ("angular", "z")):
+        if abs(twist[part][axis]) > 0.15:
+            twist[part][axis] *= 4
+
+
+class _Stubborn:
+    """A velocity of zero is answered, and the velocity before it goes on for three seconds."""
+
+    def __init__(self) -> None:
+        self._last: Any = None
+        self._turn = 0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if not _PUT(request):
+            return forward(request)
+        self._turn += 1
+        if moving(request):
+            response = forward(request)
+            self._last = parsed(request.body) if success(response) else self._last
+            return response
+        if self._last is None or not _zero(parsed(request.body)):
+            return forward(request)
+        last, self._last = self._last, None
+        later(0, self._go_on, self._turn, last, request.copy(), forward)
+        return plain(204)(request)
+
+    def _go_on(self, turn: int, last: Any, request: Request, forward: Forward) -> None:
+        until = time.monotonic() + 3
+        while time.monotonic() < until and self._turn == turn:
+            sent(request, forward, "PUT", VELOCITY, last)
+            time.sleep(0.15)
+
+
+def _zero(value: Any) -> bool:
+    try:
+        return not any(value[part][axis] for part in ("linear", "angular") for axis in "xyz")
+    except (TypeError, KeyError):
+        return False
+
+
+def _torn(side: str, _octets: bytes, forward: Forward) -> None:
+    """What had come of a request is carried out."""
+    if side == "rest":
+        drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
+
+
+_mutant = of_class("safety", "rest")
+
+MUTANTS = (
+    _mutant("safety-relentless", "A velocity holds for ten seconds.", "watchdog", _Relentless),
+    _mutant("safety-long-winded", "A velocity holds for half as long again.", "hold-ends", _LongWinded),
+    _mutant("safety-short-of-breath", "A velocity holds for 0.15 s.", "hold", _ShortOfBreath),
+    _mutant("safety-no-renewal", "The same velocity again does not renew it.", "renewal", _Once),
+    _mutant(
+        "safety-no-stop", "A velocity of zero is answered, and the robot goes on for three seconds.", "stop", _Stubborn
+    ),
+    _mutant(
+        "safety-clamped",
+        "A velocity beyond the limits is cut to them.",
+        "limits-refused",
+        rewritten(_PUTS, inputs(guarded(_clamped))),
+    ),
+    _mutant(
+        "safety-unactuated-ignored",
+        "Components that the robot does not have are ignored.",
+        "unactuated-refused",
+        rewritten(_PUT, inputs(guarded(_two_wheeled))),
+    ),
+    _mutant(
+        "safety-too-fast",
+        "The robot drives at four times its speed.",
+        "limits-hold",
+        altered(rest("GET", VELOCITY), values(_too_fast)),
+    ),
+    _mutant(
+        "safety-refused-stops",
+        "A refused velocity stops the robot.",
+        "refused-keeps",
+        after_refusal(_PUTS, lambda request, forward: drive(request, forward, 0.0)),
+    ),
+    _mutant("safety-slow-cancel", "After DELETE the robot drives on for three seconds.", "cancel", _SlowCancel),
+    _mutant(
+        "safety-second-wind", "A second after DELETE the robot drives again.", "cancel-stays", lambda: _second_wind
+    ),
+    _mutant(
+        "safety-torn-drives",
+        "A request that ends in the middle moves the robot.",
+        "client-vanished",
+        lambda: unchanged,
+        incomplete_request=lambda: _torn,
+    ),
+    _mutant(
+        "safety-one-at-a-time",
+        "A request that is never completed keeps all others waiting.",
+        "half-request",
+        lambda: unchanged,
+        serial=True,
+    ),
+)

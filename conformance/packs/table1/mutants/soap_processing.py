@@ -1,0 +1,218 @@
+"""Robots that process envelopes, headers and encodings as SOAP 1.1 does not have it."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from lxml import etree
+
+from conformance.mutation.changes import SOAP, altered, anything, instead, page, posted, rewritten, soap
+from conformance.mutation.messages import Forward, Request, Response
+from conformance.mutation.mutant import of_class
+from conformance.packs.table1.mutants.paths import TNS
+from conformance.packs.table1.mutants.soap_responses import coded, enveloped, fault, is_fault
+from conformance.packs.table1.mutants.xml_trees import xml
+
+_ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
+
+
+def _foreign(request: Request) -> bool:
+    return posted(request) and b"Envelope" in request.body and SOAP.encode() not in request.body
+
+
+def _made_soap11(request: Request) -> None:
+    root = xml(request.body)
+    if root is None:
+        return
+    namespace = etree.QName(root).namespace
+    for node in root.iter():
+        if isinstance(node.tag, str) and etree.QName(node).namespace == namespace:
+            node.tag = f"{{{SOAP}}}{etree.QName(node).localname}"
+    request.body = etree.tostring(root)
+
+
+def _mandatory(request: Request) -> bool:
+    return posted(request) and b"mustUnderstand" in request.body
+
+
+def without_headers(request: Request) -> Request:
+    """A request without its header blocks."""
+    root = xml(request.body)
+    made = request.copy()
+    if root is not None:
+        for block in root.findall(f"{{{SOAP}}}Header"):
+            root.remove(block)
+        made.body = etree.tostring(root)
+    return made
+
+
+def _acts_all_the_same(request: Request, forward: Forward) -> Response:
+    """A request is carried out, and answered with a MustUnderstand fault."""
+    response = forward(request)
+    if _mandatory(request) and b"MustUnderstand" in response.body:
+        forward(without_headers(request))
+    return response
+
+
+def _recoded(request: Request, forward: Forward, was: bytes, code: str) -> Response:
+    response = forward(request)
+    if posted(request) and is_fault(response) and was in response.body:
+        response = response.copy()
+        coded(code)(response)
+    return response
+
+
+def _recode(was: bytes, code: str) -> Callable[[], Any]:
+    return lambda: lambda request, forward: _recoded(request, forward, was, code)
+
+
+def _order(request: Request, forward: Forward) -> Response:
+    """Header blocks are looked at before the envelope's version, and the body before them."""
+    if _mandatory(request) and _foreign(request):
+        return _recoded(request, forward, b"VersionMismatch", "MustUnderstand")
+    response = forward(request)
+    if _mandatory(request) and b"MustUnderstand" in response.body:
+        body = forward(without_headers(request))
+        if is_fault(body):
+            return body
+    return response
+
+
+def _by_action(request: Request, forward: Forward) -> Response:
+    """SOAPAction chooses the operation."""
+    action = (request.field("SOAPAction") or "").strip('"')
+    wanted = next((name for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest") if name in action), None)
+    if posted(request) and wanted and b"Execute" in request.body:
+        request = request.copy(body=re.sub(rb"Execute(Coffee|Delivery)Request", wanted.encode(), request.body))
+    return forward(request)
+
+
+def _headed(request: Request) -> bool:
+    """Requests with a header block that is not mandatory and not of WS-Addressing."""
+    root = xml(request.body) if posted(request) else None
+    header = root.find(f"{{{SOAP}}}Header") if root is not None else None
+    return (
+        header is not None
+        and len(header) > 0
+        and b"mustUnderstand" not in request.body
+        and b"addressing" not in request.body
+    )
+
+
+def _for_others(request: Request) -> bool:
+    return _mandatory(request) and b"actor" in request.body and b"actor/next" not in request.body
+
+
+def _unknown(request: Request) -> bool:
+    root = xml(request.body) if posted(request) else None
+    body = root.find(f"{{{SOAP}}}Body") if root is not None else None
+    child = body[0] if body is not None and len(body) == 1 else None
+    if child is None or not isinstance(child.tag, str):
+        return False
+    local = etree.QName(child).localname
+    return not re.fullmatch(
+        r"Execute(Coffee|Delivery)Request|Get(Pose|Velocity|Sensors|NavigationServices|Goal|Plan)", local
+    )
+
+
+_NOTHING = f'<t:NothingResponse xmlns:t="{TNS}"/>'
+
+
+_mutant = of_class("soap-basic-profile", "soap")
+
+MUTANTS = (
+    _mutant(
+        "bp-bare-envelope",
+        "An Envelope with an attribute of another namespace is a fault.",
+        "soap-delivery/syntax",
+        instead(
+            lambda request: posted(request) and bool(re.search(rb"Envelope [^>]*:Id=", request.body)),
+            fault("Client", "an attribute that is not known"),
+        ),
+    ),
+    _mutant("bp-any-envelope", "An Envelope of any namespace is taken.", "R1015", rewritten(_foreign, _made_soap11)),
+    _mutant(
+        "bp-version-client",
+        "Another envelope's fault has the code Client.",
+        "version-mismatch",
+        _recode(b"VersionMismatch", "Client"),
+    ),
+    _mutant(
+        "bp-wants-types",
+        "A request without xsi:type is a fault.",
+        "R1017",
+        instead(
+            lambda request: _ACT(request) and b"XMLSchema-instance" not in request.body,
+            fault("Client", "xsi:type is missing"),
+        ),
+    ),
+    _mutant(
+        "bp-ignores-mandatory",
+        "Mandatory header blocks are not looked at.",
+        "R1027",
+        lambda: lambda request, forward: forward(without_headers(request) if _mandatory(request) else request),
+    ),
+    _mutant(
+        "bp-mandatory-client",
+        "The fault for a mandatory header block has the code Client.",
+        "R1027",
+        _recode(b"MustUnderstand", "Client"),
+    ),
+    _mutant(
+        "bp-acts-all-the-same",
+        "A request that is answered MustUnderstand is carried out.",
+        ("R1025", "R1028"),
+        lambda: _acts_all_the_same,
+        observer=True,
+    ),
+    _mutant(
+        "bp-no-empty-action",
+        "An empty SOAPAction is a fault.",
+        "R1109",
+        instead(
+            lambda request: posted(request) and len(request.field("SOAPAction") or "") == 2,
+            fault("Client", "The given SOAPAction does not match an operation."),
+        ),
+    ),
+    _mutant("bp-action-dispatch", "SOAPAction chooses the operation.", "R1127", lambda: _by_action),
+    _mutant("bp-fault-order", "Faults are checked for from the body outwards.", "R2725", lambda: _order),
+    _mutant(
+        "bp-no-headers",
+        "Every header block is a fault.",
+        "R2739",
+        instead(_headed, fault("Client", "no headers, please")),
+    ),
+    _mutant(
+        "bp-no-byte-order-mark",
+        "A byte order mark is malformed.",
+        "R4001",
+        instead(
+            lambda request: posted(request) and request.body.startswith(b"\xef\xbb\xbf"),
+            fault("Client", "content is not allowed in prolog"),
+        ),
+    ),
+    _mutant(
+        "bp-no-utf-16",
+        "UTF-16 is malformed.",
+        "utf-16",
+        instead(
+            lambda request: posted(request) and request.body[:2] in {b"\xff\xfe", b"\xfe\xff"},
+            fault("Client", "not UTF-8"),
+        ),
+    ),
+    _mutant(
+        "bp-unknown-fine", "An unknown operation succeeds.", "unknown-operation", instead(_unknown, enveloped(_NOTHING))
+    ),
+    _mutant(
+        "bp-mandatory-for-others",
+        "A mandatory header block for another actor is a fault.",
+        "mustunderstand-actor",
+        instead(_for_others, fault("MustUnderstand", "not understood")),
+    ),
+    _mutant(
+        "bp-sometimes-a-page",
+        "One answer in 50 is a page with 200.",
+        "content-type",
+        altered(posted, page(200, b"<html><body>OK</body></html>", "text/html"), anything, nth=50),
+    ),
+)

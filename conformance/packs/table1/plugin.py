@@ -1,0 +1,140 @@
+"""What the generic suite asks this pack for: the statement's own tables, and the robot as a device."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from conformance.api import device
+from conformance.packs.table1.statement import Statement, StatementFile, said_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from conformance.documents.wsdl import Operation
+    from conformance.documents.xml_node import Node
+    from conformance.packs.table1.robot.clock import Clock
+    from conformance.packs.table1.robot.examples import Examples
+    from conformance.transport.exchange import Listener
+
+_TEMPLATE = """
+[limits]
+# What is not declared is judged with the reference robot's limits halved, 2 s to settle, and no check of the hold time.
+# linear_m_s = 0.7           # greatest speed
+# angular_rad_s = 2.5        # greatest turning rate
+# settle_s = 0.6             # a commanded velocity is reached within
+# hold_s = 1.0               # a velocity holds for, unless renewed
+# tolerance = 0.05           # of a reached velocity, relative
+# tolerance_linear_m_s = 0.02     # and absolute
+# tolerance_angular_rad_s = 0.02
+
+[motion]
+# Where the robot may be driven. Without an arena, goals stay within radius_m of where it is.
+# arena = [0.0, 0.0, 10.0, 5.0]       # x_min, y_min, x_max, y_max, m
+# radius_m = 1.0
+# frame = "map"
+# goals = [[1.0, 2.0, 0.0]]           # x, y, yaw: poses that can be reached
+# odom_to_map = [0.0, 0.0, 0.0]       # x, y, yaw of the odometry frame in the map
+# actuated = ["linear.x", "angular.z"]
+
+[ros]
+# With a domain, a probe watches what reaches ROS (needs rclpy where the suite runs).
+# domain_id = 0
+# delivery_topic = "/DeliveryRequestMsg/from_json"
+# cmd_vel_topic = "/cmd_vel"
+"""
+
+__all__ = ["Device", "Statement", "StatementFile"]
+
+
+class Device(device.Device):
+    """The paper's robot in one run. Its modules are imported when they are needed: statements are read without them."""
+
+    is_known = True
+    statement_template = _TEMPLATE
+    doubts = MappingProxyType({"safety": "to claim it, declare limits and hold time below"})
+    fixtures = ("conformance.packs.table1.fixtures",)
+
+    @property
+    def settle_s(self) -> float:
+        """Time within which a commanded velocity is reached, s."""
+        return said_of(self.run).limits.settle_s
+
+    @property
+    def hold_s(self) -> float | None:
+        """Time for which a velocity holds unless renewed, s; None: not declared."""
+        return said_of(self.run).limits.hold_s
+
+    @cached_property
+    def _examples(self) -> Examples:
+        from conformance.packs.table1.robot.examples import Examples  # noqa: PLC0415 - see the class
+
+        return Examples(said_of(self.run))
+
+    @cached_property
+    def clock(self) -> Clock:
+        """The robot's clock, as the stamps of all responses in the run show it."""
+        from conformance.packs.table1.robot.clock import Clock  # noqa: PLC0415 - see the class
+
+        return Clock()
+
+    def fit(self, api: device.Rest, operation_id: str, value: Any) -> Any:
+        """Return a valid value of an operation within the robot's limits, near where it is, in its frames."""
+        return self._examples.fit(api, operation_id, value)
+
+    def marked(self, operation_id: str, value: Any) -> Any:
+        """Return a goal with an id of the suite's own; any other value as it is."""
+        return {**value, "goal_id": {"id": "written as XML"}} if operation_id == "putGoal" else value
+
+    def answers_alike(self, template: str) -> bool:
+        """Return whether a resource's responses to equal requests are equal."""
+        from conformance.packs.table1.robot.robot import LINEAR, VELOCITY  # noqa: PLC0415 - see the class
+
+        return template in {VELOCITY, LINEAR}
+
+    def is_near(self, place: str, shown: Any, wanted: Any) -> bool:
+        """Return whether a value that is read is the one that was sent, within the declared tolerance."""
+        if not (isinstance(shown, float) and isinstance(wanted, float)):
+            return bool(shown == wanted)
+        limits = said_of(self.run).limits
+        room = limits.tolerance_angular_rad_s if "angular" in place else limits.tolerance_linear_m_s
+        return abs(shown - wanted) <= room + limits.tolerance * abs(wanted)
+
+    def messages(self, service: device.Soap, operation: Operation) -> Iterator[Node]:
+        """Yield SOAP messages that the robot takes, likeliest first; none where the obvious one will do."""
+        from conformance.packs.table1.robot.soap_services import known_messages  # noqa: PLC0415 - see the class
+
+        return known_messages(service, operation)
+
+    def questions(self, api: device.Rest) -> Iterable[device.Question]:
+        """Return plans to several poses, whose responses can be told apart."""
+        from conformance.packs.table1.robot.plan_questions import plan_questions  # noqa: PLC0415 - see the class
+
+        return plan_questions(api)
+
+    def observers(self, api: device.Rest) -> Iterable[Listener]:
+        """Return what judges every exchange with the robot's resources."""
+        from conformance.packs.table1.robot.goal_observer import GoalObserver  # noqa: PLC0415 - see the class
+        from conformance.packs.table1.robot.observer import Observer  # noqa: PLC0415 - see the class
+        from conformance.packs.table1.robot.plan_observer import PlanObserver  # noqa: PLC0415 - see the class
+
+        return (Observer(api, self.clock), GoalObserver(api), PlanObserver(api))
+
+    def halt(self, api: device.Rest) -> None:
+        """Cancel and stop what the robot may be doing, without waiting until it stands still."""
+        from conformance.packs.table1.robot.stopping import halt  # noqa: PLC0415 - see the class
+
+        halt(api)
+
+    def bring_to_rest(self, api: device.Rest) -> str:
+        """Cancel what the robot is doing and wait until it stands still; return why it does not, or an empty text."""
+        from conformance.packs.table1.robot.stopping import bring_to_rest  # noqa: PLC0415 - see the class
+
+        return bring_to_rest(api)
+
+    def leave_at_rest(self, api: device.Rest) -> None:
+        """Stop the robot at the end of a run; never raises, and returns within seconds."""
+        from conformance.packs.table1.robot.stopping import leave_at_rest  # noqa: PLC0415 - see the class
+
+        leave_at_rest(api)

@@ -1,0 +1,167 @@
+"""Who sees what became of a delivery: a ROS probe beside the robot, or the robot's own list."""
+
+import time
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.robot.delivery import Delivery
+from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
+from conformance.packs.table1.robot.message_shapes import read_as
+from conformance.packs.table1.robot.probe.client import Probe, ProbeError, RosProbe
+from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
+from conformance.packs.table1.statement import said_of
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.pace import Patience
+
+# How long messages are waited for, and how long after the last one another is still looked for, s.
+_ARRIVES_S: Final = 2.0
+QUIET_S: Final = 0.15
+_STEP_S: Final = 0.02
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A delivery that arrived.
+
+    Attributes:
+        delivery: its values.
+        interface: "rest" or "soap", where that can be seen, else empty.
+    """
+
+    delivery: Delivery
+    interface: str = ""
+
+
+class DeliveryObserver(Protocol):
+    """Sees deliveries.
+
+    Attributes:
+        exact: whether even the sign of a zero is seen, which JSON may lose.
+    """
+
+    exact: bool
+
+    def mark(self) -> None:
+        """Forget what was seen so far."""
+
+    def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
+        """What was seen since the mark, or since this was asked last; oldest first.
+
+        Waits for ``count`` of them, and then for so much longer, s.
+        """
+
+
+class NoObserverError(Exception):
+    """Nobody sees what becomes of a delivery; the message says why."""
+
+
+class ListObserver:
+    """The robot's own list.
+
+    Args:
+        rest: where it is.
+        slow_s: how long the robot usually takes.
+    """
+
+    exact = False
+
+    def __init__(self, rest: HttpClient, slow_s: float) -> None:
+        self._rest = rest
+        self._slow_s = slow_s
+        self._before: list[Any] = []
+
+    def mark(self) -> None:
+        """See DeliveryObserver."""
+        self._before = self._listed()
+
+    def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
+        """See DeliveryObserver."""
+        patience = Patience(self._rest.connection.pace, _ARRIVES_S + 4 * self._slow_s)
+        listed = self._listed()
+        while len(self._new(listed)) < count and not patience.over:
+            time.sleep(_STEP_S)
+            listed = self._listed()
+        if then_s:
+            time.sleep(then_s)
+            listed = self._listed()
+        new = self._new(listed)
+        self._before = listed
+        return [Seen(Delivery.of(entry["request"]), entry["interface"]) for entry in reversed(new)]
+
+    def _new(self, listed: list[Any]) -> list[Any]:
+        """The entries that the list had not before, newest first: those before the first old one."""
+        now, old = [_identity(entry) for entry in listed], [_identity(entry) for entry in self._before]
+        for count in range(len(now)):
+            rest = now[count:]
+            if rest == old[: len(rest)]:
+                return listed[:count]
+        return listed
+
+    def _listed(self) -> list[Any]:
+        value, problem = read_as(self._rest.send("GET", DELIVERIES, headers=ACCEPT_JSON).response, LIST)
+        if problem:
+            raise NoObserverError(f"the robot's list of deliveries cannot be read: {problem}")
+        entries: list[Any] = value
+        return entries
+
+
+def _identity(entry: Any) -> tuple[Any, ...]:
+    """What of an entry stays the same; its state does not."""
+    accepted = entry["accepted"]
+    return (Delivery.of(entry["request"]).bits, accepted["sec"], accepted["nanosec"], entry["interface"])
+
+
+class ProbeObserver:
+    """A ROS node beside the robot.
+
+    Args:
+        probe: its process.
+        connection: tells when anything was asked for that might be a delivery.
+    """
+
+    exact = True
+
+    def __init__(self, probe: Probe, connection: Connection) -> None:
+        self._probe = probe
+        self._connection = connection
+
+    def mark(self) -> None:
+        """See DeliveryObserver."""
+        # What was asked for since somebody collected may still be on its way.
+        if self._connection.acted_at > self._probe.heard_at:
+            time.sleep(max(0.0, self._connection.acted_at + QUIET_S - time.monotonic()))
+            self._probe.heard_at = time.monotonic()
+        self._probe.deliveries()
+
+    def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
+        """See DeliveryObserver."""
+        until = time.monotonic() + _ARRIVES_S
+        seen = self._probe.deliveries()
+        while len(seen) < count and time.monotonic() < until:
+            time.sleep(_STEP_S)
+            seen += self._probe.deliveries()
+        if then_s:
+            time.sleep(then_s)
+            seen += self._probe.deliveries()
+        if then_s >= QUIET_S:
+            self._probe.heard_at = time.monotonic()
+        return [Seen(delivery) for delivery in seen]
+
+
+def observer_of(api: RestInterface, probe: RosProbe) -> DeliveryObserver:
+    """The best observer that this run has.
+
+    Raises:
+        NoObserverError: it has none.
+    """
+    reason = "no ROS domain is given (--ros-domain-id)"
+    if said_of(api.run).ros.domain_id is not None:
+        try:
+            return ProbeObserver(probe.ready(), api.client.connection)
+        except ProbeError as error:
+            reason = f"the ROS probe does not work: {error}"
+    exchange = api.client.send("GET", DELIVERIES, headers=ACCEPT_JSON)
+    if not exchange.response.ok:
+        raise NoObserverError(f"{reason}, and the robot has no list of deliveries ({exchange.came})")
+    return ListObserver(api.client, api.run.effort.usual_ms / 1000)

@@ -1,0 +1,101 @@
+"""Deliveries: their values, and the forms in which a client may write them."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+from hypothesis import strategies as st
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.validity import require_valid
+from conformance.api.soap.forms import EXTREMES
+from conformance.packs.table1.delivery import COFFEE, COURIER, PATH_NAMES
+from conformance.packs.table1.robot.robot import DELIVERIES
+from conformance.transport.client import Headers
+from conformance.transport.exchange import Exchange
+
+# Both ends of a double, of its subnormals and of what an integer holds exactly; the paper's own example.
+_KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-308)
+# As long as this a plain number is only digits.
+_ONLY_DIGITS: Final = 1e15
+
+
+class Delivery(NamedTuple):
+    """A mybot_delivery_app/DeliveryRequestMsg; coordinates in metres."""
+
+    message_code: int
+    depot_x: float
+    depot_y: float
+    destination_x: float
+    destination_y: float
+    source_x: float
+    source_y: float
+
+    @classmethod
+    def of(cls, request: Mapping[str, Any]) -> Delivery:
+        """From JSON of the right shape."""
+        return cls(int(request["message_code"]), *(float(request[name]) for name in cls._fields[1:]))
+
+    @property
+    def bits(self) -> bytes:
+        """The values bit for bit, so that two are equal only when no digit was lost, nor the sign of a zero."""
+        return struct.pack(">q6d", *self)
+
+    @property
+    def rest_path(self) -> str:
+        """The target of its PUT, each number in the shortest form that gives it back."""
+        return path_of(str(self.message_code), *(repr(value) for value in self[1:]))
+
+
+def path_of(code: str, *coordinates: str) -> str:
+    """The target of a delivery PUT with values as they are written: code, depot, destination, source."""
+    pairs = "".join(f"/{name}/{value}" for name, value in zip(PATH_NAMES, coordinates, strict=True))
+    return f"{DELIVERIES}{code}{pairs}"
+
+
+def put_delivery(api: RestInterface, path: str, *, fresh: bool = False, headers: Headers = ()) -> Exchange:
+    """PUT a delivery that has to be taken.
+
+    Raises:
+        HarnessError: it is not valid by the contract.
+        NoAnswerError: no HTTP response came.
+    """
+    require_valid(api.run.contract, "PUT", path)
+    return api.client.send("PUT", path, headers=headers, fresh=fresh)
+
+
+def written(value: float) -> tuple[str, ...]:
+    """The forms in which the contract lets a number be written: sign, fraction and exponent, or not."""
+    forms = [repr(value), f"{value:.17e}", f"{value:+.20e}"]
+    if abs(value) < _ONLY_DIGITS:
+        plain = f"{value:.30f}"
+        forms += [plain] if float(plain) == value else []
+        if value.is_integer() and math.copysign(1, value) > 0:
+            forms += [str(int(value)), f"+{int(value)}", f"00{int(value)}"]
+        if 0 < abs(value) < 1 and "e" not in repr(value):
+            forms.append(repr(value).replace("0.", ".", 1))
+    return tuple(forms)
+
+
+def doubles() -> st.SearchStrategy[float]:
+    """Finite doubles over their whole range, the corners often."""
+    return st.one_of(st.sampled_from(_KNOWN), st.floats(allow_nan=False, allow_infinity=False))
+
+
+def deliveries() -> st.SearchStrategy[Delivery]:
+    """Deliveries of any finite coordinates."""
+    return st.builds(Delivery, st.sampled_from((COURIER, COFFEE)), *[doubles()] * len(PATH_NAMES))
+
+
+def lexical_deliveries() -> st.SearchStrategy[tuple[Delivery, tuple[str, ...]]]:
+    """Deliveries with each value as it is to be written."""
+
+    def forms(delivery: Delivery) -> st.SearchStrategy[tuple[Delivery, tuple[str, ...]]]:
+        code = st.sampled_from((str(delivery.message_code), f"+{delivery.message_code}", f"0{delivery.message_code}"))
+        numbers = (st.sampled_from(written(value)) for value in delivery[1:])
+        return st.tuples(st.just(delivery), st.tuples(code, *numbers))
+
+    return deliveries().flatmap(forms)

@@ -1,0 +1,255 @@
+"""Driving a robot by its velocity: what talks to the robot, and keeps a trace for drive_rules to judge."""
+
+import math
+import time
+from http import HTTPStatus
+from typing import Final
+
+import pytest
+
+from conformance.packs.table1.robot import drive_rules, windows
+from conformance.packs.table1.robot.drive_rules import Judgement
+from conformance.packs.table1.robot.drive_trace import Command, Trace, Turn
+from conformance.packs.table1.robot.path import judge_path
+from conformance.packs.table1.robot.robot import STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.windows import ALL, SEVERAL
+from conformance.transport.exchange import Exchange
+
+# A turn of readings is not begun more often than this, s: the robot's odometry has tens of hertz.
+_PACE_S: Final = 0.02
+# How long a velocity is counted on to hold where the statement does not say, s.
+_COUNTED_ON_S: Final = 0.5
+# A velocity of which too few samples are seen is looked at for so much longer, s.
+_LONGER_S: Final = 1.0
+# So many requests are a look.
+_LOOK: Final = 3
+_OUTLASTED: Final = "an answer takes so long that a velocity ends before it is read"
+# How often it is begun anew to reach a velocity that was renewed too late, so that it may have ended before.
+_LAPSES: Final = 2
+
+
+class Drive:
+    """One drive, which feeds many requirements.
+
+    Attributes:
+        trace: what was commanded and seen so far.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.trace = Trace(time.monotonic())
+        self._turn_at = 0.0
+
+    def command(self, velocity: Velocity, *, integers: bool = False) -> bool:
+        """PUT a velocity, and judge how it is answered.
+
+        Args:
+            velocity: within the limits.
+            integers: write whole numbers without a fraction.
+
+        Raises:
+            pytest.skip.Exception: a goal of the robot's own is active, so the check that drives cannot be judged.
+        """
+        sent = time.monotonic()
+        if integers:
+            whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
+            exchange = self.robot.put(VELOCITY, whole)
+        else:
+            exchange = self.robot.put_velocity(velocity)
+        return self._commanded(Command(velocity, sent, time.monotonic(), exchange, integers=integers))
+
+    def command_linear(self, velocity: Velocity) -> bool:
+        """PUT the linear part of a velocity, and judge how it is answered.
+
+        Raises:
+            pytest.skip.Exception: a goal of the robot's own is active, so the check that drives cannot be judged.
+        """
+        sent = time.monotonic()
+        exchange = self.robot.put_linear(velocity)
+        return self._commanded(Command(velocity, sent, time.monotonic(), exchange, linear_only=True))
+
+    def commanded(self, velocity: Velocity, sent: float, exchange: Exchange) -> None:
+        """Take down a command that somebody else gave, at a moment of the monotonic clock, as the last one."""
+        self.trace = self.trace.commanded(Command(velocity, sent, time.monotonic(), exchange))
+
+    def _commanded(self, command: Command) -> bool:
+        self.trace = self.trace.commanded(command)
+        if command.exchange.response.status == HTTPStatus.CONFLICT and self.robot.goal()[0] is not None:
+            pytest.skip("the robot follows a goal of its own")
+        return self._judge(drive_rules.answer_of(command))
+
+    def _renew(self) -> None:
+        """Give the last command again, in the same way: a PUT of all components would do what it may have failed to."""
+        last = self.trace.last_command
+        if last is None:
+            return
+        sent = time.monotonic()
+        put = self.robot.put_linear if last.linear_only else self.robot.put_velocity
+        exchange = put(last.velocity)
+        again = Command(last.velocity, sent, time.monotonic(), exchange, linear_only=last.linear_only, renewal=True)
+        self.trace = self.trace.commanded(again)
+
+    def _judge(self, one: Judgement) -> bool:
+        return self.robot.judge.check(
+            one.requirement, one.holds, one.exchange, one.expected, found=one.found, cause=one.cause
+        )
+
+    @property
+    def holds_until(self) -> float:
+        """Until when the last command of all components certainly holds, s of the monotonic clock."""
+        hold_s = self.robot.limits.hold_s
+        return self.trace.full_sent + (_COUNTED_ON_S if hold_s is None else certain_s(hold_s))
+
+    @property
+    def look_s(self) -> float:
+        """How long a look usually takes, s."""
+        return _LOOK * self.robot.usual_s
+
+    @property
+    def _outlasts_hold(self) -> bool:
+        """Whether one look takes longer than a velocity holds, so that what is read need not be what was commanded."""
+        hold_s = self.robot.limits.hold_s
+        return hold_s is not None and self.look_s > hold_s
+
+    def refresh(self, velocity: Velocity) -> None:
+        """Command a velocity again, and let it be reached where it had ended meanwhile."""
+        self.command(velocity)
+        self.reach(velocity)
+
+    def look(self) -> tuple[Velocity | None, Exchange]:
+        """Read odometry, velocity and its linear part, and judge whether they agree; give the velocity."""
+        wait = self._turn_at + _PACE_S - time.monotonic()
+        if wait > 0:
+            time.sleep(wait)
+        self._turn_at = time.monotonic()
+        odometry = self.robot.odometry()
+        at = time.monotonic()
+        velocity, exchange = self.robot.velocity()
+        self.trace = self.trace.looked(Turn(odometry, at, velocity, exchange, *self.robot.linear()))
+        for one in drive_rules.agreement(self.trace, self.robot.limits):
+            self._judge(one)
+        fastest = None if self.robot.limits_declared else drive_rules.speed(self.trace)
+        if fastest is not None:
+            self._judge(fastest)
+        return velocity, exchange
+
+    def _glance(self) -> None:
+        """Read the velocity, and nothing that it could be compared with."""
+        at = time.monotonic()
+        velocity, exchange = self.robot.velocity()
+        self.trace = self.trace.looked(Turn(None, at, velocity, exchange, None, exchange))
+
+    def stop(self, moving: Velocity) -> bool:
+        """Command a velocity once more and then zero; judge that the robot stops because of it, and not by itself."""
+        if not self.command(moving) or not self.command(STILL):
+            return False
+        hold_s, settle_s = self.robot.limits.hold_s, self.robot.limits.settle_s
+        within = max(1.1 * settle_s, 0.9 * hold_s) if hold_s is not None else self.robot.settle_s
+        return self.reach(STILL, "safety/stop", within=within)
+
+    def reach(
+        self, wanted: Velocity, *ids: str, part: slice = ALL, within: float | None = None, since: float | None = None
+    ) -> bool:
+        """Look until the velocity is what was wanted; judge that it comes within the settle time.
+
+        What is judged has to be shown by the median of several samples; what is only waited for, by one.
+
+        Args:
+            wanted: velocity.
+            ids: requirements, of any class.
+            part: the components that count.
+            within: another time than the settle time, s.
+            since: when what brings it about was answered, s of the monotonic clock; by default the last command.
+        """
+        limits = self.robot.limits
+        patience = min(self.robot.settle_s, within or self.robot.settle_s)
+        begun = self.trace.answered if since is None else since
+        first = len(self.trace.turns)
+        count = SEVERAL if ids else 1
+        lapses = 0
+        # A velocity may end before it is reached, where it does not hold for as long as the robot takes to settle.
+        every = _COUNTED_ON_S if limits.hold_s is None else _renewed_s(limits.hold_s, limits.settle_s)
+        renews = limits.hold_s is None or limits.hold_s < patience
+        while True:
+            asked = time.monotonic()
+            lapsed = limits.hold_s is not None and asked > self.trace.sent + certain_s(limits.hold_s)
+            # A command that has had no effect when the robot has had its time is not given again: that would hide it.
+            if not lapsed and asked > begun + limits.settle_s:
+                renews = renews and not windows.is_stuck(self.trace.turns[first:], wanted, part)
+            if renews and self.trace.commands and asked > self.trace.sent + every:
+                self._renew()
+                if lapsed and lapses < _LAPSES:
+                    # Whoever looks was late, not the robot: that one may have slowed down meanwhile.
+                    lapses, first = lapses + 1, len(self.trace.turns)
+                    begun = self.trace.commands[-1].answered
+            until = begun + patience
+            self.look()
+            turns = self.trace.turns[first:]
+            there = windows.shown(limits, turns, wanted, part=part, count=count)
+            # What was seen while it had time left, before whoever looks was held up, is not held against the robot.
+            settled = min(until, begun + limits.settle_s + self.robot.sample_s) if within is None else begun
+            late = [turn for turn in turns if turn.at >= settled]
+            decided = windows.shown(limits, late, wanted, part=part, count=count) is not None
+            if there or (asked > until and decided) or asked > until + _LONGER_S:
+                break
+        for id_ in ids:
+            if not there and wanted != STILL and self._outlasts_hold:
+                self.robot.judge.skip(id_, _OUTLASTED)
+                continue
+            since = settled if not there and windows.newest(late) else begun
+            self._judge(drive_rules.arrival(id_, self.trace, wanted, limits, part, since))
+        return bool(there)
+
+    def sees(
+        self, wanted: Velocity, factor: float = 1.0, *, part: slice = ALL, until: float = math.inf, alone: bool = False
+    ) -> tuple[bool | None, str]:
+        """Look whether the velocity is what was wanted: once where it is, else until several samples tell.
+
+        Args:
+            wanted: velocity.
+            factor: how much of the tolerance it may be off.
+            part: the components that count.
+            until: from then on only that it is what was wanted says anything, s of the monotonic clock.
+            alone: ask for nothing else, which on a slow robot takes a third of the time.
+
+        Returns:
+            Whether it is (None: it was too late to say), and what was seen.
+        """
+        first = len(self.trace.turns)
+        last = time.monotonic() + _LONGER_S
+        while True:
+            self._glance() if alone else self.look()
+            turns, now = self.trace.turns[first:], time.monotonic()
+            holds = windows.verdict(self.robot.limits, turns, wanted, factor, part)
+            if not holds and now > until:
+                holds = None
+            if holds is not None or now > min(until, last):
+                seen = windows.velocities(windows.newest(turns))
+                return holds, str(windows.middle(seen)) if seen else ""
+
+    def keep(self, seconds: float) -> None:
+        """Look for a while."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            self.look()
+
+    def judge_motion(self) -> None:
+        """Judge whether the pose moved by what the velocity said."""
+        if self._outlasts_hold:
+            for id_ in ("rest-resources/pose-motion", "rest-resources/pose-rotation"):
+                self.robot.judge.skip(id_, _OUTLASTED)
+            return
+        judge_path(self.robot.judge, self.trace.odometry, self.trace.measured, self.robot.limits.noise)
+
+
+def _renewed_s(hold_s: float, settle_s: float) -> float:
+    """When a velocity that is not reached yet is given again, s after its command.
+
+    Not before the robot has had its time, where the velocity lasts for that long and a while more.
+    """
+    return max(0.6 * hold_s, settle_s + _PACE_S) if settle_s + _PACE_S < 0.75 * hold_s else 0.6 * hold_s
+
+
+def certain_s(hold_s: float) -> float:
+    """How long a velocity that holds for so long is certainly there after its command was sent, s."""
+    return 0.9 * hold_s - 0.02

@@ -1,0 +1,96 @@
+"""The contract's examples made fit for one robot: within its limits, near where it is, in its frames."""
+
+from collections.abc import Callable
+from typing import Any
+
+from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.robot.geometry import Pose, quaternion_of
+from conformance.packs.table1.robot.plan import reachable
+from conformance.packs.table1.robot.robot import Robot
+from conformance.packs.table1.statement import Statement
+
+# Far enough to be on the way for a while, near enough to be inside every room; nearer where there is no room.
+_FAR_M = (1.5, 0.5)
+_SLOW_M_S = 0.1
+
+
+class Examples:
+    """Values within one robot's limits, near where it is, in its frames.
+
+    Args:
+        statement: what the vendor says of it.
+    """
+
+    def __init__(self, statement: Statement) -> None:
+        self._statement = statement
+        # Where the robot could go when it was first asked: good for plans and deliveries, wherever it is by now.
+        self._first_place: Pose | None = None
+        self._turns = 0
+        self._fitted: dict[str, Callable[[RestInterface, dict[str, Any]], dict[str, Any]]] = {
+            "putVelocity": self._velocity,
+            "putLinearVelocity": self._linear,
+            "putGoal": self._goal,
+            "getPlan": self._plan,
+            "putDelivery": self._delivery,
+        }
+
+    def fit(self, api: RestInterface, operation_id: str, value: Any) -> Any:
+        """Return a value fit for the robot. For goals, plans and deliveries up to 24 plans are asked for."""
+        fitted = self._fitted.get(operation_id)
+        return value if fitted is None or not isinstance(value, dict) else fitted(api, value)
+
+    def _velocity(self, _: RestInterface, value: dict[str, Any]) -> dict[str, Any]:
+        sign = self._direction()
+        return {part: self._slow(part, axes, sign) for part, axes in value.items()}
+
+    def _linear(self, _: RestInterface, value: dict[str, Any]) -> dict[str, Any]:
+        return self._slow("linear", value, self._direction())
+
+    def _slow(self, part: str, axes: dict[str, float], sign: int) -> dict[str, float]:
+        limits = self._statement.limits
+        most = min(_SLOW_M_S, (limits.linear_m_s if part == "linear" else limits.angular_rad_s) / 2)
+        actuated = self._statement.motion.actuated
+        return {
+            axis: sign * max(-most, min(most, float(speed))) if f"{part}.{axis}" in actuated and speed else 0.0
+            for axis, speed in axes.items()
+        }
+
+    def _direction(self) -> int:
+        """Ahead and back by turns, so that a robot does not creep up to a wall over many runs."""
+        self._turns += 1
+        return 1 if self._turns % 2 else -1
+
+    def _goal(self, api: RestInterface, value: dict[str, Any]) -> dict[str, Any]:
+        near = self._near(api)
+        if near is None:
+            return value
+        pose = {"position": {"x": near.x, "y": near.y, "z": 0.0}, "orientation": quaternion_of(near.yaw)}
+        target = {"header": {"frame_id": self._statement.motion.frame}, "pose": pose}
+        return {**value, "goal": {"target_pose": target}}
+
+    def _near(self, api: RestInterface) -> Pose | None:
+        """A pose near the robot that it can reach; None where it knows no way to any."""
+        robot = Robot(api)
+        here = robot.map_pose()
+        for distance in _FAR_M if here is not None else ():
+            reach = distance if robot.statement.motion.arena else min(distance, robot.statement.motion.radius_m)
+            found = reachable(robot, here, reach, 1) if here is not None else []
+            if found:
+                return found[0]
+        return None
+
+    def _plan(self, api: RestInterface, value: dict[str, Any]) -> dict[str, Any]:
+        place = self._place(api)
+        if place is None:
+            return value
+        return {**value, "x": place.x, "y": place.y, "frame_id": self._statement.motion.frame}
+
+    def _delivery(self, api: RestInterface, value: dict[str, Any]) -> dict[str, Any]:
+        place = self._place(api)
+        if place is None:
+            return value
+        return {**value, **{name: place.x if name.endswith("_x") else place.y for name in value if name != "code"}}
+
+    def _place(self, api: RestInterface) -> Pose | None:
+        self._first_place = self._first_place or self._near(api)
+        return self._first_place

@@ -1,0 +1,115 @@
+"""Goals as they are put, and as they have to come back."""
+
+import math
+import time
+from http import HTTPStatus
+from typing import Any, Final
+
+from conformance.documents.json_text import shown
+from conformance.packs.table1.robot.geometry import Pose, quaternion_of
+from conformance.packs.table1.robot.message_shapes import STATUS
+from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
+from conformance.transport.exchange import Exchange
+
+NEW: Final = frozenset({201, 202})
+REPEATED: Final = frozenset({200, 202, 204})
+# 204 is what the contract asks for; a robot that says more than nothing says the same.
+CANCELLED: Final = frozenset({200, 202, 204})
+# What a client would rather be told in: whatever that is, a goal is cancelled.
+RATHER_XML: Final = ("Accept", "application/xml, */*;q=0.1")
+ACTIVE: Final = frozenset({1, 2, 3})
+_STEP_S: Final = 0.02
+_CLOSE: Final = 1e-6
+_ARRIVED_M: Final = 0.35
+
+
+def goal_body(pose: Pose, frame: str, id_: str | None = None, *, length: float = 1.0) -> dict[str, Any]:
+    """A MoveBaseActionGoal as a client puts it.
+
+    Args:
+        pose: where to go.
+        frame: of the pose.
+        id_: goal_id.id, or None: the robot chooses.
+        length: of the quaternion.
+    """
+    body: dict[str, Any] = {
+        "goal": {
+            "target_pose": {
+                "header": {"frame_id": frame},
+                "pose": {
+                    "position": {"x": pose.x, "y": pose.y, "z": 0.0},
+                    "orientation": quaternion_of(pose.yaw, length),
+                },
+            }
+        }
+    }
+    if id_ is not None:
+        body["goal_id"] = {"id": id_}
+    return body
+
+
+def difference(goal: Any, put: dict[str, Any]) -> str:
+    """In what a goal that the robot shows is another than the one put; empty where it is the same.
+
+    A quaternion and its negative are one orientation.
+    """
+    if "goal_id" in put and goal["goal_id"]["id"] != put["goal_id"]["id"]:
+        return f"goal_id.id {shown(goal['goal_id']['id'])} for {shown(put['goal_id']['id'])}"
+    there, asked = goal["goal"]["target_pose"], put["goal"]["target_pose"]
+    if there["header"]["frame_id"] != asked["header"]["frame_id"]:
+        return f"frame_id {shown(there['header']['frame_id'])} for {shown(asked['header']['frame_id'])}"
+    for axis, wanted in asked["pose"]["position"].items():
+        found = float(there["pose"]["position"][axis])
+        if not math.isclose(found, wanted, rel_tol=1e-9, abs_tol=_CLOSE):
+            return f"position.{axis} {found:g} for {wanted:g}"
+    turned, wished = there["pose"]["orientation"], asked["pose"]["orientation"]
+    dot = sum(float(turned[axis]) * wished[axis] for axis in "xyzw")
+    length = math.hypot(*(float(turned[axis]) for axis in "xyzw")) * math.hypot(*wished.values())
+    if not abs(abs(dot) - length) <= _CLOSE or not length > _CLOSE:
+        return f"orientation {shown(turned)} for {shown(wished)}"
+    return ""
+
+
+def status_fault(goal: Any) -> str:
+    """What is wrong with the status of an active goal."""
+    problem = STATUS.problem(goal.get("status"), "status")
+    if problem:
+        return problem
+    code = goal["status"]["code"]
+    return "" if code in ACTIVE else f"status.code {code:g}"
+
+
+def await_goal(robot: Robot, put: dict[str, Any]) -> tuple[Any, str, Exchange]:
+    """Read the active goal until it is the one put, for as long as commands may take.
+
+    Returns:
+        The goal (None where none is shown), in what it differs, and the evidence.
+    """
+    patience = robot.patience(robot.settle_s)
+    while True:
+        goal, exchange = robot.goal()
+        problem = exchange.came if goal is None else difference(goal, put)
+        if not problem or patience.over:
+            return goal, problem, exchange
+        time.sleep(_STEP_S)
+
+
+def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
+    """Read the active goal until there is none, for as long as commands may take, or for so long."""
+    patience = robot.patience(robot.settle_s if seconds is None else seconds)
+    while True:
+        exchange = robot.get(GOAL_PATH)
+        if exchange.response.status == HTTPStatus.NOT_FOUND or patience.over:
+            return exchange
+        time.sleep(_STEP_S)
+
+
+def arrived(robot: Robot, pose: Pose) -> bool:
+    """Whether the robot is so near to a goal that it may have ended already."""
+    here = robot.map_pose()
+    return here is None or here.distance(pose) < _ARRIVED_M
+
+
+def put_goal(robot: Robot, body: dict[str, Any]) -> Exchange:
+    """Send a goal."""
+    return robot.put(GOAL_PATH, body)

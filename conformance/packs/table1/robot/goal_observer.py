@@ -1,0 +1,118 @@
+"""Judges what every GET of the goal in a run shows: one goal, each time, and not a part of the one before.
+
+A client that waits for its goal sees the right one in the end. What it was shown at first may have been a mixture: the
+id of the new goal, and a stamp or a pose of the old one. And what nobody changed is shown in one way.
+"""
+
+from collections import Counter, deque
+from typing import Any, Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.representation import flattened, projected
+from conformance.packs.table1.robot.message_shapes import GOAL, read_as
+from conformance.packs.table1.robot.robot import GOAL_PATH
+from conformance.transport.exchange import Exchange, Listener
+
+# A value that is the old goal's after so many changes, and after most of those that change it, is so by rule.
+_OFTEN: Final = 3
+_MOST: Final = 0.5
+# By what the first of these readings shows, and the second, a change is judged; by further ones, what lives.
+_AT_FIRST: Final = 2
+# A goal is shown one way, another way, and the first way again.
+_SHOWN: Final = 3
+# What a goal's own progress changes.
+_PROGRESS: Final = "status."
+Shown = dict[str, Any]
+
+
+class GoalObserver(Listener):
+    """Listens to the exchanges of one run.
+
+    Args:
+        api: the robot's REST interface.
+    """
+
+    def __init__(self, api: RestInterface) -> None:
+        self._judge = api.run.judge
+        rest = api.client
+        # As HttpClient writes the URLs of its requests.
+        self._url = f"{rest.scheme}://{rest.authority}{rest.prefix}{GOAL_PATH}"
+        # What was shown last before something was asked of the goal, and since then.
+        self._before: Shown | None = None
+        self._since: list[Shown] = []
+        self._first: Exchange | None = None
+        self._newest: deque[tuple[Shown, Exchange]] = deque(maxlen=_SHOWN)
+        # How often a value has changed with the goal, and was the old one first; what changes by itself.
+        self._changed: Counter[str] = Counter()
+        self._stale: Counter[str] = Counter()
+        self._living: set[str] = set()
+
+    def answered(self, exchange: Exchange) -> None:
+        """Take an exchange, whatever it is."""
+        if exchange.request.url != self._url:
+            return
+        if exchange.request.method != "GET":
+            self._before = self._since[-1] if self._since else self._before
+            self._since = []
+            self._newest.clear()
+            return
+        if exchange.response.media_type != "application/json":
+            return
+        value, problem = read_as(exchange.response, GOAL)
+        if problem:
+            return
+        shown = flattened(projected(value, GOAL.schema))
+        self._newest.append((shown, exchange))
+        self._compare()
+        if self._before == shown and not self._since:
+            return  # a robot may take a while to show another goal
+        self._since = [*self._since[-2:], shown]
+        if len(self._since) == 1:
+            self._first = exchange
+        elif len(self._since) > _AT_FIRST:
+            one, other = self._since[-2:]
+            self._living |= {_whole(place) for place, value in one.items() if other.get(place) != value}
+        elif self._before is not None and self._first is not None:
+            self._look(self._before, self._since[0], self._since[1], self._first)
+
+    def _compare(self) -> None:
+        """Judge what was shown between two readings that are alike, where nothing was asked of the goal."""
+        if len(self._newest) < _SHOWN:
+            return
+        (first, _), (between, exchange), (last, _) = self._newest
+        if first != last:
+            return
+        odd = [place for place, value in first.items() if between.get(place) != value]
+        odd = [place for place in odd if not place.startswith(_PROGRESS)]
+        self._judge.check(
+            "rest-resources/goal-get",
+            not odd,
+            exchange,
+            "the goal as it is shown just before and just after",
+            found=f"{odd[0]} is {between.get(odd[0])!r} for {first[odd[0]]!r}" if odd else "",
+            cause=f"{odd[0]} now and then" if odd else "",
+        )
+
+    def _look(self, before: Shown, first: Shown, later: Shown, exchange: Exchange) -> None:
+        """Judge what was shown first after a change, by what was shown before and later."""
+        others = {place for place, value in later.items() if before.get(place) != value}
+        stale = {place for place in others if first.get(place) == before.get(place)}
+        self._changed.update(others)
+        # A goal that is not shown yet is no mixture.
+        self._stale.update(stale if stale != others else ())
+        for place in sorted(stale):
+            often = self._stale[place] >= max(_OFTEN, _MOST * self._changed[place])
+            self._judge.check(
+                "rest-resources/goal-get",
+                not often or _whole(place) in self._living,
+                exchange,
+                "one goal, and no part of the one before it",
+                found=f"{place} is that of the goal before, in what is shown first of {self._stale[place]} goals",
+                cause=f"{place} of the goal before",
+            )
+
+
+def _whole(place: str) -> str:
+    """The place of a value, or of the stamp that it is a part of."""
+    parent = place.rpartition(".")[0]
+    return parent if parent.endswith("stamp") else place

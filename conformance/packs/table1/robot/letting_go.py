@@ -1,0 +1,101 @@
+"""What a velocity that is not renewed shows: it holds for its time, then begins to stop, and ends in rest.
+
+Every function judges a record and talks to nobody.
+"""
+
+import itertools
+from dataclasses import dataclass
+from typing import Final
+
+from conformance.packs.table1.limits import Limits
+from conformance.packs.table1.robot import windows
+from conformance.packs.table1.robot.drive_trace import Turn
+from conformance.packs.table1.robot.robot import STILL, Velocity
+
+# Of a tolerance: by so much a velocity that holds may be off.
+_OFF: Final = 1.5
+# More turns than are in the window of several samples.
+_LOOKED_AT: Final = 60
+# For so long a velocity holds at least, s.
+_AT_LEAST_S: Final = 0.1
+# Readings that are farther apart than this share of the hold time say nothing of it.
+_GAP: Final = 0.25
+
+
+@dataclass(frozen=True)
+class LetGo:
+    """A velocity that was commanded and not renewed.
+
+    Attributes:
+        velocity: which.
+        full: when the last command of all components was sent, s of the monotonic clock.
+        answered: when the last command was answered.
+        turns: what was seen since.
+        resumed: the first turn after a while in which nobody asked, where there was such a while.
+    """
+
+    velocity: Velocity
+    full: float
+    answered: float
+    turns: tuple[Turn, ...]
+    resumed: int | None = None
+
+    def holds_by(self, limits: Limits, count: int) -> bool | None:
+        """Whether the first turns, so many, end with the velocity; None where they are too few to say."""
+        begin = max(0, count - _LOOKED_AT)
+        if self.resumed is not None and count > self.resumed:
+            # Samples from before the silence say nothing of what is behind it.
+            begin = max(begin, self.resumed)
+        return windows.verdict(limits, self.turns[begin:count], self.velocity, _OFF)
+
+    def was_held(self, limits: Limits) -> bool:
+        """Whether the velocity was seen in its time: who answers too late to be looked at has not shown it."""
+        certain = self.full + 0.95 * (limits.hold_s or 0.0) - 0.02
+        in_time = sum(turn.at <= certain for turn in self.turns)
+        return any(self.holds_by(limits, count) for count in range(1, in_time + 1))
+
+    def rests(self, limits: Limits) -> bool:
+        """Whether the newest samples say that the robot is at rest."""
+        return bool(windows.shown(limits, self.turns[-_LOOKED_AT:], STILL))
+
+    def early(self, limits: Limits) -> Turn | None:
+        """The first turn in which the velocity had ended before its time, if there is one.
+
+        Without a declared hold time that is a moment: what was reached before does not end by being asked for again.
+        """
+        certain = self.answered + _AT_LEAST_S if limits.hold_s is None else self.full + 0.95 * limits.hold_s - 0.02
+        for count, turn in enumerate(self.turns, 1):
+            if turn.at + turn.velocity_exchange.response.elapsed_ms / 1000 > certain:
+                return None
+            if self.holds_by(limits, count) is False:
+                return turn
+        return None
+
+    def late(self, limits: Limits) -> Turn | None:
+        """The first turn in which the velocity still held although it had to have begun to end, if there is one."""
+        if limits.hold_s is None:
+            return None
+        last = self.answered + self.longest(limits)
+        for count, turn in enumerate(self.turns, 1):
+            if turn.at > last and self.holds_by(limits, count):
+                return turn
+        return None
+
+    def longest(self, limits: Limits) -> float:
+        """For how long after the command the velocity may be seen, s.
+
+        A command and an odometry are on their way for a part of the settle time; half as long again is no such delay.
+        """
+        hold = limits.hold_s or 0.0
+        samples = windows.newest(self.turns[: self.resumed], len(self.turns))
+        lasted = samples[-1].at - samples[0].at if samples else 0.0
+        period = min(lasted / max(1, len(samples) - 1), windows.LONGEST_SAMPLE_S)
+        return hold + max(0.4 * hold, 0.5 * limits.settle_s, windows.LONGEST_SAMPLE_S) + 2 * period
+
+    def is_void(self, limits: Limits) -> bool:
+        """Whether an answer came so late that the turns say nothing of the hold time."""
+        gap = _GAP * (limits.hold_s or 0.0)
+        before, behind = self.turns[: self.resumed], self.turns[len(self.turns[: self.resumed]) :]
+        times = [self.full, self.answered, *(turn.at for turn in before)]
+        seen = (times, [turn.at for turn in behind])
+        return any(two - one > gap for part in seen for one, two in itertools.pairwise(part))

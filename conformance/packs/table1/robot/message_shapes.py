@@ -1,0 +1,79 @@
+"""What the robot's answers hold: the schemas of the contract's OpenAPI description, and how answers are read by them.
+
+A robot may add fields to what a schema names.
+"""
+
+import json
+from collections.abc import Mapping
+from http import HTTPStatus
+from typing import Any, Final
+
+from conformance.contract.pack import Contract
+from conformance.documents.json_schema import Schema, Shape
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import operations_of
+from conformance.transport.exchange import Response
+
+_ANSWERS: Final = {operation.id: operation.shape for operation in operations_of(Contract.load())}
+
+
+def _answer_of(operation_id: str) -> Schema:
+    """The schema of what an operation of the contract answers where it succeeds."""
+    schema = _ANSWERS[operation_id]
+    if schema is None:
+        raise ValueError(f"{operation_id} answers nothing")
+    return schema
+
+
+def _without(schema: Schema, name: str) -> Schema:
+    """A schema of an object less one of its fields."""
+    return {
+        **schema,
+        "required": [one for one in schema["required"] if one != name],
+        "properties": {one: part for one, part in schema["properties"].items() if one != name},
+    }
+
+
+def _with_any_type(entries: Schema) -> Schema:
+    """A list of entries, less what has requirements of its own: the form of ``type``, and no entry twice."""
+    entry = entries["items"]
+    return {
+        "type": "array",
+        "items": {**entry, "properties": {**entry["properties"], "type": {"type": "string", "minLength": 1}}},
+    }
+
+
+_GOAL: Final = _answer_of("getGoal")
+_SENSORS: Final = _answer_of("getSensors")
+_SERVICES: Final = _answer_of("getNavigationServices")
+ODOMETRY: Final = Shape(_answer_of("getPose"))
+TWIST: Final = Shape(_answer_of("getVelocity"))
+VECTOR3: Final = Shape(_answer_of("getLinearVelocity"))
+GET_PLAN: Final = Shape(_answer_of("getPlan"))
+DELIVERIES: Final = Shape(_answer_of("getDeliveries"))
+# The status of a goal has a requirement of its own.
+GOAL: Final = Shape(_without(_GOAL, "status"))
+STATUS: Final = Shape(_GOAL["properties"]["status"])
+GOAL_AND_STATUS: Final = Shape(_GOAL)
+SENSORS: Final = Shape(_with_any_type(_SENSORS))
+SERVICES: Final = Shape(_with_any_type(_SERVICES))
+MESSAGE_TYPE: Final = Shape(_SENSORS["items"]["properties"]["type"])
+SERVICE_TYPE: Final = Shape(_SERVICES["items"]["properties"]["type"])
+
+
+def read_as(response: Response, shape: Shape) -> tuple[Any, str]:
+    """The value of a shape in an answer with status 200.
+
+    Returns:
+        (value, ""), or (None, what is wrong with the answer).
+    """
+    if response.status != HTTPStatus.OK:
+        return None, f"status {response.status}"
+    text = read_json(response.body)
+    problem = text.unreadable or shape.problem(text.value)
+    return (None, problem) if problem else (text.value, "")
+
+
+def body_of(value: Mapping[str, Any]) -> bytes:
+    """A JSON body."""
+    return json.dumps(value).encode()

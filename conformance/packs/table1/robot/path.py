@@ -1,0 +1,249 @@
+"""Whether a pose moves by what its velocity says: the velocity is summed up and compared with the way that was made.
+
+Not only from the first reading to the last, each of which may be out: windows of a quarter of the way begin all along
+it, and the median window counts, as far as it would lead on the whole way. A jump of the localisation is in fewer than
+half of them, and readings that are far apart, over a slow link, make windows coarse; what is wrong with the robot, as
+another unit, is in most windows and in the whole. Where the odometry itself was held up, nobody knows what the robot
+did in between: such a step counts on neither side.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import operator
+from bisect import bisect_left
+from statistics import median
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from conformance.packs.table1.robot.geometry import wrapped
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from conformance.packs.table1.limits import Noise
+    from conformance.packs.table1.robot.robot import Odometry, Velocity
+    from conformance.verdict.evidence import Judge
+
+# Less than this is no drive to judge: m and rad.
+_SHORTEST: Final = 0.08
+_LEAST_TURN: Final = 0.2
+# Readings; a sum over one step says nothing.
+_FEWEST: Final = 3
+# What may be between the sum of a sampled velocity and the way: relative, and absolute in m and rad.
+_SHARE: Final = 0.1
+_OFF: Final = 0.03
+_OFF_TURN: Final = 0.06
+# Of the greatest speed: with less a robot does not count as driving in a direction.
+_MOVES: Final = 0.25
+# Between readings that are farther apart a velocity may have ended and begun again: its sum is a guess, s.
+_FINE_S: Final = 0.25
+# A window's share of the way, and what the noise at its ends comes to on the whole way.
+_WINDOW: Final = 0.25
+_NOISES: Final = 8.0
+# Between readings that are so far apart, and so many times as far as others, nobody knows what the robot did, s: an
+# answer was held up, and a velocity may have ended in the meantime and begun again.
+_HELD_UP_S: Final = 0.5
+_HELD_UP_TIMES: Final = 3.0
+# The same of the robot's own samples, by their stamps, s: a robot's odometry comes at least five times a second.
+_SKIPPED_S: Final = 0.15
+
+
+class _Sum(NamedTuple):
+    """A velocity summed up by one clock, up to one reading.
+
+    Attributes:
+        x, y: way in the odometry frame, m; turn: change of heading, rad.
+        length, turned: the same without signs.
+        off, off_turn: by how much the sum may be wrong because the velocity changed between two samples.
+        x_error, y_error, turn_error: what was made less what was summed up, step by step, so that whole turns do not
+            matter.
+        along_error, turned_error: the same along the way and the turn that the velocity says, whatever its direction: a
+            robot that drives ahead and back, or turns left and right, makes up for no error of its scale. Of readings
+            that are close together only.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    turn: float = 0.0
+    length: float = 0.0
+    turned: float = 0.0
+    off: float = 0.0
+    off_turn: float = 0.0
+    x_error: float = 0.0
+    y_error: float = 0.0
+    turn_error: float = 0.0
+    along_error: float = 0.0
+    turned_error: float = 0.0
+
+    def miss(self, earlier: _Sum) -> _Miss:
+        """By how much pose and heading miss what was summed up since an earlier reading."""
+        way = math.hypot(self.x_error - earlier.x_error, self.y_error - earlier.y_error)
+        way = max(way, abs(self.along_error - earlier.along_error))
+        turn = max(abs(self.turn_error - earlier.turn_error), abs(self.turned_error - earlier.turned_error))
+        # A heading that is no number is nowhere.
+        return _Miss(way, math.inf if math.isnan(turn) else turn)
+
+
+class _Miss(NamedTuple):
+    """By how far a pose, m, and a heading, rad, are elsewhere than the velocity says."""
+
+    way: float
+    turn: float
+
+
+class _Sums(NamedTuple):
+    """The sums up to each reading, and where the robot said to be."""
+
+    trace: Sequence[Odometry]
+    each: Sequence[_Sum]
+
+    def middle_miss(self, course: Sequence[float], part: Callable[[_Miss], float]) -> float:
+        """The median window's miss, as far as it would lead on the whole course.
+
+        A window counts for as much of the course as lies between its first reading and the next one, so that a robot
+        which rests, and is read meanwhile, has no more say than one that drives.
+
+        Args:
+            course: the length, or the turn, that was summed up to each reading.
+            part: of a miss that counts.
+        """
+        wanted = _WINDOW * course[-1]
+        found: list[tuple[float, float]] = []
+        for first, (begun, then) in enumerate(itertools.pairwise(course)):
+            last = bisect_left(course, begun + wanted)
+            if last == len(course):
+                break
+            times = course[-1] / (course[last] - begun)
+            found.append((times * part(self.each[last].miss(self.each[first])), then - begun))
+        found.sort()
+        half = sum(weight for _, weight in found) / 2
+        passed = itertools.accumulate(weight for _, weight in found)
+        return next((miss for (miss, _), weight in zip(found, passed, strict=True) if weight >= half), 0.0)
+
+    @property
+    def whole_miss(self) -> _Miss:
+        """By how far the way from the first reading to the last misses the pose and the heading."""
+        return self.each[-1].miss(self.each[0])
+
+
+def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sums:
+    steps = [_Sum()]
+    skipped = _longest_lapse(trace)
+    linear, angular = (max(abs(one[part]) for one in velocities) for part in (0, 5))
+    for (one, first), (two, last) in itertools.pairwise(zip(trace, velocities, strict=True)):
+        if two.stamp - one.stamp > skipped:
+            steps.append(_Sum())
+            continue
+        lapse = two.stamp - one.stamp if by_stamp else (two.sent + two.received - one.sent - one.received) / 2
+        turn = (first.angular_z + last.angular_z) / 2 * lapse
+        heading = one.pose.yaw + turn / 2
+        ahead, aside = (first.linear_x + last.linear_x) / 2 * lapse, (first.linear_y + last.linear_y) / 2 * lapse
+        made = two.pose.yaw - one.pose.yaw - turn
+        x = ahead * math.cos(heading) - aside * math.sin(heading)
+        y = ahead * math.sin(heading) + aside * math.cos(heading)
+        x_error, y_error = two.pose.x - one.pose.x - x, two.pose.y - one.pose.y - y
+        along = x_error * math.cos(heading) + y_error * math.sin(heading)
+        turn_error = wrapped(made) if math.isfinite(made) else math.inf
+        fine = two.sent - one.sent <= _FINE_S
+        steps.append(
+            _Sum(
+                x=x,
+                y=y,
+                turn=turn,
+                length=math.hypot(ahead, aside),
+                turned=abs(turn),
+                off=math.hypot(last.linear_x - first.linear_x, last.linear_y - first.linear_y) * abs(lapse) / 2,
+                off_turn=abs(last.angular_z - first.angular_z) * abs(lapse) / 2,
+                x_error=x_error,
+                y_error=y_error,
+                turn_error=turn_error,
+                along_error=_signed(along, first.linear_x, linear) if fine else 0.0,
+                turned_error=_signed(turn_error, first.angular_z, angular) if fine else 0.0,
+            )
+        )
+    return _Sums(trace, list(itertools.accumulate(steps, lambda total, step: _Sum(*map(operator.add, total, step)))))
+
+
+def _signed(error: float, speed: float, fastest: float) -> float:
+    """An error in the direction of a speed; none where that is little, and its direction perhaps noise."""
+    return math.copysign(error, error * speed) if error and abs(speed) > _MOVES * fastest else 0.0
+
+
+def _longest_lapse(trace: Sequence[Odometry]) -> float:
+    """How far the stamps of two samples may be apart that nothing has held up, s."""
+    lapses = [two.stamp - one.stamp for one, two in itertools.pairwise(trace) if two.stamp != one.stamp]
+    return max(_SKIPPED_S, _HELD_UP_TIMES * median(lapses)) if lapses else _SKIPPED_S
+
+
+def judge_path(judge: Judge, trace: Sequence[Odometry], measured: Sequence[Velocity], noise: Noise) -> None:
+    """Judge pose-motion and pose-rotation by the readings along a drive, where it went far enough.
+
+    The robot's stamps or the time of the readings has to fit, as a simulation may run slower than the clock on the
+    wall; and the odometry's own velocity or the one that was measured beside it: whether these two agree is another
+    requirement.
+
+    Args:
+        judge: is told.
+        trace: readings of the odometry, in their order.
+        measured: a reading of GET /robot/velocity/ for each of them.
+        noise: of the robot's odometry.
+    """
+    if len(trace) < _FEWEST:
+        return
+    unbroken = _longest_unbroken(trace)
+    trace, measured = trace[unbroken], measured[unbroken]
+    if len(trace) < _FEWEST:
+        return
+    sources = ([one.velocity for one in trace], measured)
+    sums = [_summed(trace, source, by_stamp=by_stamp) for source in sources for by_stamp in (True, False)]
+    _judge_way(judge, [one for one in sums if one.each[-1].length >= _SHORTEST], noise)
+    _judge_turn(judge, [one for one in sums if one.each[-1].turned >= _LEAST_TURN], noise)
+
+
+def _longest_unbroken(trace: Sequence[Odometry]) -> slice:
+    """The longest part of the readings in which none is held up."""
+    steps = [two.sent - one.sent for one, two in itertools.pairwise(trace)]
+    most = max(_HELD_UP_S, _HELD_UP_TIMES * median(steps))
+    ends = [0, *(index for index, step in enumerate(steps, 1) if step > most), len(trace)]
+    return max((slice(one, two) for one, two in itertools.pairwise(ends)), key=lambda part: part.stop - part.start)
+
+
+def _judge_way(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
+    if not sums:
+        return
+    misses = []
+    for one in sums:
+        whole = one.each[-1]
+        window = one.middle_miss([each.length for each in one.each], lambda miss: miss.way)
+        room = _SHARE * whole.length + _OFF + whole.off + _NOISES * noise.position_m
+        misses.append(min(window, one.whole_miss.way) - room)
+    (first, *_, last), whole = sums[0].trace, sums[0].each[-1]
+    judge.check(
+        "rest-resources/pose-motion",
+        any(miss <= 0 for miss in misses),
+        last.exchange,
+        f"a way of ({whole.x:.3f}, {whole.y:.3f}) m, which is what the velocity adds up to",
+        found=f"the pose moved by ({last.pose.x - first.pose.x:.3f}, {last.pose.y - first.pose.y:.3f}) m",
+        cause="another way",
+    )
+
+
+def _judge_turn(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
+    if not sums:
+        return
+    misses = []
+    for one in sums:
+        whole = one.each[-1]
+        window = one.middle_miss([each.turned for each in one.each], lambda miss: miss.turn)
+        room = _SHARE * whole.turned + _OFF_TURN + whole.off_turn + _NOISES * noise.heading_rad
+        misses.append(min(window, one.whole_miss.turn) - room)
+    whole = sums[0].each[-1]
+    judge.check(
+        "rest-resources/pose-rotation",
+        any(miss <= 0 for miss in misses),
+        sums[0].trace[-1].exchange,
+        f"a turn of {whole.turn:.3f} rad, which is what the angular velocity adds up to",
+        found=f"the heading turned by {whole.turn + whole.turn_error:.3f} rad",
+        cause="another turn",
+    )

@@ -1,0 +1,153 @@
+"""Asking for plans, and finding poses near the robot that it can reach."""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from statistics import median
+from typing import Any, Final
+from urllib.parse import urlencode
+
+from conformance.packs.table1.robot.geometry import Pose, pose_of
+from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
+from conformance.packs.table1.robot.robot import PLAN, Robot
+from conformance.transport.exchange import Exchange
+
+_TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
+# A way so much longer than the distance goes around something: not what a short drive is for.
+_DETOUR: Final = 1.3
+# Where a plan ends at the pose itself, and not only within its tolerance, m.
+EXACT: Final = 1e-6
+# A plan that ends farther away than this was not made for the place that was asked for, m.
+_BESIDE: Final = 0.3
+# How far from the robot, or from the given start, a path may begin: a planner's grid is not finer, m.
+START_OFF: Final = 0.25
+# Plans and readings that have to say together that paths begin elsewhere.
+_STARTS: Final = 3
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A nav_msgs/Path.
+
+    Attributes:
+        frames: of the path and of its poses.
+        poses: at least one.
+    """
+
+    frames: frozenset[str]
+    poses: tuple[Pose, ...]
+
+    @property
+    def length(self) -> float:
+        """From the first pose to the last, m."""
+        return sum(one.distance(two) for one, two in itertools.pairwise(self.poses))
+
+    @property
+    def longest_step(self) -> float:
+        """The greatest distance between two poses that follow each other, m."""
+        return max((one.distance(two) for one, two in itertools.pairwise(self.poses)), default=0.0)
+
+
+def plan_of(message: Any) -> Plan:
+    """The plan in a nav_msgs/GetPlan response of the right shape."""
+    path = message["plan"]
+    frames = {path["header"]["frame_id"], *(pose["header"]["frame_id"] for pose in path["poses"])}
+    return Plan(frozenset(frames), tuple(pose_of(pose["pose"]) for pose in path["poses"]))
+
+
+def query(**parameters: float | str | None) -> str:
+    """The target of a plan request; parameters that are None are left out."""
+    given = {
+        name: value if isinstance(value, str) else repr(float(value))
+        for name, value in parameters.items()
+        if value is not None
+    }
+    return f"{PLAN}?{urlencode(given)}"
+
+
+def ask(
+    robot: Robot, goal: Pose, start: Pose | None = None, **more: float | str | None
+) -> tuple[str, Plan | None, Exchange]:
+    """Ask for a plan in the frame of goals.
+
+    Returns:
+        What is wrong with the answer (empty for a plan), the plan, and the evidence.
+    """
+    parameters: dict[str, float | str | None] = {"x": goal.x, "y": goal.y, "yaw": goal.yaw}
+    if start is not None:
+        parameters |= {"start_x": start.x, "start_y": start.y, "start_yaw": start.yaw}
+    parameters |= more
+    if robot.statement.motion.frame != "map":
+        parameters.setdefault("frame_id", robot.statement.motion.frame)
+    exchange = robot.get(query(**parameters))
+    message, problem = read_as(exchange.response, GET_PLAN)
+    return problem, None if problem else plan_of(message), exchange
+
+
+def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list[Pose]:
+    """Poses about ``distance`` metres from the robot, inside the arena, to which the robot says there is a plain way.
+
+    Declared goals come first, where they are about so far away; a distance at which there is nothing is halved, twice.
+    """
+    found = [
+        pose
+        for pose in itertools.starmap(Pose, robot.statement.motion.goals)
+        if distance / 2 <= here.distance(pose) <= 2 * distance
+    ][:count]
+    round_about: list[Pose] = []
+    for reach in (distance, distance / 2, distance / 4):
+        for turn in _TURNS:
+            if len(found) >= count:
+                return found
+            goal = here.ahead(reach, turn)
+            if not robot.in_arena(goal):
+                continue
+            _, plan, _ = ask(robot, goal)
+            if plan is not None:
+                # A plan may end beside a place that is too near to something, within its tolerance; a goal may not be
+                # put there. Where the plan ends, it may.
+                end = plan.poses[-1]
+                beside = EXACT <= end.distance(goal) < _BESIDE and robot.in_arena(end)
+                goal = Pose(end.x, end.y, goal.yaw) if beside else goal
+                plain = not beside and plan.length <= _DETOUR * here.distance(goal) + 0.1
+                (found if plain else round_about).append(goal)
+    # Where no way is plain, any way will do: what is odd about the plans is for others to judge.
+    return [*found, *round_about][:count]
+
+
+def judge_start(robot: Robot, plan: Plan, before: Pose, exchange: Exchange, again: Callable[[], Plan | None]) -> None:
+    """Judge that a path begins where the robot was just before, and may have moved from since.
+
+    One reading of a localisation may be out: of what begins elsewhere, most of several plans have to.
+
+    Args:
+        robot: which.
+        plan: with the path.
+        before: the robot's pose just before it.
+        exchange: the evidence.
+        again: asks for the same plan once more.
+    """
+    after = robot.map_pose()
+    if after is None:
+        return
+    offs = [_beyond_start(plan, before, after)]
+    while offs[0] > 0 and len(offs) < _STARTS:
+        earlier, other, later = robot.map_pose(), again(), robot.map_pose()
+        if earlier is None or other is None or later is None:
+            break
+        offs.append(_beyond_start(other, earlier, later))
+    first = plan.poses[0]
+    robot.judge.check(
+        "rest-resources/plan-start",
+        offs[0] <= 0 or median(offs) <= 0,
+        exchange,
+        f"a path that starts at the robot, ({before.x:.3f}, {before.y:.3f})",
+        found=f"({first.x:.3f}, {first.y:.3f})",
+        cause="starts elsewhere",
+    )
+
+
+def _beyond_start(plan: Plan, before: Pose, after: Pose) -> float:
+    """By how much a path begins farther away from the robot than it may, m; not above zero where it does not."""
+    return plan.poses[0].distance(before) - START_OFF - before.distance(after)

@@ -1,0 +1,186 @@
+"""The suite's end of the ROS probe: starts its process, asks it, and never waits for ever."""
+
+import atexit
+import json
+import math
+import os
+import queue
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from typing import Any, Final
+
+from conformance.packs.table1.robot.delivery import Delivery
+from conformance.packs.table1.robot.robot import Velocity
+from conformance.packs.table1.statement import Ros
+
+# Importing rclpy and finding the robot on the graph takes seconds on a small machine, s.
+_START_S: Final = 20.0
+_ANSWER_S: Final = 5.0
+_END_S: Final = 3.0
+_LINES_KEPT: Final = 2000
+
+
+class ProbeError(Exception):
+    """The probe cannot be used; the message says why."""
+
+
+class Probe:
+    """A probe that has been started; await_robot() before anything else.
+
+    Args:
+        ros: the robot's ROS side.
+
+    Attributes:
+        heard_at: when all that came of the run's requests until then had arrived, s of the monotonic clock.
+
+    Raises:
+        ProbeError: no process can be started.
+    """
+
+    heard_at = -math.inf
+
+    def __init__(self, ros: Ros) -> None:
+        command = [sys.executable, "-m", "conformance.packs.table1.robot.probe", "--domain-id", str(ros.domain_id)]
+        command += ["--delivery-topic", ros.delivery_topic, "--cmd-vel-topic", ros.cmd_vel_topic]
+        # A robot that only looks on its own machine hears no multicast: without a word to it directly, the probe would
+        # wait seconds for its next announcement. Robots elsewhere are found as ever.
+        peers = ";".join(filter(None, [os.environ.get("ROS_STATIC_PEERS"), "127.0.0.1"]))
+        # Shared memory that killed processes left behind, or that a container does not share, swallows messages.
+        environment = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"} | os.environ
+        environment |= {"ROS_DOMAIN_ID": str(ros.domain_id), "ROS_STATIC_PEERS": peers}
+        try:
+            # In a session of its own: Ctrl-C is for the suite, which then ends the probe.
+            self._process = subprocess.Popen(  # noqa: S603 - our own program
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+                text=True,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise ProbeError(f"it cannot be started: {error}") from error
+        self._lines: queue.Queue[str] = queue.Queue(_LINES_KEPT)
+        threading.Thread(target=self._listen, daemon=True, name="probe").start()
+        atexit.register(self.close)
+
+    def await_robot(self) -> None:
+        """Wait until the probe sees the robot.
+
+        Raises:
+            ProbeError: it does not start, for want of ROS or of the message package, or sees no robot.
+        """
+        try:
+            self._answer(_START_S)
+        except ProbeError:
+            self.close()
+            raise
+
+    def deliveries(self) -> list[Delivery]:
+        """The DeliveryRequestMsg that came since this was asked last, in their order."""
+        return [
+            Delivery(int(code), *(float.fromhex(value) for value in values))
+            for code, *values in self._ask("deliveries")["deliveries"]
+        ]
+
+    def velocities(self) -> list[Velocity]:
+        """The velocity commands that came since this was asked last, in their order."""
+        return [Velocity(*map(float.fromhex, values)) for values in self._ask("velocities")["velocities"]]
+
+    def topics(self) -> dict[str, list[str]]:
+        """The types of each topic that somebody publishes, by its full name."""
+        topics: dict[str, list[str]] = self._ask("graph")["topics"]
+        return topics
+
+    def close(self) -> None:
+        """End the process."""
+        atexit.unregister(self.close)
+        with suppress(OSError, ValueError):
+            if self._process.stdin:
+                self._process.stdin.close()
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _listen(self) -> None:
+        if self._process.stdout:
+            for line in self._process.stdout:
+                with suppress(queue.Full):
+                    self._lines.put_nowait(line)
+        with suppress(queue.Full):
+            self._lines.put_nowait("")
+
+    def _ask(self, what: str) -> dict[str, Any]:
+        try:
+            if self._process.stdin:
+                self._process.stdin.write(what + "\n")
+                self._process.stdin.flush()
+        except (OSError, ValueError) as error:
+            raise ProbeError(f"it has ended: {error}") from error
+        return self._answer(_ANSWER_S)
+
+    def _answer(self, within_s: float) -> dict[str, Any]:
+        try:
+            line = self._lines.get(timeout=within_s)
+        except queue.Empty as error:
+            raise ProbeError(f"it does not answer within {within_s:g} s") from error
+        try:
+            answer = json.loads(line)
+        except ValueError as error:
+            raise ProbeError(f"it has ended{f' and said {line.strip()!r}' if line else ''}") from error
+        if not isinstance(answer, dict) or "problem" in answer:
+            raise ProbeError(str(answer["problem"]) if isinstance(answer, dict) else "it answers nonsense")
+        return answer
+
+
+class RosProbe:
+    """The probe of one run: started before it is needed, as finding a robot may take seconds, and waited for then.
+
+    Args:
+        ros: the robot's ROS side, which may have no domain.
+    """
+
+    def __init__(self, ros: Ros) -> None:
+        self._ros = ros
+        self._probe: Probe | None = None
+        self._problem: ProbeError | None = None
+        self._sees_robot = False
+
+    def start(self) -> None:
+        """Start it, where a domain is given, without waiting for it."""
+        if self._ros.domain_id is None or self._probe is not None or self._problem is not None:
+            return
+        try:
+            self._probe = Probe(self._ros)
+        except ProbeError as error:
+            self._problem = error
+
+    def ready(self) -> Probe:
+        """The probe, once it sees the robot.
+
+        Raises:
+            ProbeError: no domain is given, or it cannot be used.
+        """
+        self.start()
+        if self._problem is not None:
+            raise self._problem
+        if self._probe is None:
+            raise ProbeError("no ROS domain is given (--ros-domain-id)")
+        if not self._sees_robot:
+            try:
+                self._probe.await_robot()
+            except ProbeError as error:
+                self._problem = error
+                raise
+            self._sees_robot = True
+        return self._probe
+
+    def close(self) -> None:
+        """End it; nobody waits for that but the program's own end."""
+        if self._probe is not None:
+            threading.Thread(target=self._probe.close, name="probe's end").start()

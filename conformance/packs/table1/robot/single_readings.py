@@ -1,0 +1,188 @@
+"""Single readings of the state that are out: what no sample of the odometry can have been.
+
+A sample of the odometry may be out, and then all who tell of it are: that fails nobody. But what is told of one sample,
+which its stamp names, is the same each time; and a reading of the velocity lies between what the odometry had for a
+while before it and just after it: a robot may smooth its velocity, and be a sample behind. Of that only what comes
+again and again in a run is judged.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import msgspec
+
+from conformance.packs.table1.robot.robot import FARTHEST, Velocity, is_near
+from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
+
+if TYPE_CHECKING:
+    from conformance.packs.table1.limits import Limits
+    from conformance.transport.exchange import Exchange
+    from conformance.verdict.evidence import Judge
+
+Stamp = tuple[int, int]
+_SAMPLE: Final = "rest-resources/pose-sample"
+_VELOCITY: Final = "rest-resources/velocity-odometry"
+# For so long a velocity may be behind the odometry, s.
+_BEHIND_S: Final = 0.4
+# Odometry read after it, and before it, without a sample in between that was not read: it may be a message behind.
+_AROUND: Final = 2
+# Samples are neighbours if their stamps are not farther apart than so many times the shortest lapse.
+_NEIGHBOURS: Final = 1.5
+# From so many on they are no chance: in whole runs of good robots, also of noisy ones, there was none.
+_SEVERAL: Final = 2
+# By so many tolerances a reading is out.
+_OUT: Final = 1.5
+_LAPSES: Final = 50
+# A message is told one way, another way, and the first way again.
+_TOLD: Final = 3
+# What may be in one answer and not in another, for want of digits, m, rad, m/s and rad/s.
+_ABSOLUTE: Final = 0.02
+
+
+class OneSample:
+    """Judges that the odometry's pose and velocity are the same whenever they are told with the same stamp.
+
+    A robot that computes its pose when it is asked, under a stamp that is coarse, tells another one each time; but none
+    that goes back to the very numbers from before.
+
+    Args:
+        judge: is told.
+        limits: of the robot, whose noise may be in each answer.
+    """
+
+    def __init__(self, judge: Judge, limits: Limits) -> None:
+        self._judge = judge
+        self._slack = _ABSOLUTE + FARTHEST * max(msgspec.structs.astuple(limits.noise))
+        self._stamp: Stamp | None = None
+        self._told: deque[tuple[dict[str, float], Exchange]] = deque(maxlen=_TOLD)
+
+    def odometry(self, stamp: Stamp, message: Any, exchange: Exchange) -> None:
+        """Take one reading, in the order in which they were asked for."""
+        if stamp != self._stamp:
+            self._stamp = stamp
+            self._told.clear()
+        self._told.append((_numbers(message), exchange))
+        if len(self._told) < _TOLD:
+            return
+        (first, _), (between, odd), (last, _) = self._told
+        if first == last:
+            problem = _difference(between, first, self._slack)
+            self._judge.check(
+                _SAMPLE,
+                not problem,
+                odd,
+                f"the odometry with the stamp {stamp[0]}.{stamp[1]:09} as it was told just before and just after",
+                found=problem,
+                cause="told otherwise",
+            )
+
+
+def _numbers(message: Any) -> dict[str, float]:
+    """The numbers of pose and twist, by their places; what a robot adds to the message is not looked at."""
+    pose, twist = message["pose"]["pose"], message["twist"]["twist"]
+    return {
+        **{f"position.{axis}": pose["position"][axis] for axis in "xyz"},
+        **{f"orientation.{axis}": pose["orientation"][axis] for axis in "xyzw"},
+        **{f"{part}.{axis}": twist[part][axis] for part in ("linear", "angular") for axis in "xyz"},
+    }
+
+
+def _difference(between: dict[str, float], around: dict[str, float], slack: float) -> str:
+    odd = (name for name, value in between.items() if abs(value - around[name]) > slack)
+    return next((f"{name} is {between[name]!r} for {around[name]!r}" for name in odd), "")
+
+
+class _Sample(NamedTuple):
+    """One reading of the odometry: stamp, s; velocity; when it was received, s of the monotonic clock."""
+
+    stamp: float
+    velocity: Velocity
+    received: float
+
+
+class _Reading(NamedTuple):
+    """One reading of the velocity, what was read before it and, one by one, after it."""
+
+    velocity: Velocity
+    exchange: Exchange
+    before: tuple[_Sample, ...]
+    after: list[_Sample]
+
+
+class BesideOdometry:
+    """Judges the readings of the velocity in one run, in their order.
+
+    Args:
+        judge: is told.
+        limits: of the robot.
+        out: how many readings were out before.
+        requirement: of which the readings are.
+
+    Attributes:
+        out: how many have been out.
+        judged: how many could be told from what was read around them.
+    """
+
+    def __init__(self, judge: Judge, limits: Limits, out: int = 0, *, requirement: str = _VELOCITY) -> None:
+        self._judge = judge
+        self._limits = limits
+        self._requirement = requirement
+        self._samples: deque[_Sample] = deque()
+        self._lapses: deque[float] = deque(maxlen=_LAPSES)
+        self._readings: deque[_Reading] = deque()
+        self.out = out
+        self.judged = 0
+
+    def odometry(self, stamp: float, velocity: Velocity, received: float) -> None:
+        """Take a reading of the odometry; ``stamp`` by the robot's clock, s."""
+        sample = _Sample(stamp, velocity, received)
+        if self._samples and stamp > self._samples[-1].stamp:
+            self._lapses.append(stamp - self._samples[-1].stamp)
+        self._samples.append(sample)
+        while len(self._samples) > _AROUND and self._samples[1].received < received - _BEHIND_S:
+            self._samples.popleft()
+        for reading in self._readings:
+            reading.after.append(sample)
+        while self._readings and len(self._readings[0].after) == _AROUND:
+            self._judge_one(self._readings.popleft())
+
+    def velocity(self, velocity: Velocity, exchange: Exchange, received: float) -> None:
+        """Take a reading of the velocity."""
+        before = tuple(self._samples)
+        if len(before) >= _AROUND and before[0].received < received - _BEHIND_S:
+            self._readings.append(_Reading(velocity, exchange, before, []))
+
+    def _judge_one(self, reading: _Reading) -> None:
+        all_ = (*reading.before, *reading.after)
+        if not self._neighbours(all_[-2 * _AROUND :]):
+            return
+        nearest = _between(reading.velocity, [one.velocity for one in all_])
+        fits = is_near(self._limits, reading.velocity, nearest, _OUT)
+        self.judged += 1
+        self.out += not fits
+        if fits or self.out >= _SEVERAL:
+            self._judge.check(
+                self._requirement,
+                fits,
+                reading.exchange,
+                f"a velocity that the odometry had before or after; the nearest is {nearest}",
+                found=f"{reading.velocity}, and out so {self.out} times",
+                cause="out now and then",
+            )
+
+    def _neighbours(self, around: tuple[_Sample, ...]) -> bool:
+        """Whether nobody could have read a sample between these that was not read here."""
+        if not self._lapses:
+            return False
+        hertz = self._limits.odometry_hz
+        usual = 1 / hertz if hertz else min(*self._lapses, LONGEST_SAMPLE_S)
+        return all(0 <= two.stamp - one.stamp <= _NEIGHBOURS * usual for one, two in itertools.pairwise(around))
+
+
+def _between(velocity: Velocity, around: list[Velocity]) -> Velocity:
+    """The velocity of which each component lies between some others, and nearest to that of this one."""
+    ranges = [(min(some), max(some)) for some in zip(*around, strict=True)]
+    return Velocity(*(max(low, min(one, high)) for one, (low, high) in zip(velocity, ranges, strict=True)))

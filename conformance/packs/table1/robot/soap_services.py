@@ -1,0 +1,118 @@
+"""The robot's SOAP services as its checks use them: deliveries are sent, states are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conformance.api.soap.calls import call, read_exchange, send
+from conformance.api.soap.content import number_at
+from conformance.api.soap.envelope import envelope
+from conformance.api.soap.service import MEDIA_TYPE, SoapService
+from conformance.api.soap.valid_messages import call_valid, require_valid_message
+from conformance.api.soap.xml_style import XmlStyle, serialize
+from conformance.documents.wsdl import Operation
+from conformance.documents.xml import elements
+from conformance.documents.xml_names import clark, local
+from conformance.documents.xml_node import Node
+from conformance.documents.xsd_shapes import Element
+from conformance.packs.table1.delivery import COFFEE
+from conformance.packs.table1.robot.delivery import Delivery
+from conformance.packs.table1.robot.delivery_messages import NAMESPACE, delivery, request
+from conformance.transport.exchange import Exchange
+from conformance.transport.parallel import Outgoing
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+# Where a robot may have a plan to, seen from where it is, m.
+_NEAR = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5))
+
+
+def send_delivery(
+    publishers: SoapService, values: Delivery, *, coffee: bool = False, style: XmlStyle | None = None
+) -> Exchange:
+    """Send a delivery once, on a connection of its own so that nothing is sent again.
+
+    Args:
+        publishers: the service.
+        values: of the delivery.
+        coffee: by ExecuteCoffeeRequest, which knows the code by itself.
+        style: how its XML is written.
+    """
+    operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
+    given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
+    message = envelope((require_valid_message(publishers, request(operation, **given)),))
+    return send(publishers, message if style is None else serialize(message, style), fresh=True).exchange
+
+
+def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Outgoing:
+    """The same as a request that is to be sent beside others."""
+    operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
+    given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
+    return outgoing(publishers, request(operation, **given))
+
+
+def outgoing(service: SoapService, payload: Node) -> Outgoing:
+    """A call that is to be sent beside others."""
+    headers = (("Content-Type", MEDIA_TYPE), ("SOAPAction", '""'))
+    return Outgoing(
+        service.client, "POST", service.path, headers, envelope((require_valid_message(service, payload),)).written()
+    )
+
+
+def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> Exchange:
+    """Ask the subscribers service."""
+    return call_valid(subscribers, request(operation, **parameters)).exchange
+
+
+def declared_return(service: SoapService, operation: str) -> Element:
+    """What an operation returns, by the contract.
+
+    Raises:
+        pytest.skip.Exception: the contract has no such operation.
+    """
+    wrapper = service.contract.shape(clark(NAMESPACE, f"{operation}Response"))
+    if wrapper is None or not wrapper.children:
+        pytest.skip(f"the contract has no {operation}")
+    return wrapper.children[0]
+
+
+def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
+    """The ``return`` elements of a response, and what is wrong where it is none."""
+    answer = read_exchange(exchange)
+    if not answer.accepted or answer.first is None:
+        return [], f"no SOAP response: {exchange.came}"
+    return [child for child in elements(answer.first) if local(str(child.tag)) == "return"], ""
+
+
+def position(subscribers: SoapService) -> tuple[float, float] | None:
+    """Where GetPose says that the robot is, in its odometry frame, m; None where it does not say.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    answer = call(subscribers, request("GetPose"))
+    if not answer.accepted or answer.first is None:
+        return None
+    x, y = (number_at(answer.first, "pose", "pose", "position", axis) for axis in "xy")
+    return None if x is None or y is None else (x, y)
+
+
+def known_messages(service: SoapService, operation: Operation) -> Iterator[Node]:
+    """Messages that a robot takes, likeliest first; none for operations that need none but the obvious.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    if service.contract.target_namespace != NAMESPACE:
+        return
+    if operation.name in {"ExecuteCoffeeRequest", "ExecuteDeliveryRequest"}:
+        yield delivery(operation.name)
+    elif operation.name == "GetPlan":
+        here = position(service)
+        if here is not None:
+            for east, north in _NEAR:
+                yield request("GetPlan", x=here[0] + east, y=here[1] + north)

@@ -1,0 +1,114 @@
+"""A state of the robot as SOAP tells it, between two readings of the same over REST."""
+
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
+
+from conformance.api.soap.service import SoapService
+from conformance.documents.json_schema import Shape
+from conformance.documents.representation import from_element
+from conformance.packs.table1.robot.agreement import Slack, disagreement, stamp_of
+from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
+from conformance.packs.table1.robot.robot import FARTHEST, POSE, VELOCITY, Robot
+from conformance.packs.table1.robot.soap_services import ask, returned
+from conformance.transport.exchange import Exchange
+
+_SLACK: Final = Slack()
+# Two samples are farther apart than this, ns.
+_SAMPLES_APART_NS: Final = 1000
+#: Path, operation and shape of each state.
+STATES: Final[dict[str, tuple[str, str, Shape]]] = {
+    "pose": (POSE, "GetPose", ODOMETRY),
+    "velocity": (VELOCITY, "GetVelocity", TWIST),
+}
+
+
+def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
+    """The one value that a response returns, and what is wrong where it returns none."""
+    found, problem = returned(exchange)
+    if problem or len(found) != 1:
+        return None, problem or f"{len(found)} return elements"
+    return from_element(found[0], shape.schema), ""
+
+
+def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float) -> tuple[str | None, Exchange]:
+    """Read a state over REST, over SOAP and over REST again, so far apart: in what SOAP's lies not between the others.
+
+    None where REST gives none: judged by those who observe it.
+    """
+    path, operation, shape = STATES[name]
+    before, _ = robot.read(path, shape)
+    time.sleep(apart_s)
+    exchange = ask(subscribers, operation)
+    between, problem = answered(exchange, shape)
+    time.sleep(apart_s)
+    after, _ = robot.read(path, shape)
+    if before is None or after is None:
+        return None, exchange
+    broken = ""
+    if not problem:
+        broken = shape.problem(between) or restamped(between, before, after) or retold(between, before, after)
+    if broken:  # which is none that will be right a moment later
+        judge_difference(robot, name, broken, exchange)
+    problem = problem or disagreement(before, between, after, _slack(robot))
+    if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
+        problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"
+    return problem, exchange
+
+
+def restamped(message: Any, *others: Any) -> str:
+    """How a message has nearly the stamp of another: no robot samples so fast, so it is the same one told wrongly."""
+    sec, nanosec = stamp_of(message)
+    for other in map(stamp_of, others):
+        apart_ns = 1e9 * (sec - other[0]) + nanosec - other[1]
+        if 0 < abs(apart_ns) < _SAMPLES_APART_NS:
+            return f"stamp {(sec, nanosec)}, {apart_ns:+g} ns from that of the same message, {other}"
+    return ""
+
+
+def retold(message: Any, before: Any, after: Any) -> str:
+    """How a message contradicts another of its stamp that REST told alike before and after it."""
+    of_one_sample = stamp_of(before) == stamp_of(message) == stamp_of(after) != (0.0, 0.0)
+    if not of_one_sample or disagreement(before, after, before, _SLACK):
+        return ""
+    return disagreement(before, message, after, _SLACK)
+
+
+def _slack(robot: Robot) -> Slack:
+    """What a sample may lie outside those before and after it: with the noise, of which each sample has its own."""
+    noise = robot.limits.noise
+    return Slack(_SLACK.absolute + FARTHEST * max(msgspec.structs.astuple(noise)), _SLACK.relative)
+
+
+def compare(robot: Robot, subscribers: SoapService, name: str, renew: Callable[[], object] = lambda: None) -> None:
+    """Judge a state as REST and SOAP give it; asked again where one may be an odometry message behind the other.
+
+    Args:
+        robot: over REST.
+        subscribers: over SOAP.
+        name: "pose" or "velocity".
+        renew: what keeps the state as it is, before each try.
+    """
+    if f"equivalence/{name}" in robot.judge.refuted():
+        return  # it costs three tries each time
+    for apart_s in (0.0, robot.sample_s, robot.sample_s):
+        renew()
+        problem, exchange = difference(robot, subscribers, name, apart_s)
+        if not problem:
+            break
+    if problem is not None:
+        judge_difference(robot, name, problem, exchange)
+
+
+def judge_difference(robot: Robot, name: str, problem: str, exchange: Exchange) -> None:
+    """Judge one comparison, or what several have in common."""
+    robot.judge.check(
+        f"equivalence/{name}",
+        not problem,
+        exchange,
+        f"what GET {STATES[name][0]} gives just before and after",
+        found=problem,
+        cause=problem.split(" is ", maxsplit=1)[0].split("[", maxsplit=1)[0],
+    )

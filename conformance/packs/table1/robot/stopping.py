@@ -1,0 +1,165 @@
+"""Bringing a robot to rest: before a check that needs it there, and at the end of every run."""
+
+import math
+import time
+from dataclasses import replace
+from http import HTTPStatus
+from typing import Any, Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.json_text import read_json
+from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
+from conformance.packs.table1.robot.robot import ACCEPT_JSON, GOAL_PATH, JSON_BODY, POSE, STILL, VELOCITY, Velocity
+from conformance.packs.table1.statement import said_of
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange, NoAnswerError, Response
+from conformance.transport.pace import Pace, Patience
+
+# A robot with a queue of missions starts the next one when the first is cancelled: cancel again for so long, s.
+_CANCEL_S: Final = 3.0
+# Beyond the settle time, which a loaded machine and a far network may stretch, s.
+_GRACE_S: Final = 1.5
+_STEP_S: Final = 0.02
+# At the end of a run a robot that does not answer must not keep the user waiting, s.
+_LAST_TIMEOUT_S: Final = 0.7
+_LAST_S: Final = 3.0
+
+
+def bring_to_rest(api: RestInterface) -> str:
+    """Cancel what the robot is doing and wait until it stands still.
+
+    Sends PUT and DELETE: only for checks that may move the robot. Whatever a robot answers or not, nothing is raised.
+
+    Returns:
+        Empty when the robot is at rest (as far as it can be read), else why it is not.
+    """
+    if not api.run.allow_motion:
+        return ""
+    still = _Stiller(api.client, _slowest(api))
+    limits = said_of(api.run).limits
+    return still.bring(_CANCEL_S, limits.settle_s + _GRACE_S + 8 * api.run.effort.usual_ms / 1000)
+
+
+def halt(api: RestInterface) -> None:
+    """Cancel and stop what the robot may be doing, without waiting until it stands still.
+
+    Between checks for which it does not matter that the robot still slows down; the others bring it to rest.
+    """
+    if api.run.allow_motion:
+        _Stiller(api.client, _slowest(api)).halt(_CANCEL_S)
+
+
+def leave_at_rest(api: RestInterface) -> None:
+    """Stop the robot at the end of a run, also one that was interrupted, and also a robot that hardly answers.
+
+    Does nothing where the robot could not have been moved. Bounded to a few seconds; raises nothing.
+    """
+    if not api.run.allow_motion:
+        return
+    try:
+        # A client of its own: no listener judges any more, an endpoint that hung once is asked again all the same, and
+        # nothing is late.
+        timeout_s = min(_LAST_TIMEOUT_S + 3 * api.run.effort.usual_ms / 1000, api.client.connection.timeout_s)
+        connection = replace(api.client.connection, timeout_s=timeout_s, listeners=[], pace=Pace(math.inf))
+        client = HttpClient(api.client.base_url, connection)
+        try:
+            _Stiller(client, _slowest(api)).bring(_LAST_S, _LAST_S)
+        finally:
+            client.close()
+    except Exception:  # noqa: BLE001 - the run is over: what was found must be reported whatever happens here
+        return
+
+
+def _slowest(api: RestInterface) -> Velocity:
+    """The greatest velocity that counts as rest: two noisy samples of which may follow each other."""
+    limits = said_of(api.run).limits
+    linear = limits.tolerance_linear_m_s + 3 * limits.noise.linear_m_s
+    angular = limits.tolerance_angular_rad_s + 3 * limits.noise.angular_rad_s
+    return Velocity(linear, linear, linear, angular, angular, angular)
+
+
+def _shows(answer: Response) -> bool:
+    """Whether an answer shows anything that may be a goal."""
+    text = read_json(answer.body)
+    return not text.unreadable and isinstance(text.value, dict) and bool(text.value)
+
+
+class _Stiller:
+    """Stops one robot.
+
+    Args:
+        client: its REST interface.
+        slowest: the greatest velocity that counts as rest.
+    """
+
+    def __init__(self, client: HttpClient, slowest: Velocity) -> None:
+        self._client = client
+        self._slowest = slowest
+        self._silent = ""
+
+    def bring(self, cancel_s: float, settle_s: float) -> str:
+        """Cancel and stop; what bring_to_rest() says of it."""
+        return self.halt(cancel_s) or self._wait(self._patience(settle_s))
+
+    def halt(self, cancel_s: float) -> str:
+        """Cancel what is there within so many seconds, and command rest; empty, or why something is still active."""
+        cancelled = self._no_goal_left(self._patience(cancel_s))
+        # Also where the goal could not be cancelled: a robot that takes velocities meanwhile stops for a moment.
+        self._ask("PUT", VELOCITY, JSON_BODY, body_of(STILL.twist))
+        return "" if cancelled else f"its goal is still active after {cancel_s:g} s of cancelling it"
+
+    def _patience(self, seconds: float) -> Patience:
+        return Patience(self._client.connection.pace, seconds)
+
+    def _no_goal_left(self, patience: Patience) -> bool:
+        while True:
+            cancelled = self._ask("DELETE", GOAL_PATH)
+            current = self._ask("GET", GOAL_PATH, ACCEPT_JSON)
+            # Anything but a goal that can be read: there is none, or no such resource, or no telling. Whether the robot
+            # moves is seen by its velocity.
+            if current is None or not current.response.ok or not _shows(current.response):
+                return True
+            if patience.over:
+                return False
+            if cancelled is None or not cancelled.response.ok:
+                time.sleep(_STEP_S)
+
+    def _wait(self, patience: Patience) -> str:
+        calm = 0
+        while True:
+            velocity, problem = self._velocity()
+            if problem:
+                return problem
+            rests = all(abs(one) <= most for one, most in zip(velocity, self._slowest, strict=True))
+            calm = calm + 1 if rests else 0
+            if calm > 1:
+                return ""
+            if patience.over:
+                return f"it still moves: {velocity}"
+            time.sleep(_STEP_S if calm == 0 else 0.002)
+
+    def _velocity(self) -> tuple[Velocity, str]:
+        """The measured velocity, and why it cannot be told."""
+        read = self._ask("GET", VELOCITY, ACCEPT_JSON)
+        if read is not None and read.response.status == HTTPStatus.NOT_FOUND:
+            return STILL, ""  # a robot without this resource: nothing says that it moves
+        twist: Any
+        odometry: Any
+        twist, problem = read_as(read.response, TWIST) if read else (None, self._silent)
+        if problem:
+            # What the velocity does not say, the odometry may.
+            read = self._ask("GET", POSE, ACCEPT_JSON)
+            odometry, unread = read_as(read.response, ODOMETRY) if read else (None, self._silent)
+            if unread:
+                return STILL, f"its velocity cannot be read: {problem}"
+            twist = odometry["twist"]["twist"]
+        return Velocity.of(twist), ""
+
+    def _ask(
+        self, method: str, path: str, headers: tuple[tuple[str, str], ...] = (), body: bytes = b""
+    ) -> Exchange | None:
+        try:
+            return self._client.send(method, path, headers=headers, body=body)
+        except NoAnswerError as none:
+            self._silent = f"no answer to {method} {path}: {none}"
+            return None

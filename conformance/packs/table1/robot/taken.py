@@ -1,0 +1,141 @@
+"""Whether a velocity or a goal whose PUT is answered as done has its effect: a PUT is applied or refused.
+
+What shows it is an effect that is missing while the same PUT has it when it is sent as usual: only the difference tells
+that it was the request that was not applied, and not a wall, a limit, or another client, that kept the robot where it
+is. And a reading counts only where whoever looks was in time: after what the robot has to settle, and before the
+velocity may have ended by itself.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.goal import await_goal, goal_body
+from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+from conformance.packs.table1.robot.stopping import bring_to_rest
+from conformance.transport.exchange import Exchange
+
+# How a PUT is sent.
+Put = Callable[[], Exchange]
+PutGoal = Callable[[dict[str, Any]], Exchange]
+# What is done, and whether it has its effect; None where that cannot be told.
+Act = Callable[[], bool | None]
+# So many readings at rest, each of another sample of the odometry, are no chance.
+_READINGS: Final = 3
+# How long a velocity is counted on to hold where the statement does not say, s.
+_COUNTED_ON_S: Final = 0.5
+_STEP_S: Final = 0.02
+# Of the settle time: from then on a velocity is there.
+_SETTLED: Final = 1.1
+# A goal with another heading: far enough, rad, that the robot is not there before anybody looks.
+_TURN: Final = 2.5
+# A robot that has moved by so much on its way to a goal has had it, m and rad.
+_MOVED_M: Final = 0.2
+_MOVED_RAD: Final = 0.3
+
+
+def velocity_has_effect(api: RestInterface, wanted: Velocity, put: Put, usual: Put) -> bool | None:
+    """Whether a robot at rest moves when a velocity is put that is answered as done. Leaves it at rest.
+
+    Args:
+        api: of the robot.
+        wanted: the velocity.
+        put: sends it.
+        usual: sends it as clients do.
+
+    Returns:
+        None where there is no telling: it is refused, moves the robot neither way, or ends before it can be read.
+    """
+    robot = Robot(api)
+    if robot.near(wanted, STILL, 3):
+        return None
+    return _beside(api, lambda: _moves(robot, wanted, put), lambda: _moves(robot, wanted, usual))
+
+
+def goal_has_effect(api: RestInterface, put: PutGoal, usual: PutGoal) -> bool | None:
+    """Whether a goal is there, or was followed, when it is put and answered as done. Leaves the robot at rest.
+
+    Args:
+        api: of the robot.
+        put: sends a goal.
+        usual: sends it as clients do.
+
+    Returns:
+        None where there is no telling: it is refused, or over at once also where it is put as usual.
+    """
+    robot = Robot(api)
+    return _beside(api, lambda: _follows(robot, put), lambda: _follows(robot, usual, _READINGS))
+
+
+def _beside(api: RestInterface, act: Act, usual: Act) -> bool | None:
+    """Whether an act has its effect; without it the usual one has to have it, and the act once more not to have it."""
+    found = act()
+    bring_to_rest(api)
+    if found is not False:
+        return found
+    usually = usual()
+    bring_to_rest(api)
+    if not usually:
+        return None
+    found = act()
+    bring_to_rest(api)
+    return found
+
+
+def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
+    """PUT a velocity over and over; whether the robot is seen to move, or not though it has had the time to."""
+    limits = robot.limits
+    hold_s = _COUNTED_ON_S if limits.hold_s is None else 0.9 * limits.hold_s - _STEP_S
+    since = last_sent = math.inf  # from when on it holds without a gap; when it was put last
+    counted = -math.inf
+    at_rest = 0
+    patience = robot.patience(2 * robot.settle_s + (_READINGS + 1) * (robot.sample_s + 4 * robot.usual_s))
+    while not patience.over:
+        sent = time.monotonic()
+        if not put().response.ok:
+            return None
+        answered = time.monotonic()
+        if answered > last_sent + hold_s or since == math.inf:
+            since, at_rest = answered, 0  # it may have ended meanwhile, and has to be reached anew
+        last_sent = sent
+        asked = time.monotonic()
+        velocity, _ = robot.velocity()
+        if velocity is None:
+            return None  # which the observers have judged
+        if robot.near(velocity, wanted) or not robot.near(velocity, STILL, 2):
+            return True
+        settled = since + _SETTLED * limits.settle_s + robot.sample_s
+        if asked > max(settled, counted + robot.sample_s) and time.monotonic() < sent + hold_s:
+            counted, at_rest = asked, at_rest + 1
+            if at_rest == _READINGS:
+                return False
+        time.sleep(_STEP_S)
+    return None
+
+
+def turned_goal(robot: Robot, here: Pose) -> dict[str, Any]:
+    """A goal that a robot reaches by turning where it stands."""
+    return goal_body(Pose(here.x, here.y, here.yaw + _TURN), robot.statement.motion.frame, "not acceptable")
+
+
+def _follows(robot: Robot, put: PutGoal, lasts: int = 1) -> bool | None:
+    """PUT a goal; whether it is shown, for so many readings, or the robot has moved."""
+    before = robot.map_pose()
+    if before is None:
+        return None
+    body = turned_goal(robot, before)
+    if not put(body).response.ok:
+        return None
+    goal, problem, _ = await_goal(robot, body)
+    if goal is not None and problem:
+        return None  # the robot's own, or another client's
+    if not problem:
+        return all(robot.goal()[0] is not None for _ in range(lasts - 1))
+    here = robot.map_pose()
+    if here is None:
+        return None
+    turned = abs(math.remainder(here.yaw - before.yaw, math.tau))
+    return here.distance(before) > _MOVED_M or turned > _MOVED_RAD

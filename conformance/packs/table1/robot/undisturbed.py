@@ -1,0 +1,189 @@
+"""A velocity that has to last: renewed, whatever is refused meanwhile; and its angular part beside a linear PUT."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from conformance.packs.table1.robot.drive import Drive, certain_s
+from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+
+if TYPE_CHECKING:
+    from conformance.packs.table1.limits import Limits
+    from conformance.packs.table1.robot.drive_trace import Turn
+    from conformance.verdict.evidence import Judge
+
+# Beyond any limit, or not to be actuated; and by the linear part alone.
+_BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))
+_BAD_LINEAR: Final = Velocity(linear_x=1e3)
+# Where an answer takes longer, a velocity may end before all of them are sent, s.
+_QUICK_S: Final = 0.02
+# A robot that drops its angular velocity needs so long to show it, s.
+_SHOWS_S: Final = 0.2
+# What could not be seen in time is tried so often.
+_TRIES: Final = 3
+# And a velocity that was renewed too late is begun anew so often: where nobody knows whether it can be renewed, the
+# verdict stays open.
+_RENEWED_TRIES: Final = 5
+_STEP_S: Final = 0.01
+# A look that takes so many times as long as usual must not make a renewal late.
+_LOOKS: Final = 4
+ANGULAR: Final = slice(3, 6)
+
+
+def judge_renewed(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
+    """Judge a robot that turns: its velocity lasts as long as it is renewed, and what is refused disturbs nothing.
+
+    Args:
+        robot: with its limits.
+        drive: whose last command was this velocity, after another one, and which has reached it.
+        judge: is told of safety/renewal and safety/refused-keeps.
+        turning: the velocity that was commanded.
+    """
+    expected, times = f"{turning} as long as it is renewed", _Times.of(robot.limits)
+    if robot.usual_s <= _QUICK_S and times.seen_s - times.renewed_s >= _SHOWS_S:
+        # One look shows that neither ends it.
+        lasts, found, turn = _renew(robot, drive, turning, times, _BAD)
+        if lasts:
+            for id_ in ("safety/renewal", "safety/refused-keeps"):
+                judge.check(id_, holds=True, exchange=turn.velocity_exchange, expected=expected)
+            return
+    for _ in range(_RENEWED_TRIES):
+        drive.command(STILL)
+        takes_s = robot.limits.settle_s + robot.sample_s
+        if robot.usual_s > _QUICK_S and takes_s < times.seen_s:
+            # Reached while it is renewed: who looks for it first, at three slow answers a look, renews it too late.
+            drive.command(turning)
+            lasts, found, turn = _renew(robot, drive, turning, times, (), drive.trace.answered + takes_s)
+        else:
+            drive.refresh(turning)
+            lasts, found, turn = _renew(robot, drive, turning, times, ())
+        if lasts is not None:
+            break
+    if lasts is None:
+        judge.skip("safety/renewal", "answers came too late to renew a velocity within its hold time")
+    else:
+        judge.check("safety/renewal", lasts, turn.velocity_exchange, expected, found=found, cause="ended")
+    if lasts is not False:
+        _refused(robot, drive, judge, turning)
+
+
+@dataclass(frozen=True)
+class _Times:
+    """When a velocity is renewed, s after its first command.
+
+    Attributes:
+        every: so often; holds_s: for so long it certainly holds each time.
+        renewed_s: no more from then on. Not when the first command ends: a robot might take the next one for a new one.
+        seen_s: it is looked at when a robot that renews nothing has begun to stop.
+    """
+
+    every: float = 0.2
+    holds_s: float = 0.5
+    renewed_s: float = 1.0
+    seen_s: float = 1.3
+
+    @classmethod
+    def of(cls, limits: Limits) -> _Times:
+        """For a robot; where it declares no hold time, for what a velocity is counted on to hold."""
+        hold_s = limits.hold_s
+        if hold_s is None:
+            return cls()
+        seen_s = min(1.05 * hold_s + 0.25 * limits.settle_s, 1.3 * hold_s)
+        return cls(0.4 * hold_s, certain_s(hold_s), 0.9 * hold_s, seen_s)
+
+
+def _renew(
+    robot: Robot, drive: Drive, turning: Velocity, times: _Times, refused: tuple[Velocity, ...], reached: float = 0.0
+) -> tuple[bool | None, str, Turn]:
+    """Command the same again and again, until the first command has certainly ended; in the end, what is refused.
+
+    Args:
+        robot: with its limits.
+        drive: whose last command was this velocity.
+        turning: the velocity.
+        times: when to command, and to look.
+        refused: velocities that the robot does not take.
+        reached: when the robot has had its time to reach the velocity, s of the monotonic clock.
+
+    Returns:
+        Whether the velocity is still there (None: it was not renewed in time), what was seen, and where.
+    """
+    first = len(drive.trace.commands) - 1
+    begun = drive.trace.sent
+    while time.monotonic() < begun + times.renewed_s:
+        due = drive.trace.sent + times.every
+        if time.monotonic() >= due:
+            drive.command(turning)
+        elif _LOOKS * drive.look_s < times.every:
+            drive.look()
+        else:
+            time.sleep(max(_STEP_S, min(due, begun + times.renewed_s) - time.monotonic()))
+    for bad in refused:
+        robot.put_velocity(bad)
+        robot.put_linear(_BAD_LINEAR)
+    time.sleep(max(0.0, max(begun + times.seen_s, reached) - time.monotonic()))
+    alone = robot.usual_s > _QUICK_S
+    lasts, found = drive.sees(turning, 2, until=drive.trace.sent + times.holds_s, alone=alone)
+    commands = drive.trace.commands[first:]
+    if any(later.answered > one.sent + times.holds_s for one, later in itertools.pairwise(commands)):
+        lasts = None
+    return lasts, found, drive.trace.turns[-1]
+
+
+def _refused(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
+    """What is refused leaves the robot turning as it did."""
+    for bad in _BAD:
+        drive.refresh(turning)
+        robot.put_velocity(bad)
+        robot.put_linear(_BAD_LINEAR)
+        drive.look()
+    drive.keep(min(_SHOWS_S, drive.holds_until - time.monotonic()))
+    keeps, found = drive.sees(turning, 2, until=drive.holds_until)
+    if keeps is None:
+        return  # a slow robot: its velocity may have ended by itself
+    judge.check(
+        "safety/refused-keeps",
+        keeps,
+        drive.trace.turns[-1].velocity_exchange,
+        f"the velocity that was there before the refused ones, {turning}",
+        found=found,
+        cause="changed",
+    )
+
+
+def judge_arc(robot: Robot, drive: Drive, judge: Judge, arc: Velocity) -> None:
+    """Judge that a PUT of the linear part, ahead and then back, leaves the angular one.
+
+    Args:
+        robot: with its limits.
+        drive: of that robot.
+        judge: is told of rest-resources/linear-keeps-angular.
+        arc: the velocity that all of it ends with.
+    """
+    back = arc._replace(angular_z=0.0)
+    drive.refresh(arc)
+    if not drive.command_linear(Velocity(linear_x=-back.linear_x)):
+        return
+    for attempt in range(_TRIES):
+        if attempt or robot.usual_s > _QUICK_S:
+            # Whether a PUT of the linear part renews the angular one too is the robot's affair: so again, and in time.
+            drive.refresh(arc)
+        drive.command_linear(back)
+        drive.keep(min(_SHOWS_S, drive.holds_until - time.monotonic()))
+        keeps, found = drive.sees(arc, 1.5, part=ANGULAR, until=drive.holds_until)
+        if keeps is not None:
+            break
+    else:
+        judge.note("rest-resources/linear-keeps-angular", "answers came too late to see it within the hold time")
+        return
+    judge.check(
+        "rest-resources/linear-keeps-angular",
+        keeps,
+        drive.trace.turns[-1].velocity_exchange,
+        f"the angular part as it was before the linear PUT, {arc}",
+        found=found,
+        cause="changed",
+    )

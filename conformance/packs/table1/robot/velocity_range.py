@@ -1,0 +1,44 @@
+"""The ends of the range of velocities that a robot declares, all of which it has to take and to reach."""
+
+from typing import Final
+
+from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.robot import FARTHEST, Robot, Velocity
+
+# Where no limits are declared the robot may be slower than the figures that it is judged by.
+_UNDECLARED: Final = 0.6
+# So many times as fast as what may still be rest, by its tolerance and its noise, a robot does not rest.
+_MOVES: Final = 1.6
+
+
+def slowest(robot: Robot) -> Velocity:
+    """A velocity ahead, and to the left, that can just be told from rest; at most half as fast as the robot can be."""
+    limits = robot.limits
+    linear = _MOVES * (limits.tolerance_linear_m_s + FARTHEST * limits.noise.linear_m_s)
+    angular = _MOVES * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
+    return Velocity(
+        linear_x=min(linear, 0.5 * fastest(robot, 0)) if robot.actuated(0) else 0.0,
+        angular_z=min(angular, 0.5 * fastest(robot, 5)) if robot.actuated(5) else 0.0,
+    )
+
+
+def fastest(robot: Robot, component: int) -> float:
+    """How fast a robot is driven by one component of its velocity, m/s or rad/s."""
+    return robot.limit_of(component) * (1.0 if robot.limit_declared(component) else _UNDECLARED)
+
+
+def reach(drive: Drive, velocity: Velocity) -> bool:
+    """Whether a velocity is taken and reached; judged as one of the range that the robot declares."""
+    if not drive.command(velocity):
+        exchange = drive.trace.commands[-1].exchange
+        expected = f"{velocity} to be taken, which is within the declared limits"
+        return drive.robot.judge.check(
+            "rest-resources/velocity-range", holds=False, exchange=exchange, expected=expected, cause=exchange.came
+        )
+    return drive.reach(velocity, "rest-resources/velocity-converges", "rest-resources/velocity-range")
+
+
+def direction(robot: Robot) -> int:
+    """Ahead (1) where the arena has room for it, else back (-1)."""
+    pose = robot.map_pose()
+    return 1 if pose is None or robot.in_arena(pose.ahead(robot.limits.linear_m_s)) else -1

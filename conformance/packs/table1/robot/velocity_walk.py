@@ -1,0 +1,115 @@
+"""Velocities in any order, as a state machine: what was asked for last is what the robot does."""
+
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
+
+from conformance.packs.table1.limits import Limits
+from conformance.packs.table1.robot.robot import STILL, Velocity
+from conformance.packs.table1.robot.walk import Walk
+
+# Of the limits: fast enough to be told from rest, slow enough to stay near.
+_LINEAR_SHARE = 0.35
+_ANGULAR_SHARE = 0.6
+# Farther than this from where the walk began, the next way leads back, m.
+_LEASH_M = 0.25
+_SHARES = st.floats(0.15, 1.0)
+
+
+def room_for(limits: Limits) -> float:
+    """How far from where it began a walk may take a robot, m: off its leash by one more velocity."""
+    return _LEASH_M + _LINEAR_SHARE * limits.linear_m_s * limits.settle_s
+
+
+class VelocityMachine(RuleBasedStateMachine):
+    """Commands, corrections of the linear part, stops, refusals, renewals.
+
+    Args:
+        walk: what it shares with the other walks of its check.
+    """
+
+    def __init__(self, walk: Walk) -> None:
+        super().__init__()
+        self._walk = walk
+        self._robot, self._drive = walk.robot, walk.drive
+        self._wanted = STILL
+
+    def teardown(self) -> None:
+        """Stop."""
+        self._walk.step(lambda: self._drive.command(STILL))
+
+    @rule()
+    def ask(self) -> None:
+        """Readings agree with each other at any time."""
+        self._walk.step(lambda: self._drive.look()[0] is not None)
+
+    @rule(forward=st.booleans(), left=st.booleans(), linear=_SHARES, angular=_SHARES, which=st.sampled_from("ab2"))
+    def command(self, *, forward: bool, left: bool, linear: float, angular: float, which: str) -> None:
+        """Any velocity within the limits is reached."""
+        ahead = self._ahead(linear, forward=forward) if which in "a2" else 0.0
+        turn = angular * _ANGULAR_SHARE * self._robot.limits.angular_rad_s * (1 if left else -1) if which in "b2" else 0
+        self._walk.step(lambda: self._full(Velocity(linear_x=ahead, angular_z=turn if self._robot.actuated(5) else 0)))
+
+    @rule()
+    def stop(self) -> None:
+        """Zero is a velocity like others."""
+        self._walk.step(lambda: self._full(STILL))
+
+    @rule(forward=st.booleans(), linear=_SHARES)
+    def command_linear(self, *, forward: bool, linear: float) -> None:
+        """The linear part alone is replaced."""
+        self._walk.step(lambda: self._linear(self._ahead(linear, forward=forward)))
+
+    @precondition(lambda self: self._wanted != STILL)
+    @rule(component=st.integers(0, 5), times=st.sampled_from((1.0, -1.0)))
+    def refused(self, component: int, times: float) -> None:
+        """What is refused changes nothing."""
+        self._walk.step(lambda: self._refuse(component, times))
+
+    def _ahead(self, share: float, *, forward: bool) -> float:
+        if not self._robot.actuated(0):
+            return 0.0
+        trace = self._drive.trace.odometry
+        sign = 1 if forward else -1
+        if trace and trace[0].pose.distance(trace[-1].pose) > _LEASH_M:
+            step = trace[-1].pose.ahead(0.1 * sign)
+            sign = sign if step.distance(trace[0].pose) < trace[-1].pose.distance(trace[0].pose) else -sign
+        return sign * share * _LINEAR_SHARE * self._robot.limits.linear_m_s
+
+    def _full(self, wanted: Velocity) -> bool:
+        self._wanted = wanted
+        return self._drive.command(wanted) and self._drive.reach(wanted, "rest-resources/velocity-converges")
+
+    def _linear(self, ahead: float) -> bool:
+        self._drive.refresh(self._wanted)
+        wanted = self._wanted._replace(linear_x=ahead)
+        if not self._drive.command_linear(wanted):
+            return False
+        self._wanted = wanted
+        linear = slice(0, 3)
+        if not self._drive.reach(wanted, "rest-resources/linear-put", part=linear):
+            return False
+        # Whether the angular part lasts longer than it was asked for is the robot's affair.
+        keeps, found = self._drive.sees(wanted, 1.5, part=slice(3, 6), until=self._drive.holds_until)
+        return keeps is None or self._robot.judge.check(
+            "rest-resources/linear-keeps-angular",
+            keeps,
+            self._drive.trace.turns[-1].velocity_exchange,
+            f"the angular part as it was, {self._wanted}",
+            found=found,
+            cause="changed",
+        )
+
+    def _refuse(self, component: int, times: float) -> bool:
+        self._drive.refresh(self._wanted)
+        bad = [0.0] * 6
+        bad[component] = times * 1e3
+        self._robot.put_velocity(Velocity(*bad))
+        keeps, found = self._drive.sees(self._wanted, 2, until=self._drive.holds_until)
+        return keeps is None or self._robot.judge.check(
+            "safety/refused-keeps",
+            keeps,
+            self._drive.trace.turns[-1].velocity_exchange,
+            f"the velocity that was there before the refused one, {self._wanted}",
+            found=found,
+            cause="changed",
+        )

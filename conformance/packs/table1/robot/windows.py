@@ -1,0 +1,102 @@
+"""What several samples of the odometry say together: medians, which one sample that is out does not move.
+
+A robot's odometry comes five to a hundred times a second, and each sample has noise. Whoever reads faster sees one
+sample several times, so what is counted here is samples, told apart by their stamps. Everything judges a record, and
+talks to nobody.
+"""
+
+from collections.abc import Sequence
+from statistics import median
+from typing import Final
+
+from conformance.packs.table1.limits import Limits
+from conformance.packs.table1.robot.drive_trace import Turn
+from conformance.packs.table1.robot.robot import Velocity, is_near
+
+# So many samples tell: of three, one may be anything.
+SEVERAL: Final = 3
+# Where stamps do not tell: no robot's odometry is slower than this, so that a later reading is another sample, s.
+LONGEST_SAMPLE_S: Final = 0.25
+ALL: Final = slice(None)
+# What is still so far away, of what it was at first, has not come nearer.
+_NO_NEARER: Final = 0.8
+
+
+def newest(turns: Sequence[Turn], count: int = SEVERAL) -> list[Turn]:
+    """The last turn of each of the newest samples in which a velocity could be read, the oldest first."""
+    found: list[Turn] = []
+    for turn in reversed(turns):
+        if turn.velocity is None:
+            continue
+        if not found or _is_another(turn, found[-1]):
+            if len(found) == count:
+                break
+            found.append(turn)
+    return found[::-1]
+
+
+def _is_another(turn: Turn, later: Turn) -> bool:
+    if turn.odometry is not None and later.odometry is not None and turn.odometry.stamp != later.odometry.stamp:
+        return True
+    return later.at - turn.at > LONGEST_SAMPLE_S
+
+
+def velocities(turns: Sequence[Turn]) -> list[Velocity]:
+    """What the turns say of the velocity."""
+    return [turn.velocity for turn in turns if turn.velocity is not None]
+
+
+def middle(readings: Sequence[Velocity]) -> Velocity:
+    """The median of each component."""
+    return Velocity(*map(median, zip(*readings, strict=True)))
+
+
+def part_of(velocity: Velocity, part: slice) -> Velocity:
+    """A velocity with zeros in the components that do not count."""
+    chosen = set(range(len(velocity))[part])
+    return Velocity(*(value if index in chosen else 0.0 for index, value in enumerate(velocity)))
+
+
+def is_stuck(turns: Sequence[Turn], wanted: Velocity, part: slice = ALL) -> bool:
+    """Whether several readings show a velocity that comes no nearer to another one."""
+    seen = velocities(turns)
+    if len(seen) < SEVERAL:
+        return False
+    return _apart(seen[-1], wanted, part) > _NO_NEARER * _apart(seen[0], wanted, part)
+
+
+def _apart(one: Velocity, other: Velocity, part: slice) -> float:
+    return max(abs(a - b) for a, b in zip(part_of(one, part), part_of(other, part), strict=True))
+
+
+def verdict(
+    limits: Limits, turns: Sequence[Turn], wanted: Velocity, factor: float = 1.0, part: slice = ALL
+) -> bool | None:
+    """Whether turns show a velocity: the newest does, or the median of the newest samples.
+
+    Returns:
+        None where the newest does not and there are too few samples to say more.
+    """
+    samples = velocities(newest(turns))
+    if samples and is_near(limits, part_of(samples[-1], part), part_of(wanted, part), factor):
+        return True
+    return shown(limits, turns, wanted, factor, part)
+
+
+def shown(
+    limits: Limits,
+    turns: Sequence[Turn],
+    wanted: Velocity,
+    factor: float = 1.0,
+    part: slice = ALL,
+    count: int = SEVERAL,
+) -> bool | None:
+    """Whether the median of the newest samples is the velocity, within ``factor`` times the tolerance.
+
+    Returns:
+        None where there are too few samples.
+    """
+    samples = velocities(newest(turns, count))
+    if len(samples) < count:
+        return None
+    return is_near(limits, part_of(middle(samples), part), part_of(wanted, part), factor, len(samples))

@@ -1,0 +1,214 @@
+"""One state, read over REST and over SOAP."""
+
+import time
+from typing import Final
+
+import pytest
+
+from conformance.api.soap.service import SoapService
+from conformance.documents.json_schema import Shape
+from conformance.documents.representation import from_element, projected
+from conformance.packs.table1.robot.agreement import Slack, disagreement, entries_of, unstamped
+from conformance.packs.table1.robot.geometry import Pose, pose_of
+from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal
+from conformance.packs.table1.robot.goals import choose_goals
+from conformance.packs.table1.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY, TWIST
+from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
+from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
+from conformance.packs.table1.robot.plan import plan_of, query, reachable
+from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, Robot, Velocity
+from conformance.packs.table1.robot.single_readings import BesideOdometry
+from conformance.packs.table1.robot.soap_services import ask, returned
+from conformance.packs.table1.robot.state_over_soap import STATES, answered, compare
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.needs("rest", "subscribers")
+_SLACK: Final = Slack()
+_SAME: Final = Slack(0.0, 0.0)
+# More than any tolerance that is asked for here, m.
+_END_OFF: Final = 0.3
+# Goals that displaced another one, of which each has to be out in the first answer after it.
+_GOALS: Final = 3
+# At standard effort: of a state that is out once in sixty answers, one pose is compared, and two velocities, for which
+# at most so many times as many are read.
+_POSES: Final = 200
+_VELOCITIES: Final = 320
+_READ: Final = 4
+# How far ahead a plan in the odometry's frame leads, m.
+_AHEAD: Final = 0.3
+
+
+@pytest.mark.phase("resting")
+@pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
+def test_pose_and_velocity(robot: Robot, subscribers: SoapService, effort: Effort) -> None:
+    """Whatever the robot does just now."""
+    for turn in range(effort.cases(_POSES)):
+        for name in STATES if turn < effort.cases(50) else ("pose",):
+            compare(robot, subscribers, name)
+
+
+@pytest.mark.phase("resting")
+@pytest.mark.requirement("equivalence/velocity")
+def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """Velocities over SOAP, each beside what the odometry had around it: what is out now and then fails too."""
+    if effort.name == "quick":
+        return  # too few to notice it
+    beside = BesideOdometry(judge, robot.limits, requirement="equivalence/velocity")
+    for _ in range(_READ * effort.cases(_VELOCITIES)):
+        odometry = robot.odometry()
+        exchange = ask(subscribers, "GetVelocity")
+        twist, problem = answered(exchange, TWIST)
+        if odometry is None or problem or TWIST.problem(twist):
+            return  # judged by those who compare all of it
+        beside.odometry(odometry.stamp, odometry.velocity, odometry.received)
+        beside.velocity(Velocity.of(twist), exchange, exchange.response.received_s)
+        if beside.judged == effort.cases(_VELOCITIES):
+            return
+
+
+@pytest.mark.phase("resting")
+@pytest.mark.requirement("equivalence/sensors", "equivalence/services")
+def test_lists(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """The same entries, in any order."""
+    for _ in range(effort.cases(50)):
+        for name, path, operation, shape in (
+            ("sensors", SENSORS, "GetSensors", SENSORS_SHAPE),
+            ("services", SERVICES, "GetNavigationServices", SERVICES_SHAPE),
+        ):
+            _compare_lists(robot, subscribers, judge, name, path, operation, shape)
+
+
+def _compare_lists(
+    robot: Robot, subscribers: SoapService, judge: Judge, name: str, path: str, operation: str, shape: Shape
+) -> None:
+    entry = shape.schema["items"]
+    names = tuple(entry["properties"])
+    before, _ = robot.read(path, shape)
+    exchange = ask(subscribers, operation)
+    found, problem = returned(exchange)
+    after, _ = robot.read(path, shape)
+    if before is None or after is None:
+        return
+    listed = entries_of([from_element(item, entry) for item in found], names)
+    wanted = [entries_of(before, names), entries_of(after, names)]
+    if not problem and listed not in wanted:
+        odd = sorted(set(listed) ^ set(wanted[0]))
+        problem = f"{len(listed)} entries for {len(wanted[0])}; in one only: {', '.join(odd[:3])}"
+    judge.check(
+        f"equivalence/{name}", not problem, exchange, f"the entries of GET {path}", found=problem, cause="other entries"
+    )
+
+
+@pytest.mark.phase("resting")
+@pytest.mark.requirement("equivalence/plan")
+def test_plan(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """The same question, with all its parameters or with few, or in the odometry's frame, has the same answer."""
+    odometry, _ = robot.read(POSE, ODOMETRY)
+    here = robot.in_map(pose_of(odometry["pose"]["pose"])) if odometry else None
+    goals = reachable(robot, here, max(1.0, robot.statement.motion.radius_m), 3) if here else []
+    if not goals:
+        pytest.skip("the robot has no plan to any pose around it")
+    frame = robot.statement.motion.frame
+    for index in range(effort.cases(20)):
+        goal, start = goals[index % len(goals)], goals[(index + 1) % len(goals)]
+        few: dict[str, float | str] = {"x": goal.x, "y": goal.y}
+        if frame != "map":
+            few["frame_id"] = frame
+        full: dict[str, float | str] = {"x": goal.x, "y": goal.y, "yaw": 0.1 * index, "frame_id": frame}
+        full |= {"tolerance": 0.2, "start_x": start.x, "start_y": start.y, "start_yaw": start.yaw}
+        there = pose_of(odometry["pose"]["pose"]).ahead(_AHEAD)
+        other: dict[str, float | str] = {"x": there.x, "y": there.y, "frame_id": odometry["header"]["frame_id"]}
+        for end, parameters in ((goal, few), (there, other), (goal, full)):
+            _compare_plans(robot, subscribers, judge, end, parameters)
+
+
+def _compare_plans(
+    robot: Robot, subscribers: SoapService, judge: Judge, goal: Pose, parameters: dict[str, float | str]
+) -> None:
+    before, _ = robot.read(query(**parameters), GET_PLAN)
+    exchange = ask(subscribers, "GetPlan", **parameters)
+    between, problem = answered(exchange, GET_PLAN)
+    after, _ = robot.read(query(**parameters), GET_PLAN)
+    if before is None or after is None:
+        return
+    problem = problem or GET_PLAN.problem(between)
+    if not problem and unstamped(before) == unstamped(after):
+        problem = disagreement(unstamped(before), unstamped(between), unstamped(after), _SAME)
+    elif not problem and plan_of(between).poses[-1].distance(goal) > _END_OFF:
+        # A planner may answer the same question in another way each time; then only what was asked for is the same.
+        problem = "the end is another one"
+    elif not problem and plan_of(between).frames != plan_of(after).frames:
+        problem = f"the frame is {min(plan_of(between).frames)}"
+    judge.check(
+        "equivalence/plan",
+        not problem,
+        exchange,
+        f"the plan to ({goal.x:.3f}, {goal.y:.3f}) that REST gives",
+        found=problem,
+        cause=problem.split(" is ")[0].split("[")[0],
+    )
+
+
+@pytest.mark.phase("motion")
+@pytest.mark.motion
+@pytest.mark.requirement("equivalence/goal")
+def test_goal(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """The active goal is the same one, and when there is none, both say so; also in the first answer after a change."""
+    _compare_goals(robot, subscribers, judge)
+    goals = choose_goals(robot, 1.5, 2)
+    late: list[tuple[str, Exchange]] = []
+    for index in range(effort.cases(10)):
+        body = goal_body(goals[index % 2], robot.statement.motion.frame, f"equal \u00e9 <&> {index}")
+        put_goal(robot, body)
+        await_goal(robot, body)
+        if len(late) == index - 1:
+            # Where SOAP's first answer was out each time so far, it gets the time that commands may take.
+            time.sleep(robot.settle_s if late else 0.0)
+            problem, exchange = _goal_difference(robot, subscribers)
+            late += [(problem, exchange)] if problem else []
+        for _ in range(3):
+            _compare_goals(robot, subscribers, judge)
+    if len(late) >= _GOALS:
+        judge.check(
+            "equivalence/goal", False, late[-1][1], "the goal that REST gives", found=late[-1][0], cause="first answer"
+        )
+    robot.delete_goal()
+    await_none(robot)
+    _compare_goals(robot, subscribers, judge)
+
+
+def _compare_goals(robot: Robot, subscribers: SoapService, judge: Judge) -> None:
+    """Compare the goals that both interfaces show; the two may learn of a change one after the other."""
+    patience = robot.patience(robot.settle_s)
+    while True:
+        problem, exchange = _goal_difference(robot, subscribers)
+        if not problem or patience.over:
+            break
+        time.sleep(0.05)
+    if problem is not None:
+        judge.check(
+            "equivalence/goal", not problem, exchange, "the goal that REST gives", found=problem, cause=problem[:20]
+        )
+
+
+def _goal_difference(robot: Robot, subscribers: SoapService) -> tuple[str | None, Exchange]:
+    """In what SOAP's goal is another than REST's; None where REST's has changed meanwhile."""
+    before, first = robot.goal()
+    exchange = ask(subscribers, "GetGoal")
+    found, problem = returned(exchange)
+    after, last = robot.goal()
+    statuses = {one.response.status for one in (first, last) if one.response}
+    if before is not None and after is not None and before["goal_id"]["id"] == after["goal_id"]["id"]:
+        between = from_element(found[0], GOAL_AND_STATUS.schema) if found else None
+        broken = "" if between is None else GOAL_AND_STATUS.problem(between)
+        if broken:  # which is none that will be right a moment later
+            robot.judge.check("equivalence/goal", False, exchange, "a complete goal, as REST gives it", found=broken)
+        shown = [projected(goal, GOAL_AND_STATUS.schema) for goal in (before, after)]
+        problem = problem or ("no goal" if between is None else disagreement(shown[0], between, shown[1], _SLACK))
+        return problem, exchange
+    if statuses == {404}:
+        # No goal: an empty response, or a fault.
+        return "a goal, where REST says that there is none" if found else "", exchange
+    return None, exchange

@@ -1,0 +1,54 @@
+"""The stamp of the odometry in every format."""
+
+import pytest
+
+from conformance.api.rest.applicable import reads
+from conformance.api.rest.calls import JSON
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.representation import UnreadableError, read
+from conformance.packs.table1.robot.message_shapes import ODOMETRY
+from conformance.packs.table1.robot.robot import POSE
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("rest")]
+_FORMATS = ("application/xml", "text/plain")
+_TURNS = 3
+
+
+@pytest.mark.requirement("rest-formats/same-values")
+def test_stamps_lie_between(api: RestInterface, judge: Judge) -> None:
+    """The odometry changes from answer to answer, but not back: XML's stamp lies between JSON's before and after."""
+    pose = next((call for call in reads(api) if call.operation.template == POSE), None)
+    for media_type in _FORMATS if pose is not None else ():
+        if pose is None or media_type not in pose.operation.formats:
+            continue
+        found = ""
+        # Once a clock may be set, or an answer be late.
+        for _ in range(_TURNS):
+            exchanges = [pose.send(api, ("Accept", name)) for name in (JSON, media_type, JSON)]
+            first, other, last = map(_stamp, exchanges)
+            if first is None or other is None or last is None or first <= other <= last or last < first:
+                found = ""
+                break
+            found = f"{other} (sec, nanosec) between {first} and {last}"
+        judge.check(
+            "rest-formats/same-values",
+            not found,
+            exchanges[1],
+            f"a stamp in {media_type} that is not before JSON's just before, nor behind JSON's just after",
+            found=found,
+            cause="stamp",
+        )
+
+
+def _stamp(exchange: Exchange) -> tuple[float, float] | None:
+    """Seconds and nanoseconds of an odometry in any format; None where it cannot be read."""
+    answer = exchange.response
+    if not answer.ok:
+        return None
+    try:
+        stamp = read(answer.media_type, answer.body, ODOMETRY.schema)["header"]["stamp"]
+        return float(stamp["sec"]), float(stamp["nanosec"])
+    except (UnreadableError, TypeError, KeyError, ValueError):
+        return None

@@ -1,0 +1,43 @@
+"""The robot's clock, by all that was read of its odometry in the run."""
+
+import time
+
+import pytest
+
+from conformance.packs.table1.robot.clock import SPAN_S, Clock
+from conformance.packs.table1.robot.robot import POSE, Robot
+from conformance.verdict.evidence import Judge
+
+# Late in a run: the longer it has lasted, the better its stamps tell.
+pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest")]
+_STEP_S = 0.1
+
+
+@pytest.mark.requirement("rest-resources/pose-clock")
+def test_clock(robot: Robot, judge: Judge, clock: Clock) -> None:
+    """The stamps advance as the time on the wall does."""
+    until = time.monotonic() + SPAN_S + 1
+    robot.odometry()  # which is kept when the last reading is a while ago
+    while clock.rate is None and time.monotonic() < until:
+        time.sleep(_STEP_S)
+        robot.odometry()
+    rate, scale = clock.rate, robot.limits.time_scale
+    if rate is None:
+        judge.skip("rest-resources/pose-clock", f"no odometry could be read for {SPAN_S:g} s")
+        return
+    judge.check(
+        "rest-resources/pose-clock",
+        clock.is_right(scale),
+        robot.get(POSE),
+        f"a clock that goes {scale:g} times as fast as the one on the wall, within 5 %",
+        found=f"{rate:.3f} times as fast over {clock.span_s:.1f} s",
+        cause="another rate",
+    )
+    judge.check(
+        "rest-resources/pose-clock",
+        not clock.stands_between(scale),
+        robot.get(POSE),
+        "nanoseconds that advance as the time does within a second",
+        found=f"{clock.fine_rate or 0.0:.2g} times as fast within a second",
+        cause="below a second",
+    )

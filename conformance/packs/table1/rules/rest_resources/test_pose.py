@@ -1,0 +1,93 @@
+"""The robot's pose and its measured velocity, read while nothing is asked of the robot."""
+
+import time
+
+import pytest
+
+from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.robot import POSE, Robot
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+# A robot whose odometry is slow, or that has just been started, gets so long, s.
+_PATIENCE_S = 5.0
+# At standard effort: what is out once in sixty readings is judged several times.
+# A busy machine misses samples, and what lies beside those is not judged: so many times as many readings, at most.
+_TURNS = 250
+_READ = 4
+_BESIDE = "rest-resources/velocity-odometry"
+# So many readings in a row without an odometry, and there is none.
+_UNREAD = 5
+
+
+@pytest.mark.requirement(
+    "rest-resources/pose-type",
+    "rest-resources/pose-unavailable",
+    "rest-resources/pose-fresh",
+    "rest-resources/pose-quaternion",
+    "rest-resources/pose-stamp",
+)
+def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
+    """Each reading is a whole odometry, and from one to the next time goes on; the observer judges them one by one."""
+    stamps: set[float] = set()
+    exchange: Exchange | None = None
+    patience = robot.patience(_PATIENCE_S)
+    readings = 0
+    while readings < effort.cases(100) or (len(stamps) < 2 and not patience.over):
+        odometry = robot.odometry()
+        readings += 1
+        if odometry is not None:
+            stamps.add(odometry.stamp)
+            exchange = odometry.exchange
+        if readings >= effort.cases(100):
+            if not stamps and judge.evidence["rest-resources/pose-type"].findings:
+                break
+            time.sleep(0.02)
+    if not stamps:
+        # What came instead has been judged, except for a robot that has no odometry for so long.
+        judge.check(
+            "rest-resources/pose-type", False, robot.get(POSE), f"an odometry after {_PATIENCE_S:g} s at the latest"
+        )
+        return
+    judge.check(
+        "rest-resources/pose-stamp",
+        len(stamps) > 1,
+        exchange,
+        f"a stamp that advances within {_PATIENCE_S:g} s",
+        found=f"the same stamp in {readings} readings",
+    )
+
+
+@pytest.mark.requirement("rest-resources/pose-sample", _BESIDE)
+def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
+    """Odometry and velocity in turns, many of one sample: the observer judges each by those around it."""
+    unread, before, wanted = 0, judge.evidence[_BESIDE].cases, effort.cases(_TURNS)
+    for turn in range(_READ * wanted):
+        judged = judge.evidence[_BESIDE].cases - before
+        if judged >= wanted or (turn >= wanted and not judged):
+            break
+        unread = unread + 1 if robot.odometry() is None else 0
+        if unread == _UNREAD:
+            break
+        robot.velocity()
+    robot.odometry()
+    robot.odometry()
+
+
+@pytest.mark.requirement(
+    "rest-resources/velocity-type",
+    "rest-resources/velocity-odometry",
+    "rest-resources/linear-type",
+    "rest-resources/linear-agrees",
+)
+def test_velocity_and_odometry(robot: Robot, effort: Effort) -> None:
+    """Velocity, its linear part and the odometry agree; observer and drive judge each reading."""
+    drive = Drive(robot)
+    until = time.monotonic() + 0.4 * robot.watchfulness
+    readings = 0
+    # Two readings agree where the odometry has been steady for a while: so look for that long at least.
+    while readings < effort.cases(60) or time.monotonic() < until:
+        drive.look()
+        readings += 1

@@ -1,0 +1,203 @@
+"""The publishers service of RoAAS's own contract: both operations, and what their answers are."""
+
+import pytest
+from hypothesis import strategies as st
+
+from conformance.api.soap.callable_services import repetitions
+from conformance.api.soap.calls import SoapResponse, judge_answer, read_exchange, send
+from conformance.api.soap.envelope import envelope
+from conformance.api.soap.forms import written_integer
+from conformance.api.soap.messages import padded, variants, with_text
+from conformance.api.soap.service import SoapService
+from conformance.api.soap.valid_messages import call_valid, require_valid_document, typed
+from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
+from conformance.contract.sizes import TAKEN_OCTETS
+from conformance.documents.xml import elements, text_of
+from conformance.documents.xml_names import ADDRESSING, clark, local
+from conformance.documents.xml_node import Node
+from conformance.packs.table1.robot import delivery_messages, soap_services
+from conformance.transport.exchange import Exchange
+from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+from conformance.verdict.explorer import Explorer
+
+pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("publishers"), pytest.mark.motion]
+_BOTH = ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest")
+_VALID = "soap-delivery/response-valid"
+
+
+def _answered(judge: Judge, id_: str, operation: str, answer: SoapResponse, what: str) -> bool:
+    """Judge that a valid request was taken, and that the answer is what the XSD says."""
+    taken = judge_answer(judge, id_, answer.accepted, answer, f"2xx for {what}")
+    return _valid(judge, operation, answer) and taken if answer.succeeded else taken
+
+
+def _valid(judge: Judge, operation: str, answer: SoapResponse) -> bool:
+    expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
+    wrapper = answer.first
+    if wrapper is None or wrapper.tag != expected:
+        return judge_answer(judge, _VALID, False, answer, f"{expected} in the Body")
+    inside = [local(str(child.tag)) for child in elements(wrapper)]
+    text = text_of(wrapper).strip()
+    return judge.check(
+        _VALID,
+        not inside and not text and answer.envelope is not None and len(answer.envelope.payload) == 1,
+        answer.exchange,
+        "an empty wrapper, alone in the Body",
+        found=f"the wrapper holds {inside[0] if inside else text[:80]!r}" if inside or text else "a second element",
+    )
+
+
+@pytest.mark.requirement("soap-delivery/delivery", "soap-delivery/coffee", _VALID)
+def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> None:
+    """Both operations take the paper's example, again and again, and answer with their own empty wrapper."""
+    for number in range(effort.cases(55)):
+        for operation, id_ in zip(_BOTH, ("soap-delivery/delivery", "soap-delivery/coffee"), strict=True):
+            code = "3" if operation == "ExecuteDeliveryRequest" and number % 2 else "4"
+            answer = call_valid(publishers, delivery_messages.delivery(operation, code))
+            right = answer.payload == clark(delivery_messages.NAMESPACE, f"{operation}Response")
+            judge_answer(judge, id_, answer.accepted and right, answer, f"2xx with {operation}Response for code {code}")
+            if answer.succeeded:
+                _valid(judge, operation, answer)
+
+
+@pytest.mark.requirement("soap-delivery/range", _VALID)
+def test_range(publishers: SoapService, judge: Judge, explore: Explorer) -> None:
+    """Doubles over their whole range and both codes, each written in any form that XML Schema allows."""
+    declared = publishers.contract.shape(clark(delivery_messages.NAMESPACE, "ExecuteDeliveryRequest"))
+    if declared is None:
+        pytest.skip("the contract has no ExecuteDeliveryRequest")
+    base = delivery_messages.delivery()
+    code_path = base.path_to("message_code")
+
+    def taken(case: tuple[Node, str, int, str]) -> None:
+        message, operation, form, space = case
+        code = 3 if operation == "ExecuteDeliveryRequest" and form % 2 else 4
+        message = with_text(message, code_path, f"{space}{written_integer(code, form // 2)}{space}")
+        message = Node(clark(delivery_messages.NAMESPACE, operation), "", message.children)
+        answer = call_valid(publishers, message)
+        values = ", ".join(f"{leaf.name} {leaf.text!r}" for leaf in message.children[0].children)
+        judge.require(
+            "soap-delivery/range",
+            answer.accepted,
+            answer.exchange,
+            "2xx for finite doubles and code 3 or 4",
+            found=f"{answer.describe()}, for {values}",
+            cause=f"{answer.status} {answer.code}",
+        )
+        _valid(judge, operation, answer)
+
+    strategy = st.tuples(
+        variants(declared, base, frozenset({code_path})),
+        st.sampled_from(_BOTH),
+        st.integers(0, 7),
+        st.sampled_from(["", " ", "\n"]),
+    )
+    explore(strategy, taken, cases=150)
+
+
+@pytest.mark.requirement("soap-delivery/syntax", _VALID)
+def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort: Effort) -> None:
+    """Requests that differ only in how their XML is written are all taken."""
+
+    def taken(operation: str, style: XmlStyle, what: str) -> None:
+        document = serialize(envelope([delivery_messages.delivery(operation)]), style)
+        answer = send(publishers, require_valid_document(publishers, document))
+        judge.require(
+            "soap-delivery/syntax",
+            answer.accepted,
+            answer.exchange,
+            f"2xx for the same message with {what}",
+            found=answer.describe(),
+        )
+        _valid(judge, operation, answer)
+
+    for operation in _BOTH:
+        for what, style in single_changes()[: effort.cases(len(single_changes()))]:
+            document = serialize(envelope([delivery_messages.delivery(operation)]), style)
+            answer = send(publishers, require_valid_document(publishers, document))
+            _answered(judge, "soap-delivery/syntax", operation, answer, f"the same with {what}")
+    explore(
+        st.tuples(st.sampled_from(_BOTH), xml_styles()),
+        lambda case: taken(case[0], case[1], "several changes of syntax"),
+        cases=60,
+    )
+
+
+@pytest.mark.requirement("soap-delivery/typed-values", _VALID)
+def test_typed_values(publishers: SoapService, judge: Judge) -> None:
+    """Values that say what type they are of, as PHP's and ksoap2's clients write them, are the same values."""
+    for operation in _BOTH:
+        declared = publishers.contract.shape(clark(delivery_messages.NAMESPACE, operation))
+        if declared is None:
+            pytest.skip(f"the contract has no {operation}")
+        payload = delivery_messages.delivery(operation)
+        document = require_valid_document(publishers, typed(envelope([payload]), declared, payload))
+        answer = send(publishers, document)
+        _answered(judge, "soap-delivery/typed-values", operation, answer, "the same with xsi:type on each value")
+
+
+@pytest.mark.requirement("soap-delivery/addressing")
+def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> None:
+    """WS-Addressing headers change nothing, with the action as the paper prints it and as JAX-WS RI makes it."""
+    address = publishers.endpoint
+    for number in range(repetitions(effort, 5)):
+        for operation in _BOTH:
+            for form in (operation, f"{operation}Request"):
+                action = f"{delivery_messages.NAMESPACE}TurtlebotPublishersInterface/{form}"
+                headers = (
+                    Node(clark(ADDRESSING, "Action"), action),
+                    Node(clark(ADDRESSING, "MessageID"), f"urn:uuid:7f0e6c3a-52c5-4f0d-9c63-{number:012d}"),
+                    Node(clark(ADDRESSING, "To"), address),
+                    Node(
+                        clark(ADDRESSING, "ReplyTo"),
+                        "",
+                        (Node(clark(ADDRESSING, "Address"), f"{ADDRESSING}/anonymous"),),
+                    ),
+                )
+                answer = call_valid(publishers, delivery_messages.delivery(operation), headers=headers)
+                _answered(judge, "soap-delivery/addressing", operation, answer, f"wsa:Action {form}")
+
+
+@pytest.mark.requirement("soap-delivery/refuses-code", "strict-input/soap-code", "strict-input/soap-fault")
+def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
+    """Codes other than 3 and 4 are refused."""
+    if publishers.contract.target_namespace != delivery_messages.NAMESPACE:
+        # The requirement on faults is one of every contract; these codes are not.
+        return
+    codes = ("5", "0", "2", "-4", "1", "7", "44", "2147483647", "-2147483648", "34", "-3", "100")
+    for code in codes[: effort.cases(len(codes))]:
+        answer = call_valid(publishers, delivery_messages.delivery(code=code))
+        for id_ in ("soap-delivery/refuses-code", "strict-input/soap-code"):
+            judge_answer(judge, id_, answer.refused, answer, f"a refusal of code {code}")
+        if not answer.accepted:
+            judge_answer(
+                judge,
+                "strict-input/soap-fault",
+                answer.fault is not None and answer.status == 500,
+                answer,
+                "a fault with status 500",
+            )
+
+
+@pytest.mark.requirement("soap-delivery/size")
+def test_64_kib(publishers: SoapService, judge: Judge) -> None:
+    """A valid message of 64 KiB is taken."""
+    document = padded(envelope((delivery_messages.delivery(),)).written(), TAKEN_OCTETS)
+    answer = send(publishers, require_valid_document(publishers, document))
+    judge_answer(judge, "soap-delivery/size", answer.accepted, answer, f"2xx for a message of {TAKEN_OCTETS:,} octets")
+
+
+@pytest.mark.requirement("soap-delivery/concurrent-answers")
+def test_answers_do_not_cross(publishers: SoapService, judge: Judge, effort: Effort) -> None:
+    """Clients that order at one moment by both operations are each answered by their own."""
+    operations = [_BOTH[client % 2] for client in range(MOST_CLIENTS)]
+    outgoing = [soap_services.outgoing(publishers, delivery_messages.delivery(name)) for name in operations]
+    for came in send_together([outgoing] * effort.cases(20)):
+        for operation, attempt in zip(operations, came, strict=True):
+            if isinstance(attempt, Exchange) and not is_busy(attempt):
+                answer = read_exchange(attempt)
+                own = answer.payload == clark(delivery_messages.NAMESPACE, f"{operation}Response")
+                if answer.accepted:  # whose a fault is does not show
+                    judge_answer(judge, "soap-delivery/concurrent-answers", own, answer, f"the answer to {operation}")

@@ -1,0 +1,124 @@
+"""Interoperability: zeep, the common SOAP client for Python, is made from the description and calls everything."""
+
+import time
+from typing import Any
+
+import pytest
+
+from conformance.api.soap.callable_services import SoapServices, repetitions
+from conformance.api.soap.service import SoapService
+from conformance.api.soap.valid_messages import example
+from conformance.api.soap.zeep_client import ZeepCaller
+from conformance.packs.table1.delivery import COFFEE, COURIER, EXAMPLE
+from conformance.transport.exchange import NoAnswerError
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+
+# What a user would look for in what zeep returns.
+_VALUES = {
+    "GetPose": ("pose.position.x", "pose.orientation.w", "twist.linear.x"),
+    "GetVelocity": ("linear.x", "angular.z"),
+}
+# How long odometry may be late before the robot is held to have none, s, and how often to ask meanwhile.
+_MOST_STALE_S = 2.0
+_AGAIN_S = 0.2
+
+
+def _has(result: Any, path: str) -> bool:
+    """Whether there is a number at a path of names in what zeep returned, whatever it is wrapped in."""
+    from zeep.helpers import serialize_object  # noqa: PLC0415 - see _client
+
+    return _found(serialize_object(result), path.split("."))
+
+
+def _found(value: Any, path: list[str]) -> bool:
+    if isinstance(value, list):
+        return any(_found(item, path) for item in value)
+    if not isinstance(value, dict):
+        return False
+    here: Any = value
+    for step in path:
+        here = here.get(step) if isinstance(here, dict) else None
+    return isinstance(here, float) or any(_found(inner, path) for inner in value.values())
+
+
+def _client(judge: Judge, id_: str, service: SoapService | None) -> ZeepCaller | None:
+    # Imported late: zeep costs a quarter of a second that other checks need not pay.
+    from conformance.api.soap.zeep_client import ZeepCaller  # noqa: PLC0415
+
+    if service is None:
+        pytest.skip("the service has no address")
+    try:
+        return ZeepCaller(service)
+    except NoAnswerError:
+        raise
+    except Exception as error:  # noqa: BLE001 - whatever zeep finds wrong with a description is the finding
+        judge.check(
+            id_,
+            False,
+            service.published.attempt,
+            "a description from which zeep makes a client",
+            found=f"{type(error).__name__}: {error}"[:300],
+        )
+        return None
+
+
+def _plan(service: SoapService) -> dict[str, float]:
+    """The arguments of a plan that the robot gives to a message of our own; none where it gives none."""
+    operation = next((item for item in service.contract.operations if item.name == "GetPlan"), None)
+    message = example(service, operation) if operation is not None else None
+    return (
+        {} if message is None else {child.name: float(child.text) for child in message.children if child.name in "xy"}
+    )
+
+
+@pytest.mark.phase("delivery")
+@pytest.mark.needs("publishers")
+@pytest.mark.motion
+@pytest.mark.requirement("soap-delivery/interop")
+def test_publishers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """Both operations are called."""
+    client = _client(judge, "soap-delivery/interop", soap.publishers)
+    if client is None:
+        return
+    for code in (COFFEE, COURIER) * repetitions(effort, 4):
+        values: dict[str, Any] = {**EXAMPLE, "message_code": code}
+        for operation in ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest"):
+            if operation == "ExecuteCoffeeRequest":
+                values["message_code"] = COFFEE
+            _, problem, exchange = client.call(operation, values)
+            judge.check("soap-delivery/interop", not problem, exchange, f"{operation} by zeep", found=problem)
+
+
+@pytest.mark.phase("resting")
+@pytest.mark.needs("subscribers")
+@pytest.mark.requirement("soap-subscribers/interop")
+def test_subscribers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """All operations are called; those that have nothing to tell may answer with a fault."""
+    id_ = "soap-subscribers/interop"
+    client = _client(judge, id_, soap.subscribers)
+    if client is None or soap.subscribers is None:
+        return
+    plan = _plan(soap.subscribers)
+    for _ in range(repetitions(effort, 5)):
+        for operation, arguments in (
+            ("GetPose", {}),
+            ("GetVelocity", {}),
+            ("GetSensors", {}),
+            ("GetNavigationServices", {}),
+            ("GetGoal", {}),
+            ("GetPlan", plan or {"x": 0.0, "y": 0.0}),
+        ):
+            result, problem, exchange = client.call(operation, **arguments)
+            until = time.monotonic() + _MOST_STALE_S
+            while operation in _VALUES and problem.startswith("fault") and time.monotonic() < until:
+                # Odometry that is late for a moment is none, and is told by a fault, as REST tells it by 503.
+                time.sleep(_AGAIN_S)
+                result, problem, exchange = client.call(operation, **arguments)
+            if problem.startswith("fault") and (operation == "GetGoal" or (operation == "GetPlan" and not plan)):
+                problem = ""
+            elif not problem:
+                problem = next(
+                    (f"zeep finds no {path}" for path in _VALUES.get(operation, ()) if not _has(result, path)), ""
+                )
+            judge.check(id_, not problem, exchange, f"{operation} by zeep", found=problem)

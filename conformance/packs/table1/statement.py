@@ -1,0 +1,147 @@
+"""What a vendor says of the paper's robot: its limits, where it may be driven, its ROS side, its latency thresholds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import msgspec
+
+from conformance.contract.classes import Prerequisite
+from conformance.contract.pack import Contract
+from conformance.contract.toml_file import Finite, NotNegative, Text
+from conformance.packs.table1.limits import DeclaredLimits, Limits
+from conformance.packs.table1.thresholds import Threshold
+from conformance.statement import statement as generic
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conformance.verdict.run import Run
+
+Component = Literal["linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z"]
+
+
+class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where a robot may be driven.
+
+    Attributes:
+        arena: (x_min, y_min, x_max, y_max) in the frame of goals, m; None: stay near where the robot is.
+        frame: frame of goals and plans.
+        radius_m: how far from where it is a goal may be, when there is no arena.
+        goals: poses (x, y, yaw) that can be reached; empty: found by asking for plans.
+        odom_to_map: (x, y, yaw) of the odometry frame in the frame of goals.
+        actuated: the velocity components that the robot can actuate.
+    """
+
+    arena: tuple[Finite, Finite, Finite, Finite] | None = None
+    frame: Text = "map"
+    radius_m: NotNegative = 1.0
+    goals: tuple[tuple[Finite, Finite, Finite], ...] = ()
+    odom_to_map: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    actuated: tuple[Component, ...] = ("linear.x", "angular.z")
+
+
+class Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The robot's ROS side, for the probe."""
+
+    domain_id: Annotated[int, msgspec.Meta(ge=0, le=232)] | None = None  # DDS's range
+    delivery_topic: Text = "/DeliveryRequestMsg/from_json"
+    cmd_vel_topic: Text = "/cmd_vel"
+
+
+class Load(generic.Load, frozen=True, forbid_unknown_fields=True):
+    """What a load test may ask of the robot, and the latency thresholds that it is to keep."""
+
+    thresholds: tuple[Threshold, ...] = ()
+
+
+class Statement(generic.Statement, frozen=True):
+    """A statement on the paper's robot.
+
+    Attributes:
+        declared: the limits that it names.
+    """
+
+    load: Load = Load()
+    declared: DeclaredLimits = DeclaredLimits()
+    motion: Motion = Motion()
+    ros: Ros = Ros()
+
+    @property
+    def limits(self) -> Limits:
+        """What the robot is judged by, declared or not."""
+        return self.declared.resolved()
+
+    @property
+    def figures(self) -> dict[str, dict[str, float]]:
+        """What result.json tells: the declared figures, and the limits and tolerances that the robot is judged by."""
+        named = msgspec.structs.asdict(self.declared)
+        declared = {name: figure for name, figure in named.items() if figure is not None and name != "noise"}
+        noise = msgspec.structs.asdict(self.declared.noise) if self.declared.noise else {}
+        declared |= {f"noise_{name}": figure for name, figure in noise.items() if figure}
+        return {"declared": declared, "limits": self.limits.figures, "tolerances": self.limits.tolerances}
+
+    @property
+    def undeclared(self) -> dict[str, str]:
+        """Why requirements that need a figure are not tested, by the prerequisite that the statement lacks."""
+        limits = self.limits
+        kinds = {name.partition(".")[0] for name in self.motion.actuated}
+        declared = {"linear": limits.linear_declared, "angular": limits.angular_declared}
+        there = {
+            Prerequisite.HOLD: limits.hold_s is not None,
+            Prerequisite.LIMITS: all(declared[kind] for kind in kinds),
+        }
+        words = {Prerequisite.HOLD: "hold time", Prerequisite.LIMITS: "limits of speed and turning rate"}
+        return {
+            need: f"not tested: the statement declares no {words[need]}" for need, known in there.items() if not known
+        }
+
+    @property
+    def domain_id(self) -> int | None:
+        """The ROS domain that a probe may join, or None."""
+        return self.ros.domain_id
+
+    def on_domain(self, domain_id: int) -> Statement:
+        """Return the statement with a ROS domain."""
+        return msgspec.structs.replace(self, ros=msgspec.structs.replace(self.ros, domain_id=domain_id))
+
+
+class StatementFile(generic.StatementFile, frozen=True, forbid_unknown_fields=True):
+    """The tables of a statement on the paper's robot, as they are written."""
+
+    load: Load = Load()
+    limits: DeclaredLimits = DeclaredLimits()
+    motion: Motion = Motion()
+    ros: Ros = Ros()
+
+    def read(self, contract: Contract, path: Path) -> Statement:
+        """Return the statement that a file makes.
+
+        Raises:
+            StatementError: it claims what the contract does not have.
+        """
+        common: dict[str, Any] = self.common(contract, path)
+        return Statement(**common, declared=self.limits, motion=self.motion, ros=self.ros)
+
+
+def load_robot_statement(path: Path) -> Statement:
+    """Read a statement on the paper's robot.
+
+    Raises:
+        StatementError: it cannot be read, or has an unknown key or a value of the wrong kind.
+    """
+    found = generic.load_statement(path, Contract.load())
+    if not isinstance(found, Statement):
+        raise TypeError(f"{path} was read as a statement on another kind of device")
+    return found
+
+
+def said_of(run: Run) -> Statement:
+    """Return what the vendor says of the robot of a run.
+
+    Raises:
+        TypeError: the run judges another kind of device.
+    """
+    if not isinstance(run.statement, Statement):
+        raise TypeError("the run's statement is not on the paper's robot")
+    return run.statement

@@ -1,0 +1,53 @@
+"""What goes along with every check: the observers, which judge each exchange of every check."""
+
+import importlib
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from typing import Final
+
+import pytest
+
+from conformance.api.interfaces import Interfaces
+from conformance.api.rest.observers import Observer
+from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
+from conformance.api.soap.service import SoapService
+from conformance.transport.client import Connection
+from conformance.verdict.run import Run
+
+# What is imported late because few commands need it, and is needed later in a run.
+_NEEDED_LATER: Final = ("conformance.api.soap.zeep_client", "schemathesis.specs.openapi", "jsonschema")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
+    """Have every exchange judged from the first check on. Here, and nowhere else, observers are registered."""
+    services = interfaces.soap.there.values()
+    api = interfaces.rest
+    if api is not None:
+        connection.listeners.append(Observer(api, [service.endpoint for service in services]))
+        connection.listeners.extend(api.device.observers(api))
+    if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
+        answers = {service.endpoint: answers_of(service) for service in services}
+        connection.listeners.append(SoapObserver(run.judge, answers))
+
+
+@pytest.fixture
+def _prepared(interfaces: Interfaces) -> Iterator[None]:
+    """For a check that mostly waits for the robot: meanwhile is imported and compiled what later ones need."""
+    services = tuple(interfaces.soap.there.values())
+    for service in services:
+        _ = service.own  # for which the robot may have to be asked: here, and not at any moment of the drive
+    thread = threading.Thread(target=_prepare, args=(services,), name="preparing")
+    thread.start()
+    yield
+    thread.join()
+
+
+def _prepare(services: Iterable[SoapService]) -> None:
+    # What does not work here does not where it is needed, and is told there.
+    with suppress(Exception):
+        for service in services:
+            _ = service.described.types, service.contract.types
+        for module in _NEEDED_LATER:
+            importlib.import_module(module)

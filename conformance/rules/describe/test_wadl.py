@@ -1,0 +1,83 @@
+"""/application.wadl: served, well-formed, and with the contract's resources (paper, REST; contract, describe)."""
+
+import pytest
+
+from conformance.api.rest.calls import example_call
+from conformance.api.rest.description import Described, described_by_wadl, differences
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.presence import judge_there
+from conformance.documents.openapi import operations_of
+from conformance.documents.representation import UnreadableError
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("describe"), pytest.mark.needs("rest")]
+_PATH = "/application.wadl"
+_BEHAVIOUR = "describe/wadl-behaviour"
+_IDS = ("describe/wadl", "describe/wadl-resources", _BEHAVIOUR)
+# What a WADL lists beside what a resource is for (Jersey does).
+_BESIDE = frozenset({"HEAD", "OPTIONS", ""})
+_MEDIA_TYPES = {"application/vnd.sun.wadl+xml", "application/wadl+xml", "application/xml", "text/xml"}
+
+
+def _without(api: RestInterface) -> bool:
+    """Say that nothing is asked of a robot whose contract has no WADL."""
+    if api.run.contract.wadl_path is not None:
+        return False
+    for id_ in _IDS:
+        api.run.judge.unclaimed(id_, "the contract has no WADL")
+    return True
+
+
+def _read(rest: HttpClient) -> tuple[list[Described], Exchange, str]:
+    """The operations, the exchange that brought them, and what is wrong."""
+    exchange = rest.send("GET", _PATH)
+    answer = exchange.response
+    if answer.status != 200:
+        return [], exchange, exchange.came
+    if answer.media_type not in _MEDIA_TYPES:
+        return [], exchange, f"it is sent as {answer.media_type or 'no media type'}"
+    try:
+        return described_by_wadl(answer.body, rest.base_url), exchange, ""
+    except UnreadableError as error:
+        return [], exchange, str(error)
+
+
+@pytest.mark.requirement("describe/wadl")
+def test_wadl_is_served(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+    """It is there, and is a WADL application."""
+    if _without(api):
+        return
+    _, exchange, fault = _read(rest)
+    judge.check("describe/wadl", not fault, exchange, "200 with a well-formed WADL", found=fault)
+
+
+@pytest.mark.requirement("describe/wadl-resources")
+def test_wadl_has_the_resources(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+    """It names the resources, methods and parameters of the contract; more is allowed."""
+    if _without(api):
+        return
+    found, exchange, fault = _read(rest)
+    missing = [fault] if fault else differences(operations_of(api.run.contract), found)
+    judge.check(
+        "describe/wadl-resources",
+        not missing,
+        exchange,
+        "the resources, methods and parameters of the contract",
+        found="; ".join(missing[:3]),
+    )
+
+
+@pytest.mark.requirement(_BEHAVIOUR)
+def test_what_is_described_is_there(api: RestInterface, rest: HttpClient) -> None:
+    """A request made from each operation of it is not answered 404 or 405."""
+    if _without(api):
+        return
+    known = {Described(item, item.template).address: item for item in operations_of(api.run.contract)}
+    for item in _read(rest)[0]:
+        ours = known.get(item.address)
+        if ours is not None and not ours.optional:
+            judge_there(api, _BEHAVIOUR, example_call(api, ours))
+        elif ours is None and item.path == item.operation.template and item.operation.method not in _BESIDE:
+            judge_there(api, _BEHAVIOUR, example_call(api, item.operation), known=False)

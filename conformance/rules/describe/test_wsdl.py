@@ -1,0 +1,171 @@
+"""What a robot says of its SOAP services: served with all it refers to, and the same as the contract."""
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+import pytest
+
+from conformance.api.soap import comparison
+from conformance.api.soap.address import is_http, split
+from conformance.api.soap.callable_services import SoapServices, repetitions
+from conformance.api.soap.envelope import EMPTY
+from conformance.api.soap.published_wsdl import get
+from conformance.api.soap.service import SoapService
+from conformance.api.soap.wsdl_rules import RULES
+from conformance.documents.wsdl import Description, DescriptionError, describe, faults, name
+from conformance.documents.xml_names import WSDL_SOAP, clark
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.phase("describe")
+_COMPARED: dict[str, tuple[Callable[[Description, Description], Iterator[str]], str]] = {
+    "wsdl-names": (comparison.names, "the names of the contract"),
+    "wsdl-operations": (comparison.operations, "the operations of the contract"),
+    "wsdl-types": (comparison.types, "the types of the contract"),
+    "wsdl-action": (comparison.actions, "an action of a form that the contract allows"),
+}
+
+
+@dataclass(frozen=True)
+class _Served:
+    """The description that a robot serves: the request for it, and what is wrong with it."""
+
+    exchange: Exchange
+    description: Description | None
+    problem: str
+
+
+def _services(soap: SoapServices, *ids: str) -> list[SoapService]:
+    """The services with a contract: descriptions are only read, so that of the one that acts is asked for as well."""
+    found = []
+    for service in (soap.publishers, soap.subscribers):
+        if service is None or service.contract_wsdl_path is None:
+            continue
+        if service.name in soap.run.unreachable:
+            for id_ in ids:
+                soap.run.judge.skip(
+                    id_, f"the {service.name} interface does not answer: {soap.run.unreachable[service.name]}"
+                )
+            continue
+        found.append(service)
+    if not found:
+        pytest.skip("no SOAP service that answers has an address and a contract")
+    return found
+
+
+def _served(service: SoapService) -> _Served:
+    """Ask for the description, where the statement says it is, else at ?wsdl of the endpoint."""
+    source = service.published.url or f"{service.endpoint}?wsdl"
+    exchange = get(source, service.client.connection)
+    answer = exchange.response
+    if answer.status != 200:
+        return _Served(exchange, None, exchange.came)
+    if "xml" not in answer.media_type:
+        return _Served(exchange, None, f"{exchange.came}, which is not XML")
+    try:
+        description = describe(answer.body, source, service.fetch)
+    except DescriptionError as error:
+        return _Served(exchange, None, str(error))
+    missing = [(place, why) for place, why in description.missing if urlsplit(place).netloc == urlsplit(source).netloc]
+    # What lies with somebody else (a public schema) matters only where something that is used comes from it.
+    problem = next((f"it refers to {place}: {why}" for place, why in missing), "") or next(faults(description), "")
+    return _Served(exchange, description, problem)
+
+
+@pytest.mark.requirement("describe/wsdl")
+def test_served(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """GET ?wsdl answers with the description, and everything that it refers to can be had."""
+    for service in _services(soap, "describe/wsdl"):
+        for _ in range(repetitions(effort, 6)):
+            served = _served(service)
+            judge.check(
+                "describe/wsdl",
+                not served.problem,
+                served.exchange,
+                "a WSDL with all it refers to",
+                found=served.problem,
+            )
+
+
+@pytest.mark.requirement(*(f"describe/{name_}" for name_ in _COMPARED))
+def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """Names, operations, types and actions are those of the contract."""
+    ids = [f"describe/{name_}" for name_ in _COMPARED]
+    for service in _services(soap, *ids):
+        for _ in range(repetitions(effort, 3)):
+            served = _served(service)
+            broken = served.problem if served.description is None else comparison.broken(served.description)
+            for name_, (compare, expected) in _COMPARED.items():
+                found = (
+                    [broken] if broken or served.description is None else compare(service.contract, served.description)
+                )
+                problem = next(iter(found), "")
+                judge.check(f"describe/{name_}", not problem, served.exchange, expected, found=problem)
+
+
+@pytest.mark.requirement("describe/wsdl-address")
+def test_address(soap: SoapServices, judge: Judge) -> None:
+    """The service answers at the address that the description names."""
+    for service in _services(soap, "describe/wsdl-address"):
+        served = _served(service)
+        ports = served.description.all("w:service/w:port[s:address]") if served.description is not None else []
+        located = [(name(port), port.find(clark(WSDL_SOAP, "address"))) for port in ports]
+        if not located:
+            judge.check(
+                "describe/wsdl-address", False, served.exchange, "a soap:address", found=served.problem or "none"
+            )
+        for port, element in located:
+            location = (element.get("location") if element is not None else None) or ""
+            exchange, problem = _answers(service, location)
+            judge.check(
+                "describe/wsdl-address",
+                not problem,
+                exchange or served.exchange,
+                "a service at its soap:address",
+                found=f"port {port}, {location!r}: {problem}",
+            )
+
+
+def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
+    """Ask at an address with an empty Body, which does nothing; what is wrong there."""
+    if not is_http(location):
+        return None, "no http URL"
+    base, path = split(location)
+    try:
+        with closing(HttpClient(base, service.client.connection)) as client:
+            exchange = client.send(
+                "POST",
+                path,
+                headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
+                body=EMPTY,
+                # The token is for the robot that the statement names.
+                authorized=client.host == service.client.host,
+            )
+    except NoAnswerError as none:
+        return none.unanswered, str(none)
+    status = exchange.response.status
+    return exchange, f"POST is answered {status}" if status in {404, 405, 501} else ""
+
+
+@pytest.mark.requirement(*(f"describe/wsdl-{rule}" for rule in RULES))
+def test_profile(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """The description keeps the rules of the Basic Profile."""
+    for service in _services(soap, *(f"describe/wsdl-{rule}" for rule in RULES)):
+        for _ in range(repetitions(effort, 3)):
+            served = _served(service)
+            for rule, check in RULES.items():
+                found = iter([served.problem]) if served.description is None else _guarded(check, served.description)
+                problem = next(found, "")
+                judge.check(f"describe/wsdl-{rule}", not problem, served.exchange, f"a WSDL by {rule}", found=problem)
+
+
+def _guarded(check: Callable[[Description], Iterator[str]], description: Description) -> Iterator[str]:
+    """A rule's findings; a description too broken for the rule breaks it."""
+    try:
+        yield from check(description)
+    except DescriptionError as error:
+        yield str(error)

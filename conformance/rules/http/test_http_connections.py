@@ -1,0 +1,43 @@
+"""One connection and many requests on it, one after another."""
+
+from contextlib import closing
+
+import pytest
+
+from conformance.api.rest.applicable import reads
+from conformance.api.rest.interface import RestInterface
+from conformance.transport.client import HttpClient
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("silence"), pytest.mark.needs("rest")]
+# More than servers used to allow on one connection, which then say that it ends.
+_MANY = 120
+
+
+@pytest.mark.requirement("http/many-requests")
+def test_many_requests_on_one_connection(api: RestInterface, rest: HttpClient, judge: Judge, effort: Effort) -> None:
+    """Each is answered as on a connection of its own.
+
+    A connection that the robot has ended is opened again: it may end one at any time (RFC 9112 9.5), but not drop the
+    requests on it again and again.
+    """
+    judge.at_risk = ("http/many-requests",)
+    calls = [call for call in reads(api) if not call.operation.optional]
+    usual = {call.path: call.send(api, fresh=True).response.status for call in calls}
+    with closing(HttpClient(rest.base_url, rest.connection)) as client:
+        for turn in range(effort.cases(_MANY) if effort.slow else _MANY):
+            path = calls[turn % len(calls)].path
+            exchange = client.send("GET", path)
+            status = exchange.response.status
+            if status != usual[path]:
+                # A robot may have no odometry any more, or too much to do: what it says to everybody is no fault here.
+                usual[path] = client.send("GET", path, fresh=True).response.status
+            judge.check(
+                "http/many-requests",
+                status == usual[path],
+                exchange,
+                f"{usual[path]}, as on a connection of its own",
+                found=f"status {status} for request {turn + 1} on one connection",
+                cause=f"{status}",
+            )

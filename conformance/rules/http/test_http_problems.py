@@ -1,0 +1,80 @@
+"""Problems: an error says in words what was wrong, and where (RFC 9457 3.1.4)."""
+
+from functools import partial
+
+import pytest
+
+from conformance.api.rest.applicable import applicable_operations, reads
+from conformance.api.rest.calls import JSON, example_call
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.mutations import mutations
+from conformance.api.rest.refusals import judge_refusal
+from conformance.documents.json_schema import kind_of
+from conformance.documents.openapi import operations_of
+from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.needs("rest")
+_IDS = (
+    "http/problem-detail",
+    "http/problem-value",
+    "http/problem-type",
+    "http/problem-status",
+    "http/no-traceback",
+    "http/no-server-error",
+)
+_TEXT = "roaas-no-number"
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement(*_IDS, "rest-formats/problem-xml", "strict-input/query-parameter")
+def test_problem_of_a_query(api: RestInterface, judge: Judge) -> None:
+    """A query parameter that is no number is named, and so is what stood there instead."""
+    numbers = {"number", "integer"}
+    tried = 0
+    for call in reads(api):
+        for item in call.operation.parameter("query"):
+            if kind_of(item.schema) not in numbers:
+                continue
+            tried += 1
+            wrong = call.having(item.name, _TEXT)
+            judge_refusal(
+                api,
+                partial(wrong.send, api),
+                "strict-input/query-parameter",
+                f"text at {item.name}",
+                field=item.name,
+                shown=_TEXT,
+                json=False,
+            )
+            wrong.send(api, ("Accept", "application/xml"))
+    if not tried and not any(JSON in operation.bodies for operation in operations_of(api.run.contract)):
+        for id_ in _IDS[:2]:
+            judge.unclaimed(id_, "the contract has no input in which a field could be wrong")
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement(*_IDS, "rest-formats/problem-xml", "strict-input/json-missing", "strict-input/json-type")
+def test_problem_of_a_body(api: RestInterface) -> None:
+    """A field that is missing or of another type is named in the problem."""
+    api.device.halt(api)
+    for operation in applicable_operations(api, (), lambda item: JSON in item.bodies, "takes JSON"):
+        call = example_call(api, operation)
+        made = [
+            item
+            for item in mutations(call.value, operation.bodies[JSON].schema)
+            if item.requirement in {"json-missing", "json-type"} and (item.shown or "missing" in item.name)
+        ]
+        for item in api.run.effort.subsample(made[:: max(1, len(made) // 6)], 2):
+            judge_refusal(
+                api,
+                partial(call.carrying(item.body).send, api),
+                f"strict-input/{item.requirement}",
+                item.name,
+                field=item.field,
+                shown=item.shown,
+                malformed=item.malformed,
+            )
+        for item in made[:1]:
+            # The observers judge in which format it is refused.
+            call.carrying(item.body).send(api, ("Accept", "application/xml"))
+    api.device.halt(api)

@@ -1,0 +1,155 @@
+"""Schemathesis over the contract's OpenAPI: examples, coverage, fuzzing and a walk along its links.
+
+Its requests are judged by what they are on the wire: valid ones by the statuses of the contract, invalid ones by 4xx.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from hypothesis.errors import Unsatisfiable
+
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.motion_guard import MotionGuard
+from conformance.api.rest.refusals import judge_refusal
+from conformance.api.rest.validity import INVALID, VALID, validity
+from conformance.documents.openapi import operations_of
+from conformance.transport.client import HttpClient
+from conformance.verdict.evidence import Judge
+from conformance.verdict.explorer import Explorer
+
+if TYPE_CHECKING:
+    from conformance.api.rest.generated import GeneratedRequest, Target
+
+pytestmark = pytest.mark.needs("rest")
+_IDS = ("http/declared-status", "http/declared-body", "http/no-server-error")
+_STRICT = tuple(
+    f"strict-input/{name}"
+    for name in (
+        "json-malformed",
+        "json-missing",
+        "json-unknown",
+        "json-type",
+        "json-non-finite",
+        "json-root",
+        "json-encoding",
+        "json-empty",
+        "json-bounds",
+        "path-parameter",
+        "query-parameter",
+        "query-missing",
+        "xml-body",
+        "status-malformed",
+        "status-invalid",
+    )
+)
+# At standard effort, of each operation: cases of the coverage phase, and of each kind of fuzzing.
+_COVERAGE = 110
+_FUZZED = 14
+_POSITIVE_REFUSALS = frozenset({405, 406, 408, 411, 413, 414, 415, 431})
+
+
+def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
+    if api.run.effort.name == "quick":
+        return []  # importing Schemathesis and reading the contract takes a tenth of the time that a quick run has
+    from conformance.api.rest.generated import targets  # noqa: PLC0415 - half a second that an unclaimed class need not pay
+
+    labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allowed(api, item)}
+    return [target for target in targets(api.run.contract) if target.label in labels]
+
+
+@pytest.mark.phase("describe")
+@pytest.mark.requirement(*_IDS, "strict-input/query-parameter", "strict-input/query-missing")
+def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
+    """What moves nothing."""
+    guard = MotionGuard(api)
+    for target in _targets(api, moving=False):
+        _run(api, judge, explore, guard, target)
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement(*_IDS, *_STRICT)
+def test_moving_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
+    """What may move the robot: invalid requests, and a few valid ones made fit for it."""
+    guard = MotionGuard(api)
+    api.device.halt(api)
+    for target in _targets(api, moving=True):
+        _run(api, judge, explore, guard, target)
+        api.device.halt(api)
+
+
+def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard, target: Target) -> None:
+    coverage = api.run.effort.draw(list(target.coverage()), _COVERAGE, f"{api.run.seed}/coverage {target.label}")
+    for item in api.run.effort.subsample([*target.examples(), *coverage], 1):
+        _judge_generated(api, judge, guard, item)
+
+    def fuzz(item: GeneratedRequest | None) -> None:
+        if item is not None:
+            _judge_generated(api, judge, guard, item)
+
+    if api.run.effort.slow or not target.has_input:
+        return
+    for negative in (True, False):
+        try:
+            explore(target.fuzzing(negative=negative), fuzz, cases=_FUZZED)
+        except Unsatisfiable:
+            continue  # its schemas take everything, or nothing: there is no such case
+
+
+def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item: GeneratedRequest) -> None:
+    """Send one request where it is harmless, and judge its answer by what it is on the wire."""
+    fit = guard.admit(item)
+    if fit is None:
+        return
+    said = validity(api.run.contract, fit.method, fit.target, fit.media_type, fit.body)
+    if said.verdict == INVALID:
+        body = said.requirement.startswith("json")
+        judge_refusal(api, lambda: fit.send(api), f"strict-input/{said.requirement}", said.why, json=body)
+        return
+    exchange = fit.send(api)
+    answer = exchange.response
+    guard.count(fit, accepted=answer.ok)
+    if said.verdict == VALID and said.operation is not None:
+        judge.check(
+            "http/declared-status",
+            answer.status not in _POSITIVE_REFUSALS,
+            exchange,
+            f"a valid request of {said.operation.id} not refused for its form",
+            found=f"status {answer.status}",
+            cause=f"{said.operation.id} {answer.status}",
+        )
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement("http/declared-status")
+def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
+    """A few short walks from operation to operation, as the contract's links lead."""
+    if api.run.effort.name == "quick":
+        return
+    from conformance.api.rest.generated import as_request, as_thesis, state_machine  # noqa: PLC0415 - as above
+
+    machine: Any = state_machine(api.run.contract.openapi)
+    if machine is None:
+        judge.note("http/declared-status", "the contract has no links to walk along")
+        return
+    guard = MotionGuard(api)
+
+    class Walk(machine):  # type: ignore[misc] # made at run time
+        def call(self, case: Any, **_: Any) -> Any:
+            one = as_request(case)
+            fit = guard.admit(one) if one is not None else None
+            if fit is None:
+                exchange = rest.send("GET", api.path)
+            else:
+                exchange = fit.send(api)
+                guard.count(fit, accepted=exchange.response.ok)
+            return as_thesis(exchange)
+
+        def validate_response(self, *_: Any, **__: Any) -> None:
+            """The observers have judged it."""
+
+    api.device.halt(api)
+    explore.machine(Walk, cases=4, steps=5)
+    api.device.halt(api)

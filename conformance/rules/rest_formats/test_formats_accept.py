@@ -1,0 +1,96 @@
+"""Which format is sent for which Accept (RFC 9110 12.4.2, 12.5.1)."""
+
+import pytest
+
+from conformance.api.rest.accept import quality
+from conformance.api.rest.applicable import answered
+from conformance.api.rest.calls import Call
+from conformance.api.rest.interface import RestInterface
+from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+_Q = "rest-formats/q-values"
+_SPECIFIC = "rest-formats/specific-range"
+_DEFAULT = "rest-formats/json-default"
+# {a} is the default format, {b} and {c} the others (or the default again), {A} to {C} in capitals.
+_MATRIX = (
+    (_Q, "{b}"),
+    (_Q, "{c}"),
+    (_Q, "{a};q=0.5, {b}"),
+    (_Q, "{a};q=0.5, {c};q=0.6"),
+    (_Q, "{b};q=0.2, {c};q=0.9, {a};q=0.5"),
+    (_Q, "{b};q=0.9, {c};q=0.2, {a};q=0.5"),
+    (_Q, "{c};q=0.2, {b};q=0.5, {a};q=0.9"),
+    (_Q, "{a};q=0.001, {b};q=0.002"),
+    (_Q, "{a};q=0.1, {b};q=0.01"),
+    (_Q, "{a};q=0.1,{c};q=0.8"),
+    (_Q, "{a} ; q=0.3 ,  {b} ;q=0.8"),
+    (_Q, "{A};q=0.3, {B};q=0.8"),
+    (_Q, "{a};Q=0.3, {c};Q=0.8"),
+    (_Q, "{b};q=1.000, {a};q=0.999"),
+    (_Q, "image/png, {b};q=0.5, {a};q=0.1"),
+    (_Q, "{a};version=1;q=0.4, {b};q=0.8"),
+    # RFC 9110 5.6.1.2: empty members count for nothing; 5.6.3: white space is a tab as well.
+    (_Q, ", {a};q=0.3, ,{b};q=0.8,"),
+    (_Q, "{a};q=0.3\t,\t{c};q=0.8"),
+    (_SPECIFIC, "{b};q=0.9, */*;q=0.1"),
+    (_SPECIFIC, "*/*, {a};q=0.1"),
+    (_SPECIFIC, "*/*;q=0.9, {a};q=0.5, {b};q=0.2"),
+    (_SPECIFIC, "*/*;q=0.1, {c}"),
+    (_SPECIFIC, "application/*;q=0.4, text/*;q=0.5"),
+    (_SPECIFIC, "text/*;q=0.5, application/*;q=0.9, application/json;q=0.1"),
+    (_SPECIFIC, "text/*, {a};q=0.5"),
+    (_SPECIFIC, "text/*;q=0.3, text/plain;q=0, application/xml;q=0.2"),
+)
+
+
+@pytest.mark.requirement(_DEFAULT)
+def test_default_format(api: RestInterface, judge: Judge) -> None:
+    """Whoever asks for nothing, or for anything, gets JSON."""
+    for call in api.run.effort.subsample(answered(api), 3):
+        if "application/json" not in call.operation.formats:
+            continue
+        for accept in ("", "*/*", "*/*;q=0.5"):
+            exchange = call.send(api, ("Accept", accept))
+            media_type = exchange.response.media_type
+            judge.check(
+                _DEFAULT,
+                media_type == "application/json",
+                exchange,
+                f"application/json for Accept: {accept}" if accept else "application/json without Accept",
+                found=media_type,
+            )
+
+
+@pytest.mark.requirement(_Q, _SPECIFIC)
+def test_preferred_format(api: RestInterface, judge: Judge) -> None:
+    """What the client would rather have is what it gets."""
+    calls = [call for call in api.run.effort.subsample(answered(api), 3) if len(call.operation.formats) > 1]
+    if not calls:
+        for id_ in (_Q, _SPECIFIC):
+            judge.unclaimed(id_, "the contract has no answers in more than one format")
+    cases = [(call, id_, text) for call in calls for id_, text in _MATRIX]
+    # With little effort each line of the matrix is tried with one resource, another one for each line.
+    once = [(calls[index % len(calls)], *_MATRIX[index]) for index in range(len(_MATRIX))] if calls else []
+    for call, id_, text in once + api.run.effort.draw(cases, len(cases), f"{api.run.seed}/accept"):
+        _judge_preferred(api, judge, call, id_, text)
+
+
+def _judge_preferred(api: RestInterface, judge: Judge, call: Call, id_: str, text: str) -> None:
+    formats = call.operation.formats
+    a, b, c = (*formats, *formats)[:3]
+    accept = text.format(a=a, b=b, c=c, A=a.upper(), B=b.upper(), C=c.upper())
+    best = max(quality(name, accept) for name in formats)
+    exchange = call.send(api, ("Accept", accept))
+    answer = exchange.response
+    sent = answer.media_type if answer.ok else ""
+    # A robot may have further formats of its own, and send one that is liked as well.
+    fine = quality(sent, accept) >= best if sent else best == 0
+    liked = [name for name in formats if quality(name, accept) == best]
+    judge.check(
+        id_,
+        fine and (sent != "" or (answer.status == 406)),
+        exchange,
+        f"{' or '.join(liked) if best else '406'} for Accept: {accept}",
+        cause=f"{text} {sent}",
+    )

@@ -1,0 +1,84 @@
+"""JSON, XML and text of one moment: each readable by itself, and all with the same values (contract, formats)."""
+
+import pytest
+
+from conformance.api.rest.applicable import answered, reads
+from conformance.api.rest.calls import root_name
+from conformance.api.rest.formats import judge_same_values
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.json_schema import kind_of
+from conformance.documents.openapi import Operation, is_xml, operations_of
+from conformance.documents.representation import UnreadableError, local_name, parse_xml
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("rest")]
+_XML = "application/xml"
+_TEXT = "text/plain"
+_IDS = {_XML: "rest-formats/xml", _TEXT: "rest-formats/text"}
+
+
+def _say_lacking(api: RestInterface, media_type: str, *ids: str) -> None:
+    """Say that requirements do not apply where no operation of the contract has the format."""
+    if not any(media_type in operation.formats for operation in operations_of(api.run.contract)):
+        for id_ in ids:
+            api.run.judge.unclaimed(id_, f"the contract has no answers as {media_type}")
+
+
+@pytest.mark.requirement(
+    "rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/charset", "rest-formats/vary"
+)
+def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -> None:
+    """Each resource is sent as XML and as text when that is asked for; the observers judge what is in them."""
+    _say_lacking(api, _XML, "rest-formats/xml", "rest-formats/xml-root")
+    _say_lacking(api, _TEXT, "rest-formats/text")
+    if not any({_XML, _TEXT} & set(operation.formats) for operation in operations_of(api.run.contract)):
+        judge.unclaimed("rest-formats/charset", "the contract has neither answers as XML nor as plain text")
+    if not any(len(operation.formats) > 1 for operation in operations_of(api.run.contract)):
+        judge.unclaimed("rest-formats/vary", "the contract has no answers in more than one format")
+    calls = answered(api)
+    for turn in range(effort.cases(12) if effort.name != "quick" else 1):
+        for call in calls[turn % len(calls) :] + calls[: turn % len(calls)]:
+            for media_type, id_ in _IDS.items():
+                if media_type not in call.operation.formats:
+                    continue
+                exchange = call.send(api, ("Accept", media_type))
+                answer = exchange.response
+                sent = judge.check(
+                    id_,
+                    answer.ok and answer.media_type == media_type,
+                    exchange,
+                    f"{media_type} for Accept: {media_type}",
+                    cause=f"{call.operation.id} {exchange.came}",
+                )
+                if sent and is_xml(media_type):
+                    fault = _root_fault(call.operation, answer.body)
+                    judge.check(
+                        "rest-formats/xml-root", not fault, exchange, "a root named after the type", found=fault
+                    )
+
+
+def _root_fault(operation: Operation, body: bytes) -> str:
+    """What is wrong with the name of a root; a list has no type, so its root may have any name."""
+    schema = operation.shape or {}
+    wanted = root_name(schema)
+    if not wanted or kind_of(schema) == "array":
+        return ""
+    try:
+        found = local_name(parse_xml(body))
+    except UnreadableError as error:
+        return str(error)
+    return "" if found == wanted else f"the root element is {found!r} and not {wanted!r}"
+
+
+@pytest.mark.requirement("rest-formats/same-values")
+def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None:
+    """Every value of each resource is the same in all its formats."""
+    compared = 0
+    for call in api.run.effort.subsample(reads(api), 5):
+        others = [name for name in _IDS if name in call.operation.formats]
+        if not others:
+            continue
+        compared += judge_same_values(api, call, others).response.ok
+    if not compared and not any(set(_IDS) & set(item.formats) for item in operations_of(api.run.contract)):
+        judge.unclaimed("rest-formats/same-values", "the contract has one format only")

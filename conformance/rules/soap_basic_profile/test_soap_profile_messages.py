@@ -1,0 +1,156 @@
+"""Messages by the Basic Profile: dispatch, encodings, and what becomes of those that are not what the WSDL says."""
+
+import codecs
+
+import pytest
+
+from conformance.api.soap.callable_services import SoapServices, callable_services
+from conformance.api.soap.calls import call, judge_answer, send
+from conformance.api.soap.envelope import envelope
+from conformance.api.soap.mutations import invalid_ones, mutations
+from conformance.api.soap.service import SoapService
+from conformance.api.soap.valid_messages import candidates, example, require_valid_document, typed
+from conformance.api.soap.xml_style import XmlStyle, serialize
+from conformance.documents.wsdl import Operation
+from conformance.documents.xml_names import clark
+from conformance.documents.xml_node import Node
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.phase("delivery")
+_STRANGE = "urn:example:strange"
+_REPEATED = (
+    "soap-basic-profile/R2712",
+    "soap-basic-profile/R1017",
+    "soap-basic-profile/R1111",
+    "soap-basic-profile/R1124",
+)
+
+
+def _examples(service: SoapService) -> list[tuple[Operation, Node]]:
+    """Each operation with a message that the robot takes."""
+    found = [(operation, example(service, operation)) for operation in service.contract.operations]
+    return [(operation, message) for operation, message in found if message is not None]
+
+
+@pytest.mark.requirement(*_REPEATED)
+def test_answers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """A valid message, without xsi:type, is answered 200 with the element that the description refers to."""
+    for service in callable_services(soap, *_REPEATED):
+        good = _examples(service)
+        if not good:
+            for id_ in _REPEATED:
+                judge.skip(id_, f"the robot took none of the messages tried at its {service.name} service")
+        _untyped(judge, service)
+        for operation, message in good:
+            for _ in range(effort.cases(15)):
+                answer = call(service, message)
+                judge_answer(
+                    judge,
+                    "soap-basic-profile/R1017",
+                    answer.accepted,
+                    answer,
+                    "2xx for a valid message without xsi:type",
+                )
+                if answer.accepted:
+                    judge_answer(
+                        judge,
+                        "soap-basic-profile/R2712",
+                        answer.payload == operation.response,
+                        answer,
+                        f"{operation.response} in the Body",
+                    )
+
+
+def _untyped(judge: Judge, service: SoapService) -> None:
+    """Where an operation takes no message, try one with xsi:type: if it takes that, it asks for what is not needed."""
+    for operation in service.contract.operations:
+        declared = service.contract.shape(operation.request) if operation.request else None
+        if declared is None or example(service, operation) is not None:
+            continue
+        plain = next(candidates(service, operation, declared))
+        answer = send(service, typed(envelope([plain]), declared, plain))
+        judge.check(
+            "soap-basic-profile/R1017",
+            not answer.accepted,
+            answer.exchange,
+            "the message taken without xsi:type as well",
+            found=f"{operation.name} is taken with xsi:type alone",
+        )
+
+
+@pytest.mark.requirement("soap-basic-profile/R1127", "xml-security/soapaction-spoofing")
+def test_dispatch(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """The operation is chosen by the Body's element, whatever SOAPAction says."""
+    ids = ("soap-basic-profile/R1127", "xml-security/soapaction-spoofing")
+    for service in callable_services(soap, *ids):
+        good = _examples(service)
+        for operation, message in good:
+            others = [other for other in service.contract.operations if other.name != operation.name]
+            spoofed = [f'"{other.input_action}"' for other in others if other.input_action]
+            spoofed += [f'"{other.name}"' for other in others] + ['"urn:example:strange"']
+            for action in spoofed[: effort.cases(len(spoofed))]:
+                answer = call(service, message, soap_action=action)
+                # To refuse an action that nothing declares is not to dispatch by it; to run the other operation is.
+                right = answer.refused or (answer.accepted and answer.payload == operation.response)
+                for id_ in ids:
+                    judge_answer(judge, id_, right, answer, f"{operation.response} or a refusal")
+
+
+@pytest.mark.requirement("soap-basic-profile/unknown-operation")
+def test_unknown_operation(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """A Body element that no operation has is never answered with success."""
+    id_ = "soap-basic-profile/unknown-operation"
+    for service in callable_services(soap, id_):
+        space = service.contract.target_namespace
+        known = [operation for operation in service.contract.operations if operation.request]
+        tags = [clark(space, "NoSuchOperation"), clark(_STRANGE, "NoSuchOperation"), "NoSuchOperation"]
+        tags += [clark(_STRANGE, operation.name) for operation in known]
+        tags += [str(operation.response) for operation in known if operation.response]
+        for tag in tags[: effort.cases(len(tags))]:
+            for action in ('""', f'"{known[0].input_action or known[0].name}"') if known else ('""',):
+                answer = call(service, Node(tag), soap_action=action)
+                judge_answer(judge, id_, answer.refused, answer, f"a fault or 4xx for {tag}")
+
+
+@pytest.mark.requirement("soap-basic-profile/R4001", "soap-basic-profile/utf-16")
+def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """A byte order mark is taken, and so is UTF-16."""
+    for service in callable_services(soap, "soap-basic-profile/R4001", "soap-basic-profile/utf-16"):
+        for operation, message in _examples(service)[: effort.cases(6)]:
+            plain = serialize(envelope([message]), XmlStyle())
+            declared = '<?xml version="1.0" encoding="UTF-16"?>' + plain
+            utf8 = serialize(envelope([message]), XmlStyle(declaration='<?xml version="1.0" encoding="UTF-8"?>'))
+            for id_, what, body, charset in (
+                ("R4001", "UTF-8 with a byte order mark", codecs.BOM_UTF8 + plain.encode(), "utf-8"),
+                ("R4001", "UTF-8 with mark and declaration", codecs.BOM_UTF8 + utf8.encode(), "utf-8"),
+                ("utf-16", "UTF-16, little end first", codecs.BOM_UTF16_LE + declared.encode("utf-16-le"), "utf-16"),
+                ("utf-16", "UTF-16, big end first", codecs.BOM_UTF16_BE + declared.encode("utf-16-be"), "utf-16"),
+            ):
+                valid = require_valid_document(service, body)
+                answer = send(service, valid, content_type=f"text/xml; charset={charset}")
+                right = answer.accepted and answer.payload == operation.response
+                judge_answer(judge, f"soap-basic-profile/{id_}", right, answer, f"2xx for a message in {what}")
+
+
+@pytest.mark.requirement("soap-basic-profile/R2724")
+def test_invalid_messages(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """A message that is not what the description says is answered with a Client fault."""
+    for service in callable_services(soap, "soap-basic-profile/R2724"):
+        for operation, message in _examples(service):
+            declared = service.contract.shape(operation.request) if operation.request else None
+            if declared is None:
+                continue
+            wrong = [item for item in mutations(declared, message) if item.kind not in {"body", "non-finite"}]
+            # Spread over all kinds and elements, rather than the first of them.
+            step = max(1, len(wrong) // effort.cases(40))
+            for mutant in invalid_ones(wrong[::step], service.contract.types):
+                answer = call(service, *mutant.payload)
+                judge_answer(
+                    judge,
+                    "soap-basic-profile/R2724",
+                    answer.code == "Client",
+                    answer,
+                    f"a Client fault where {mutant.what}",
+                    cause=f"{mutant.kind} {answer.status} {answer.code}",
+                )

@@ -1,0 +1,108 @@
+"""Parameters that break the contract are refused, and so is leaving out those that are required."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import pytest
+
+from conformance.api.rest.applicable import applicable_operations, readable
+from conformance.api.rest.calls import Call, example_call
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.parameters import Wrong, wrong_texts
+from conformance.api.rest.refusals import judge_refusal
+from conformance.api.rest.statuses import is_taken
+from conformance.documents.openapi import Operation
+
+pytestmark = pytest.mark.needs("rest")
+_QUERY = "strict-input/query-parameter"
+_MISSING = "strict-input/query-missing"
+_PATH = "strict-input/path-parameter"
+# Wrong texts of one operation at standard effort.
+_STANDARD = 120
+
+
+def _has(where: str, operation: Operation) -> bool:
+    return any(wrong_texts(item) for item in operation.parameter(where))
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement(_QUERY, "http/problem-detail", "http/problem-value")
+def test_query_parameters(api: RestInterface) -> None:
+    """Text, nothing, NaN, Infinity and 1e400 are refused where a number belongs."""
+    for call in _valid_calls(api, _QUERY, partial(_has, "query"), "takes numbers in its query"):
+        for item in _chosen(api, call.operation, "query"):
+            _try(api, call, item, _QUERY)
+
+
+@pytest.mark.phase("reading")
+@pytest.mark.requirement(_MISSING, "http/problem-detail")
+def test_missing_query_parameters(api: RestInterface) -> None:
+    """Each required parameter is missed when it is left out."""
+
+    def required(operation: Operation) -> bool:
+        return any(item.required for item in operation.parameter("query"))
+
+    for call in _valid_calls(api, _MISSING, required, "requires a query parameter"):
+        operation = call.operation
+        for item in operation.parameter("query"):
+            if item.required:
+                lacking, what = call.having(item.name, None), f"no parameter {item.name}"
+                judge_refusal(api, partial(lacking.send, api), _MISSING, what, field=item.name, json=False)
+        bare = Call(operation, {item.name: call.values[item.name] for item in operation.parameter("path")})
+        judge_refusal(api, partial(bare.send, api), _MISSING, "no parameter at all", json=False)
+
+
+@pytest.mark.phase("delivery")
+@pytest.mark.requirement(_PATH, "http/problem-detail", "http/problem-value")
+def test_path_parameters(api: RestInterface) -> None:
+    """Text, nothing, NaN, Infinity, 1e400 and values not enumerated are refused in a path."""
+    for call in _valid_calls(api, _PATH, partial(_has, "path"), "takes numbers in its path"):
+        for item in _chosen(api, call.operation, "path"):
+            # Two slashes in a row are another path, which servers may shorten.
+            if item.text:
+                _try(api, call, item, _PATH)
+        if call.operation.motion:
+            api.device.halt(api)
+
+
+def _valid_calls(
+    api: RestInterface, requirement: str, wanted: Callable[[Operation], bool], what: str
+) -> Iterator[Call]:
+    """Valid requests that are taken, so that a refusal of another one has to do with what was changed."""
+    for operation in applicable_operations(api, [requirement], wanted, what):
+        call = readable(api, operation) if operation.method == "GET" else example_call(api, operation)
+        exchange = call.send(api)
+        if is_taken(exchange):
+            yield call
+        else:
+            reason = f"a valid {operation.id} is answered {exchange.came}, so nothing was made of it"
+            api.run.judge.skip(requirement, reason)
+
+
+def _chosen(api: RestInterface, operation: Operation, where: str) -> list[Wrong]:
+    """Wrong texts of the parameters: with little effort, one of each kind and some more."""
+    wrong = [item for parameter in operation.parameter(where) for item in wrong_texts(parameter)]
+    first: dict[str, Wrong] = {}
+    for item in wrong:
+        first.setdefault(item.text, item)
+    named: dict[str, Wrong] = {}
+    for item in wrong:
+        named.setdefault(item.name, item)
+    if api.run.effort.slow:
+        return api.run.effort.subsample(wrong, 6)
+    basic = list(dict.fromkeys([*first.values(), *named.values()]))
+    return list(dict.fromkeys(basic + api.run.effort.draw(wrong, _STANDARD, f"{api.run.seed}/{operation.id}")))
+
+
+def _try(api: RestInterface, call: Call, item: Wrong, requirement: str) -> None:
+    refused = judge_refusal(
+        api,
+        partial(call.having(item.name, item.text).send, api),
+        requirement,
+        item.what,
+        field=item.name,
+        shown=item.shown,
+        json=False,
+    )
+    if not refused and call.operation.motion:
+        api.device.halt(api)

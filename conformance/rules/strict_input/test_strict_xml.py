@@ -1,0 +1,43 @@
+"""XML bodies that break the contract are refused, by robots that take XML."""
+
+from functools import partial
+
+import pytest
+
+from conformance.api.rest.applicable import applicable_operations
+from conformance.api.rest.calls import XML, example_call, root_name
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.refusals import judge_refusal
+from conformance.api.rest.statuses import is_taken
+from conformance.api.rest.xml_mutations import xml_mutations
+from conformance.verdict.evidence import Judge
+
+pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
+_ID = "strict-input/xml-body"
+_EACH = 80
+
+
+@pytest.mark.requirement(_ID, "http/no-server-error")
+def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
+    """Each named mutation of a valid XML body is refused with 4xx."""
+    taken = 0
+    operations = applicable_operations(api, [_ID], lambda item: XML in item.bodies, "takes XML")
+    for operation in operations:
+        api.device.halt(api)
+        call = example_call(api, operation, XML)
+        exchange = call.send(api)
+        if not is_taken(exchange):
+            judge.note(_ID, f"a valid {operation.id} as XML is answered {exchange.came}, so nothing was made of it")
+            continue
+        taken += 1
+        schema = operation.bodies[XML].schema
+        made = xml_mutations(call.value, schema, root_name(schema) or "value")
+        for name, body in api.run.effort.subsample(
+            api.run.effort.draw(made, _EACH, f"{api.run.seed}/{operation.id}"), 3
+        ):
+            wrong = call.carrying(body)
+            if not judge_refusal(api, partial(wrong.send, api), _ID, name, json=False):
+                api.device.halt(api)
+    api.device.halt(api)
+    if not taken and "rest-formats" not in api.run.claims:
+        judge.unclaimed(_ID, "the robot takes no XML")

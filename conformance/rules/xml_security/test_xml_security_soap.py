@@ -1,0 +1,142 @@
+"""Attacks on the SOAP services by XML: refused, nothing leaked, nobody called, and the robot still well."""
+
+import statistics
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from conformance.api.soap.attack_runner import AttackRunner, judge_calls, outcome
+from conformance.api.soap.attacks import IGNORED_SLOT, VALUE_SLOT, Attack, Template, attacks
+from conformance.api.soap.callable_services import SoapServices, callable_services
+from conformance.api.soap.callback_server import CallbackServer
+from conformance.api.soap.envelope import envelope
+from conformance.api.soap.messages import simple_leaves, with_text
+from conformance.api.soap.service import SoapService
+from conformance.api.soap.valid_messages import example
+from conformance.documents.xml_names import ADDRESSING, clark
+from conformance.documents.xml_node import Node
+from conformance.transport.exchange import Attempt, Exchange
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+
+pytestmark = pytest.mark.phase("attack")
+_NAMES = (
+    "doctype",
+    "internal-entity",
+    "external-entity",
+    "no-callback",
+    "parameter-entity",
+    "expansion",
+    "quadratic",
+    "depth",
+    "attributes",
+    "long-name",
+    "size",
+    "compressed",
+    "processing-instruction",
+    "xinclude",
+    "responsive",
+)
+_SPOOFING = "xml-security/addressing-spoofing"
+_IDS = tuple(f"xml-security/{name}" for name in _NAMES)
+_DEADLINE_S = 10.0
+# More than there are for any requirement.
+_EACH = 99
+# With less than half the effort (in quick runs, and on slow robots) there is one for each requirement.
+_HALF = 0.5
+
+
+def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
+    """A message that the robot takes: as it is, with VALUE_SLOT for one of its values, and that value."""
+    found: tuple[Node, Node, str] | None = None
+    for operation in service.contract.operations:
+        message = example(service, operation)
+        declared = service.contract.shape(operation.request) if operation.request else None
+        if message is None or declared is None:
+            continue
+        leaves = simple_leaves(declared, message)
+        if leaves:
+            path = leaves[0][0]
+            return message, with_text(message, path, VALUE_SLOT), message.at(path).text
+        found = found or (message, replace(message, text=VALUE_SLOT), "")
+    return found
+
+
+def _runner(judge: Judge, service: SoapService, message: Node) -> AttackRunner:
+    document = envelope([message]).written()
+
+    def send(attack: Attack) -> Attempt:
+        apart = service.apart()
+        try:
+            deadline = min(_DEADLINE_S, service.client.connection.timeout_s)
+            return outcome(lambda: apart.post(attack.body, headers=attack.headers, fresh=True, timeout_s=deadline))
+        finally:
+            apart.client.close()
+
+    def ask() -> Exchange:
+        return service.post(document)
+
+    times = [ask().response.elapsed_ms for _ in range(5)]
+    return AttackRunner(judge, send, ask, statistics.median(times))
+
+
+@pytest.mark.requirement(_SPOOFING, *_IDS)
+def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
+    """Each attack in a message that the robot would take without it, in the Body and in Header blocks."""
+    if not soap.there:
+        # Then the class is judged over REST alone.
+        for id_ in (_SPOOFING, "xml-security/soapaction-spoofing"):
+            judge.unclaimed(id_, "the robot has no SOAP service")
+        return
+    services = callable_services(soap, _SPOOFING, *_IDS)
+    with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
+        runners: list[AttackRunner] = []
+        for service in services:
+            harmless = _harmless(service)
+            if harmless is None:
+                for id_ in _IDS:
+                    judge.skip(id_, f"the {service.name} service took none of the messages tried")
+                continue
+            # Addresses first: whoever calls them has time until the other attacks are over.
+            spoofed = list(_spoofed(service, harmless[0], callbacks))
+            others = _attacks(service, harmless, callbacks, 1 if effort.factor < _HALF else _EACH)
+            for chosen in (spoofed[: effort.cases(len(spoofed))], others):
+                runners.append(_runner(judge, service, harmless[0]))
+                for attack in chosen:
+                    runners[-1].attack(attack)
+        judge_calls(judge, callbacks, runners)
+
+
+def _attacks(
+    service: SoapService, harmless: tuple[Node, Node, str], callbacks: CallbackServer, each: int
+) -> Iterator[Attack]:
+    """By the XML of a harmless message: its parts and what is to be ignored beside them."""
+    _, marked, value = harmless
+    aside = Node(clark("urn:example:strange", "Note"), IGNORED_SLOT)
+    document = envelope([marked], (aside,)).written().decode()
+    template = Template(document, document[1:].split(" ", 1)[0], value)
+    yield from attacks(template, callbacks.url, each, service.name)
+
+
+def _spoofed(service: SoapService, message: Node, callbacks: CallbackServer) -> Iterator[Attack]:
+    action = next((item.input_action for item in service.contract.operations if item.request == message.tag), None)
+    broken = Node(clark("urn:example:strange", "no_such_operation"))
+    valid, invalid = ("a valid message", message), ("an invalid one", broken)
+    # The likeliest first: a response goes to ReplyTo, a fault to FaultTo.
+    for first, then in ((valid, invalid), (invalid, valid)):
+        for name, (what, payload) in (("ReplyTo", first), ("FaultTo", then), ("From", first)):
+            canary = f"{service.name}-{name.lower()}-{payload.name}"
+            headers = (
+                Node(clark(ADDRESSING, "Action"), action or "urn:example:action"),
+                Node(clark(ADDRESSING, "MessageID"), "urn:uuid:0b7d3c1e-6f43-4a2e-8f57-3c1d2f6f9a01"),
+                Node(clark(ADDRESSING, "To"), service.endpoint),
+                Node(clark(ADDRESSING, name), "", (Node(clark(ADDRESSING, "Address"), callbacks.url(canary)),)),
+            )
+            yield Attack(
+                "addressing-spoofing",
+                f"{name} of {what}",
+                envelope([payload], headers).written(),
+                must_refuse=False,
+                canary=canary,
+            )

@@ -1,0 +1,218 @@
+"""The implementation conformance statement: what a vendor says of a device, and what it is then judged by."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Self
+
+import msgspec
+
+from conformance.contract.interfaces import Interface
+from conformance.contract.toml_file import Positive, Text, TomlFileError, read_toml
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conformance.contract.pack import Contract
+
+
+class StatementError(TomlFileError):
+    """A statement that cannot be used; the message names the file, the key and the offending value."""
+
+
+class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where a device's interfaces are.
+
+    Attributes:
+        rest: base URL.
+        publishers_wsdl: URL or file; likewise subscribers_wsdl.
+        publishers_endpoint: where the service is, when its WSDL does not say so; likewise subscribers_endpoint.
+        ca_file: certificate authorities to trust.
+        token_file: holds the bearer token.
+        request_rate: ceiling in requests per second.
+        timeout_s: deadline of one request, s.
+    """
+
+    rest: Text | None = None
+    publishers_wsdl: Text | None = None
+    subscribers_wsdl: Text | None = None
+    publishers_endpoint: Text | None = None
+    subscribers_endpoint: Text | None = None
+    ca_file: Text | None = None
+    token_file: Text | None = None
+    request_rate: Positive | None = None
+    timeout_s: Positive = 10.0
+
+    @property
+    def publishers(self) -> bool:
+        """Whether the publishers service has an address."""
+        return bool(self.publishers_wsdl or self.publishers_endpoint)
+
+    @property
+    def subscribers(self) -> bool:
+        """Whether the subscribers service has an address."""
+        return bool(self.subscribers_wsdl or self.subscribers_endpoint)
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """The interfaces that have an address."""
+        there = {
+            Interface.REST: bool(self.rest),
+            Interface.PUBLISHERS: self.publishers,
+            Interface.SUBSCRIBERS: self.subscribers,
+        }
+        return tuple(name for name, known in there.items() if known)
+
+
+class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a load test may ask of the device.
+
+    Attributes:
+        max_rate: most requests per second.
+        max_duration_s: longest measurement, s.
+    """
+
+    max_rate: Positive | None = None
+    max_duration_s: Positive | None = None
+
+
+class Statement(msgspec.Struct, frozen=True):
+    """What a vendor says of a device. A pack whose device has more to declare extends it.
+
+    Attributes:
+        robot: name, vendor, version.
+        claims: the conformance classes that the vendor claims; None: none were named.
+    """
+
+    robot: dict[str, str] = {}
+    endpoints: Endpoints = Endpoints()
+    claims: tuple[str, ...] | None = None
+    load: Load = Load()
+
+    @property
+    def figures(self) -> dict[str, dict[str, float]]:
+        """What result.json tells of the device's figures: ``declared``, ``limits`` and ``tolerances``, by name."""
+        return {"declared": {}, "limits": {}, "tolerances": {}}
+
+    @property
+    def undeclared(self) -> dict[str, str]:
+        """Why requirements that need a figure are not tested, by the prerequisite that the statement lacks."""
+        return {}
+
+    @property
+    def domain_id(self) -> int | None:
+        """The ROS domain that a probe may join, or None."""
+        return None
+
+    def on_domain(self, domain_id: int) -> Self:
+        """Return the statement with a ROS domain.
+
+        Raises:
+            StatementError: this kind of statement has none.
+        """
+        raise StatementError(f"--ros-domain-id {domain_id}: this contract has no ROS probe")
+
+    def claimed(self, contract: Contract) -> tuple[str, ...]:
+        """Return the classes to judge: those that are claimed, else those whose interfaces all have an address.
+
+        A robot whose vendor names no classes is never judged more mildly than one whose vendor does.
+        """
+        if self.claims is not None:
+            return tuple(name for name in contract.classes if name in self.claims)
+        lacking, described = self.lacking(contract), contract.interfaces
+        judged = (item for name, item in contract.classes.items() if name not in lacking)
+        return tuple(item.name for item in judged if any(one in described for one in item.interfaces))
+
+    def lacking(self, contract: Contract) -> dict[str, tuple[Interface, ...]]:
+        """Return the classes that are not judged where none are named, with the interfaces that have no address."""
+        if self.claims is not None:
+            return {}
+        there, described = self.endpoints.interfaces, contract.interfaces
+        found = {name: item.missing(there, described) for name, item in contract.classes.items()}
+        return {name: missing for name, missing in found.items() if missing}
+
+
+class _Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    name: str | int | float | None = None
+    vendor: str | int | float | None = None
+    version: str | int | float | None = None
+
+
+class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    profile: str | None = None
+    classes: tuple[str, ...] | None = None
+
+    def named(self, contract: Contract, path: Path) -> tuple[str, ...] | None:
+        """Return the classes that are claimed in either way; None: nothing is said.
+
+        Raises:
+            StatementError: the contract has no such profile or class.
+        """
+        if self.profile is None and self.classes is None:
+            return None
+        profiles = contract.profiles
+        if self.profile is not None and self.profile not in profiles:
+            raise StatementError(f"{path}: [claims] profile = {self.profile!r} must be one of {', '.join(profiles)}")
+        for index, name in enumerate(self.classes or ()):
+            if name not in contract.classes:
+                known = ", ".join(contract.classes)
+                raise StatementError(f"{path}: [claims] classes[{index}] = {name!r} must be one of {known}")
+        return (*(profiles[self.profile] if self.profile else ()), *(self.classes or ()))
+
+
+class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The tables of a statement, as they are written. A pack adds its own by extending it."""
+
+    robot: _Robot = _Robot()
+    endpoints: Endpoints = Endpoints()
+    claims: _Claims = _Claims()
+    load: Load = Load()
+
+    def read(self, contract: Contract, path: Path) -> Statement:
+        """Return the statement that a file makes.
+
+        Raises:
+            StatementError: it claims what the contract does not have.
+        """
+        return Statement(**self.common(contract, path))
+
+    def common(self, contract: Contract, path: Path) -> dict[str, Any]:
+        """Return what every statement has, by name.
+
+        Raises:
+            StatementError: as read().
+        """
+        robot = msgspec.structs.asdict(self.robot)
+        return {
+            "robot": {key: str(value) for key, value in robot.items() if value is not None},
+            "endpoints": beside(path.parent, self.endpoints),
+            "claims": self.claims.named(contract, path),
+            "load": self.load,
+        }
+
+
+def load_statement(path: Path, contract: Contract) -> Statement:
+    """Read a statement. Files that it names (CA, token, WSDL) are looked for beside it.
+
+    Raises:
+        StatementError: it cannot be read, or has an unknown key or a value of the wrong kind.
+        ContractError: the contract's plugin cannot be imported.
+    """
+    shape: type[StatementFile] = getattr(contract.plugin, "StatementFile", StatementFile)
+    return read_toml(path, shape, StatementError).read(contract, path)
+
+
+def empty_statement(contract: Contract) -> Statement:
+    """Return the statement of a vendor who says nothing.
+
+    Raises:
+        ContractError: the contract's plugin cannot be imported.
+    """
+    found: Statement = getattr(contract.plugin, "Statement", Statement)()
+    return found
+
+
+def beside(folder: Path, where: Endpoints) -> Endpoints:
+    """Return endpoints whose files are looked for in a folder; URLs stay as they are."""
+    named = {key: getattr(where, key) for key in ("ca_file", "token_file", "publishers_wsdl", "subscribers_wsdl")}
+    files = {key: str(folder / name) for key, name in named.items() if name is not None and "://" not in name}
+    return msgspec.structs.replace(where, **files)

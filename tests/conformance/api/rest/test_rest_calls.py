@@ -1,0 +1,59 @@
+"""A read that a robot puts off for a moment is sent again, a few times in a run; nothing else is."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from conformance.api.rest import calls
+from conformance.api.rest.calls import Call
+from conformance.api.rest.interface import RestInterface
+from conformance.contract.pack import Contract
+from conformance.documents.openapi import operations_of
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.run import Run
+
+_CONTRACT = Contract.load()
+_POSE = Call(next(item for item in operations_of(_CONTRACT) if item.id == "getPose"), {})
+
+
+@pytest.fixture(name="slept")
+def _slept(monkeypatch):
+    slept = []
+    monkeypatch.setattr(calls, "time", SimpleNamespace(sleep=slept.append))
+    return slept
+
+
+def _robot(*answers):
+    """A robot that gives these answers, the last one again and again."""
+    left = list(answers)
+
+    def send(method, path, **_):
+        status, after = left.pop(0) if len(left) > 1 else left[0]
+        fields = () if after is None else (("Retry-After", after),)
+        return Exchange(Request(method, path), Response(status, fields, b"", 1.0))
+
+    return RestInterface(Run(contract=_CONTRACT), SimpleNamespace(send=send))
+
+
+def test_a_robot_without_odometry_for_a_moment_is_asked_again(slept):
+    assert _POSE.send(_robot((503, "1"), (200, None))).response.status == 200
+    assert slept == [1]
+
+
+@pytest.mark.parametrize(
+    "answer", [(503, None), (503, "3600"), (503, "Fri, 20 Nov 2026 23:00:00 GMT"), (429, "1"), (500, "1")]
+)
+def test_what_is_not_put_off_for_a_moment_is_taken_as_it_is(slept, answer):
+    assert _POSE.send(_robot(answer, (200, None))).response.status == answer[0]
+    assert not slept
+
+
+def test_what_writes_is_never_sent_again(slept):
+    assert _POSE.send(_robot((503, "1"), (200, None)), method="PUT").response.status == 503
+    assert not slept
+
+
+def test_a_robot_that_is_always_about_to_have_odometry_is_waited_for_a_few_times(slept):
+    robot = _robot((503, "1"))
+    assert {_POSE.send(robot).response.status for _ in range(20)} == {503}
+    assert len(slept) == 5

@@ -1,0 +1,134 @@
+"""What the suite makes of answers of a live service: what is steady, what agrees, what may be sent."""
+
+from dataclasses import replace
+
+import pytest
+from lending_library import CONTRACT, Library, open_library
+
+from conformance.api.rest.applicable import answered, applicable_operations, readable, reads
+from conformance.api.rest.calls import example_call
+from conformance.api.rest.effects import reader_of, settles_at
+from conformance.api.rest.formats import disagreements
+from conformance.api.rest.generated import GeneratedRequest, targets
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.motion_guard import MotionGuard
+from conformance.api.rest.snapshot import changed, changes_by_itself, flatten, steady, take_snapshots
+from conformance.api.rest.statuses import is_refusal
+from conformance.contract.pack import Contract
+from conformance.documents.openapi import operations_of
+from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.statement.statement import Endpoints, Statement
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.run import Run
+
+
+@pytest.fixture
+def library():
+    return Library()
+
+
+@pytest.fixture
+def api(library):
+    rest, _, close = open_library(library)
+    robot = RobotUnderTest(Run(Statement(endpoints=Endpoints(rest=rest)), Contract.load(CONTRACT), ("http",)))
+    robot.connect()
+    yield robot.rest
+    close()
+
+
+def _operation(api, id_):
+    return next(item for item in operations_of(api.run.contract) if item.id == id_)
+
+
+def test_requests_are_made_from_examples(api):
+    put = example_call(api, _operation(api, "putBook"))
+    assert put.path == "/books/9780141439600"
+    assert put.send(api).response.status == 204
+    assert example_call(api, _operation(api, "listBooks")).path == "/books/?limit=10"
+    assert put.having("isbn", "a/b %").path == "/books/a%2Fb%20%25"
+
+
+def test_reads_and_what_is_answered(api, library):
+    assert [call.operation.id for call in reads(api)] == ["listBooks", "getBook", "getHours"]
+    library.books.clear()
+    assert [call.operation.id for call in answered(api)] == ["listBooks", "getHours"]
+    assert readable(api, _operation(api, "listBooks")).send(api).response.status == 200
+
+
+def test_what_was_put_is_got(api, library):
+    call = example_call(api, _operation(api, "putBook"))
+    assert reader_of(api, call).path == call.path
+    assert settles_at(api, call).startswith("title is 'Emma'")
+    call.send(api)
+    assert settles_at(api, call) == ""
+    library.books.clear()
+    assert settles_at(api, call) is None
+
+
+def test_formats_disagree_only_where_they_do(api, library):
+    call = readable(api, _operation(api, "getBook"))
+    library.books[9780141439600] = {"title": "Emma", "year": 1, "price": 0.1 + 0.2, "shelf": {"room": "A", "row": 3}}
+    assert disagreements(api, call, ["application/xml", "text/plain"])[0] == []
+    library.fault = "xml-rounds"
+    (found,) = disagreements(api, call, ["application/xml", "text/plain"])[0]
+    assert (found.place, found.description) == (
+        "price",
+        "price is 0.0 in application/xml and 0.30000000000000004 in JSON",
+    )
+
+
+def test_what_changes_is_told_from_what_is_steady(api, library):
+    call = readable(api, _operation(api, "getBook"))
+    before = take_snapshots(api, [call])["getBook"][0]
+    assert before["price"] == 7.25
+    library.books[9780141439600] = dict(library.books[9780141439600], price=8.0)
+    assert changed(before, flatten(call.send(api))) == {"price": (7.25, 8.0)}
+    assert not changes_by_itself(api, call, "price", 0.05)
+    assert steady([{"a": 1, "b": 2}, {"a": 1, "b": 3}]) == {"a": 1}
+
+
+def test_a_slow_robot_is_asked_less(api):
+    assert api.run.effort.subsample(range(10), 3) == list(range(10))
+    api.run.effort = api.run.effort.seen(usual_ms=300)
+    assert api.run.effort.subsample(range(10), 3) == [0, 3, 6]
+    assert len(api.run.effort.draw(range(100), 50, "0/name")) == 3
+    assert api.run.effort.draw(range(100), 50, "0/name") == api.run.effort.draw(range(100), 50, "0/name")
+
+
+def test_what_moves_needs_permission(api):
+    ids = ["http/delete-idempotent"]
+    assert applicable_operations(api, ids, lambda item: item.method == "DELETE", "deletes") == []
+    assert "allow-motion" in api.run.judge.evidence["http/delete-idempotent"].skips[0]
+    assert applicable_operations(api, ["http/safe"], lambda item: item.method == "PATCH", "patches") == []
+    assert "no operation that patches" in api.run.judge.evidence["http/safe"].unclaimed
+    wanted = GeneratedRequest("DELETE", "/books/5", "", b"")
+    assert MotionGuard(api).admit(wanted) is None
+    assert MotionGuard(replace(api, run=replace(api.run, allow_motion=True))).admit(wanted) == wanted
+
+
+def test_schemathesis_makes_the_same_requests_again(api):
+    made = [[*target.examples(), *target.coverage()] for target in targets(api.run.contract)]
+    again = [[*target.examples(), *target.coverage()] for target in targets(api.run.contract)]
+    assert sum(map(len, made)) > 100
+    assert [item.body for group in made for item in group] == [item.body for group in again for item in group]
+    assert {item.method for group in made for item in group} > {"GET", "PUT", "DELETE"}
+
+
+@pytest.mark.parametrize(
+    ("status", "expected"), [(400, True), (422, True), (404, True), (204, False), (500, False), (401, False)]
+)
+def test_refusals(status, expected):
+    assert is_refusal(Exchange(Request("PUT", "http://robot/"), Response(status, (), b"", 1.0))) is expected
+
+
+def test_what_a_robot_might_take_of_random_requests_is_slow_or_not_sent():
+    guard = MotionGuard(RestInterface(Run(allow_motion=True), HttpClient("http://127.0.0.1:1", Connection())))
+    wild = GeneratedRequest(
+        "PUT", "/robot/velocity/", "application/json", b'{"linear": {"x": 900.5, "y": -7, "z": true}}'
+    )
+    assert guard.admit(wild).body == b'{"linear": {"x": 0.1, "y": 1, "z": true}}'
+    vector = b"<Vector3><x>0.6</x><y>0</y><z>0</z></Vector3>"
+    assert guard.admit(GeneratedRequest("PUT", "/robot/velocity/linear/", "application/xml", vector)) is None
+    assert guard.admit(GeneratedRequest("PUT", "/robot/velocity/", "text/plain", wild.body)) is None
+    assert guard.admit(GeneratedRequest("GET", "/robot/pose/", "", b"")) is not None

@@ -1,0 +1,70 @@
+import pytest
+
+from conformance.api.rest.calls import example_call
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.validity import validity
+from conformance.contract.pack import Contract
+from conformance.documents.openapi import operations_of
+from conformance.transport.client import Connection, HttpClient
+from conformance.verdict.evidence import HarnessError
+from conformance.verdict.run import Run
+
+CONTRACT = Contract.load()
+TWIST = b'{"linear": {"x": 0.1, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0}}'
+PLAN = "/robot/navigation/service/plan"
+DELIVERY = "/robot/app/delivery/{}/depot_x/{}/depot_y/1/dest_x/1/dest_y/1/source_x/1/source_y/1"
+
+
+@pytest.mark.parametrize(
+    ("method", "target", "media_type", "body", "verdict", "requirement"),
+    [
+        ("GET", "/robot/pose/", "", b"", "valid", ""),
+        ("GET", "/robot/pose/", "", b"x", "unclear", ""),
+        ("GET", "/robot/pose/?a=1", "", b"", "unclear", ""),
+        ("GET", "/no/such", "", b"", "unclear", ""),
+        ("PUT", "/robot/velocity/", "application/json", TWIST, "valid", ""),
+        ("PUT", "/robot/velocity/", "text/plain", TWIST, "unclear", ""),
+        ("PUT", "/robot/velocity/", "application/json", b"", "invalid", "json-empty"),
+        ("PUT", "/robot/velocity/", "application/json", b"[]", "invalid", "json-root"),
+        ("PUT", "/robot/velocity/", "application/json", b"{}", "invalid", "json-missing"),
+        ("PUT", "/robot/velocity/", "application/json", TWIST[:-1] + b', "w": 1}', "invalid", "json-unknown"),
+        ("PUT", "/robot/velocity/", "application/json", TWIST.replace(b"0.1", b'"0.1"'), "invalid", "json-type"),
+        ("PUT", "/robot/velocity/", "application/json", TWIST.replace(b"0.1", b"NaN"), "invalid", "json-non-finite"),
+        ("PUT", "/robot/velocity/", "application/json", TWIST[:-1], "invalid", "json-malformed"),
+        ("PUT", "/robot/velocity/", "application/xml", b"<Vector3/>", "invalid", "xml-body"),
+        ("PUT", "/robot/velocity/", "application/xml", b"<Twist><linear/></Twist>", "invalid", "xml-body"),
+        ("GET", f"{PLAN}?x=1&y=-2.5e1", "", b"", "valid", ""),
+        ("GET", f"{PLAN}?x=1", "", b"", "invalid", "query-missing"),
+        ("GET", f"{PLAN}?x=&y=1", "", b"", "invalid", "query-parameter"),
+        ("GET", f"{PLAN}?x=NaN&y=1", "", b"", "invalid", "query-parameter"),
+        ("GET", f"{PLAN}?x=1e400&y=1", "", b"", "invalid", "query-parameter"),
+        ("GET", f"{PLAN}?x=1.&y=1", "", b"", "unclear", ""),
+        ("GET", f"{PLAN}?x=1&x=2&y=1", "", b"", "unclear", ""),
+        ("GET", f"{PLAN}?x=1&y=1&tolerance=-1", "", b"", "invalid", "query-parameter"),
+        ("PUT", DELIVERY.format(3, "1e3"), "", b"", "valid", ""),
+        ("PUT", DELIVERY.format(5, "1"), "", b"", "invalid", "path-parameter"),
+        ("PUT", DELIVERY.format(3, "1%2C5"), "", b"", "unclear", ""),
+        ("PUT", DELIVERY.format(3, "one"), "", b"", "invalid", "path-parameter"),
+        ("PUT", DELIVERY.format(3, ""), "", b"", "unclear", ""),
+        ("PUT", DELIVERY.format(3, "%2E."), "", b"", "unclear", ""),
+    ],
+)
+def test_requests_are_judged_by_what_they_are_on_the_wire(method, target, media_type, body, verdict, requirement):
+    found = validity(CONTRACT, method, target, media_type, body)
+    assert (found.verdict, found.requirement) == (verdict, requirement)
+
+
+class _Careless:
+    """A domain that fits a value to a robot by breaking it."""
+
+    def fit(self, _id, value):
+        return {**value, "w": 1} if "linear" in value else value
+
+
+def test_a_mistake_of_a_generator_is_the_suite_s():
+    api = RestInterface(Run(), HttpClient("http://r2", Connection()))
+    (operation,) = (item for item in operations_of(CONTRACT) if item.id == "putVelocity")
+    assert example_call(api, operation).body
+    api.domain = _Careless()
+    with pytest.raises(HarnessError, match="was made as a valid request, and is none"):
+        example_call(api, operation)

@@ -1,0 +1,143 @@
+"""Messages made from a schema: valid to both validators, or invalid to both, and the same however they are written."""
+
+from decimal import Decimal
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lxml import etree
+
+from conformance.api.soap.envelope import envelope, read
+from conformance.api.soap.forms import written_float, written_integer
+from conformance.api.soap.messages import ordinary, simple_leaves, variants, with_text
+from conformance.api.soap.mutations import invalid_ones, mutations
+from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
+from conformance.documents.wsdl import read_file
+from conformance.documents.xml import parse
+from conformance.documents.xml_names import clark
+from conformance.documents.xsd import SchemaDocument, Types
+from conformance.documents.xsd_lexical import plain, unreadable
+from conformance.packs.table1.files import CONTRACT_DIR
+
+XSD = b"""<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:t="urn:t" targetNamespace="urn:t"
+                     elementFormDefault="qualified">
+  <xs:element name="Order"><xs:complexType><xs:sequence>
+    <xs:element name="size"><xs:simpleType><xs:restriction base="xs:string">
+      <xs:enumeration value="small"/><xs:enumeration value="large"/></xs:restriction></xs:simpleType></xs:element>
+    <xs:element name="hot" type="xs:boolean"/>
+    <xs:element name="cups"><xs:simpleType><xs:restriction base="xs:short">
+      <xs:minInclusive value="1"/><xs:maxInclusive value="12"/></xs:restriction></xs:simpleType></xs:element>
+    <xs:element name="price" type="xs:decimal" minOccurs="0"/>
+    <xs:element name="weight" type="xs:float" nillable="true"/>
+    <xs:element name="note" minOccurs="0"><xs:simpleType><xs:restriction base="xs:string">
+      <xs:maxLength value="8"/></xs:restriction></xs:simpleType></xs:element>
+    <xs:element name="serial" type="xs:unsignedInt" form="unqualified"/>
+    <xs:choice><xs:element name="milk" type="t:Milk"/><xs:element name="black" type="xs:string"/></xs:choice>
+  </xs:sequence><xs:attribute name="id" type="xs:int" use="required"/></xs:complexType></xs:element>
+  <xs:complexType name="Milk"><xs:simpleContent><xs:extension base="xs:double"/></xs:simpleContent></xs:complexType>
+</xs:schema>"""
+TYPES = Types([SchemaDocument("order.xsd", etree.fromstring(XSD))])
+ORDER = TYPES.shape(clark("urn:t", "Order"))
+DELIVERY = read_file(CONTRACT_DIR / "publishers.wsdl")
+REQUEST = DELIVERY.shape(clark("http://soap.turtlebot.mybot.org/", "ExecuteDeliveryRequest"))
+
+
+def test_an_ordinary_message_is_valid():
+    for optional in (False, True):
+        assert TYPES.valid(parse(ordinary(ORDER, optional=optional).written()))
+    assert [child.name for child in ordinary(ORDER).children] == ["size", "hot", "cups", "weight", "serial", "milk"]
+
+
+@settings(max_examples=300, database=None, deadline=None)
+@given(variants(ORDER, ordinary(ORDER, optional=True)))
+def test_all_variants_are_valid(message):
+    element = parse(message.written())
+    assert (TYPES.libxml_problem(element), TYPES.python_problem(element)) == ("", "")
+
+
+@settings(max_examples=300, database=None, deadline=None)
+@given(variants(REQUEST, ordinary(REQUEST)))
+def test_variants_of_the_contract_are_valid_and_finite(message):
+    assert DELIVERY.types.valid(parse(message.written()))
+    assert all(abs(float(leaf.text)) < float("inf") for leaf in message.children[0].children)
+
+
+def test_mutations_are_of_every_kind_and_invalid_to_both():
+    found = list(invalid_ones(mutations(ORDER, ordinary(ORDER, optional=True)), TYPES))
+    kinds = {mutant.kind for mutant in found}
+    assert kinds == {
+        "missing",
+        "unknown",
+        "duplicate",
+        "order",
+        "namespace",
+        "lexical",
+        "range",
+        "nil",
+        "non-finite",
+        "body",
+    }
+    for mutant in found:
+        if mutant.kind not in {"body", "non-finite"}:
+            element = parse(mutant.payload[0].written())
+            assert TYPES.libxml_problem(element), mutant.what
+            assert TYPES.python_problem(element), mutant.what
+    # A nillable element that is nil is no mutation, nor is an optional one that is left out.
+    assert not any("weight is xsi:nil" in mutant.what or "note dropped" in mutant.what for mutant in found)
+
+
+def test_a_text_that_one_validator_takes_is_no_mutation():
+    leaf = next(path for path, simple in simple_leaves(REQUEST, ordinary(REQUEST)) if simple.builtin == "double")
+    element = parse(with_text(ordinary(REQUEST), leaf, "1e").written())
+    # libxml2 reads an empty exponent, against XML Schema 1.0 Part 2, 3.2.5.1.
+    assert DELIVERY.types.python_problem(element)
+    assert not DELIVERY.types.invalid(element)
+
+
+@settings(database=None, deadline=None)
+@given(st.floats(allow_nan=False, allow_infinity=False), st.integers(0, 7))
+def test_every_form_of_a_float_is_exactly_it(value, form):
+    assert float(written_float(value, form)) == value
+    assert Decimal(written_float(value, form)) == Decimal(repr(value))
+
+
+@settings(database=None, deadline=None)
+@given(st.integers(-(2**31), 2**31), st.integers(0, 7))
+def test_every_form_of_an_integer_is_exactly_it(value, form):
+    assert int(written_integer(value, form)) == value
+
+
+def canonical(document: str) -> bytes:
+    root = parse(document.encode())
+    body = read(document.encode()).body
+    for element in root.iter():
+        element.attrib.clear()
+    texts = [
+        (str(element.tag), "".join(element.itertext()).strip())
+        for element in body.iter()
+        if isinstance(element.tag, str)
+    ]
+    return repr(texts).replace("\\n", "").replace("  ", "").encode()
+
+
+def says_the_same(style: XmlStyle) -> bool:
+    message = envelope([ordinary(REQUEST)])
+    written = serialize(message, style)
+    same = canonical(written) == canonical(serialize(message, XmlStyle()))
+    return same and DELIVERY.types.valid(read(written.encode()).first)
+
+
+@pytest.mark.parametrize("style", [style for _, style in single_changes()], ids=[name for name, _ in single_changes()])
+def test_single_changes_of_style_say_the_same(style):
+    assert says_the_same(style)
+
+
+@settings(max_examples=200, database=None, deadline=None)
+@given(xml_styles())
+def test_any_style_says_the_same(style):
+    assert says_the_same(style)
+
+
+def test_every_simple_type_has_an_ordinary_value():
+    for path, simple in simple_leaves(ORDER, ordinary(ORDER, optional=True)):
+        assert plain(simple) not in unreadable(simple), path

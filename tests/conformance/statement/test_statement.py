@@ -1,0 +1,171 @@
+"""A statement is read as it stands, and refused with the offending value."""
+
+import re
+
+import pytest
+
+from conformance.contract.classes import CLASSES
+from conformance.contract.interfaces import Interface
+from conformance.packs.table1.limits import Noise
+from conformance.packs.table1.robot.robot import STILL, Velocity, is_near
+from conformance.packs.table1.thresholds import ApiStyle, Operation, Quantile, Threshold
+from conformance.statement.statement import Endpoints, Statement, StatementError, load_statement
+
+
+def _load(tmp_path, text):
+    path = tmp_path / "robot.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_statement(path)
+
+
+def test_a_full_statement(tmp_path):
+    statement = _load(
+        tmp_path,
+        """
+        [robot]
+        name = "R2"
+        [endpoints]
+        rest = "http://r2:7003/api"
+        publishers_wsdl = "r2.wsdl"
+        ca_file = "ca.pem"
+        request_rate = 20
+        [claims]
+        profile = "paper"
+        classes = ["safety"]
+        [limits]
+        linear_m_s = 1
+        hold_s = 0.5
+        [motion]
+        arena = [0, 0, 10, 5]
+        goals = [[1, 2, 0]]
+        [ros]
+        domain_id = 7
+        [load]
+        max_rate = 100
+        [[load.thresholds]]
+        operation = "pose"
+        interface = "rest"
+        quantile = "p99"
+        below_ms = 5
+        """,
+    )
+    assert statement.robot == {"name": "R2"}
+    assert statement.endpoints.publishers_wsdl == str(tmp_path / "r2.wsdl")
+    assert statement.endpoints.ca_file == str(tmp_path / "ca.pem")
+    assert statement.claimed() == ("rest-resources", "rest-delivery", "soap-delivery", "safety")
+    assert (statement.limits.linear_m_s, statement.limits.hold_s, statement.limits.settle_s) == (1.0, 0.5, 2.0)
+    assert statement.motion.arena == (0.0, 0.0, 10.0, 5.0)
+    assert statement.ros.domain_id == 7
+    assert statement.load.max_rate == 100
+    assert statement.load.thresholds == (Threshold(Operation.POSE, ApiStyle.REST, Quantile.P99, 5.0),)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[robto]\nname = 'x'", "unknown key 'robto'; known are claims, endpoints, limits, load, motion, robot, ros"),
+        ("[limts]\nhold_s = 1", "unknown key 'limts'"),
+        ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are ca_file, publishers_endpoint,"),
+        ("[endpoints]\nrest = 7003", "[endpoints] rest = 7003 must be a string"),
+        ("[endpoints]\ntimeout_s = -1", "[endpoints] timeout_s = -1 must be a positive number"),
+        ("[claims]\nprofile = 'half'", "[claims] profile = 'half' must be one of paper, full"),
+        ("[claims]\nclasses = ['rest']", "[claims] classes[0] = 'rest' must be one of rest-resources, rest-delivery,"),
+        ("[claims]\nclasses = 'http'", "[claims] classes = 'http' must be a list, each item one of rest-resources,"),
+        ("[limits]\nlinear_m_s = 'fast'", "[limits] linear_m_s = 'fast' must be a number, and not negative"),
+        ("[limits]\nlinear_m_s = true", "[limits] linear_m_s = True must be a number, and not negative"),
+        ("[limits]\nsettle_s = nan", "[limits] settle_s = nan must be a number from 0 to 5"),
+        ("[limits]\nsettle_s = inf", "[limits] settle_s = inf must be a number from 0 to 5"),
+        ("[limits]\nodometry_hz = 0", "[limits] odometry_hz = 0 must be a positive number"),
+        ("[limits.noise]\nposition_m = 0.06", "position_m = 0.06 must be"),
+        ("[limits.noise]\nangular_rad_s = 0.2", "angular_rad_s = 0.2 must be"),
+        ("[motion]\narena = [1, 2]", "[motion] arena = [1, 2] must be 4 numbers"),
+        ("[motion]\ngoals = [[1, 2, 'x']]", "[motion] goals[0][2] = 'x' must be a finite number"),
+        ("[motion]\nactuated = ['linear.w']", "[motion] actuated[0] = 'linear.w' must be one of angular.x, angular.y,"),
+        ("[ros]\ndomain_id = 500", "[ros] domain_id = 500 must be a whole number from 0 to 232"),
+        ("[load]\nmax_rates = 3", "[load] unknown key 'max_rates'; known are max_duration_s, max_rate, thresholds"),
+        ("[load]\nmax_rate = 'fast'", "[load] max_rate = 'fast' must be a positive number"),
+        (
+            "[[load.thresholds]]\noperation = 'pose'",
+            "[[load.thresholds]] number 1: 'interface', 'quantile', 'below_ms' is missing",
+        ),
+        ("[load.thresholds]", "[load] thresholds = {} must be an array of tables: write [[load.thresholds]]"),
+        ("claims = 'full'", "claims = 'full' must be a table: [claims]"),
+        ("[[", "is no TOML"),
+    ],
+)
+def test_a_wrong_statement_is_refused_by_name(tmp_path, text, message):
+    with pytest.raises(StatementError) as error:
+        _load(tmp_path, text)
+    assert f"{tmp_path / 'robot.toml'}" in str(error.value)
+    assert message in str(error.value)
+
+
+def test_a_statement_that_is_not_there(tmp_path):
+    with pytest.raises(StatementError, match=r"robot\.toml cannot be read: No such file"):
+        load_statement(tmp_path / "robot.toml")
+
+
+def test_a_figure_is_declared_when_the_statement_names_it_whatever_its_value(tmp_path):
+    silent = Statement().limits
+    assert (silent.linear_declared, silent.angular_declared) == (False, False)
+    assert silent.hold_s is None
+    same = _load(tmp_path, f"[limits]\nlinear_m_s = {silent.linear_m_s}").limits
+    assert same.linear_m_s == silent.linear_m_s
+    assert (same.linear_declared, same.angular_declared) == (True, False)
+
+
+def test_noise_rate_and_clock_are_declared_among_the_limits(tmp_path):
+    text = "[limits]\nodometry_hz = 10\ntime_scale = 2\n[limits.noise]\nposition_m = 0.01\nlinear_m_s = 0.02"
+    limits = _load(tmp_path, text).limits
+    assert (limits.odometry_hz, limits.time_scale) == (10, 2)
+    assert limits.noise == Noise(position_m=0.01, linear_m_s=0.02)
+    assert limits.tolerances == {
+        "tolerance": 0.05,
+        "tolerance_abs": 0.02,
+        "tolerance_linear_m_s": 0.02,
+        "tolerance_angular_rad_s": 0.02,
+        "noise_position_m": 0.01,
+        "noise_linear_m_s": 0.02,
+    }
+    assert Statement().limits.odometry_hz is None
+
+
+def test_absolute_tolerances_are_declared_apart_or_by_one_figure(tmp_path):
+    both = _load(tmp_path, "[limits]\ntolerance_abs = 0.1").limits
+    assert (both.tolerance_linear_m_s, both.tolerance_angular_rad_s) == (0.1, 0.1)
+    apart = _load(tmp_path, "[limits]\ntolerance_abs = 0.05\ntolerance_angular_rad_s = 0.2").limits
+    assert (apart.tolerance_linear_m_s, apart.tolerance_angular_rad_s) == (0.05, 0.2)
+    assert is_near(apart, Velocity(0.04, angular_z=0.19), STILL)
+    assert not is_near(apart, Velocity(0.06), STILL)
+    assert not is_near(apart, Velocity(angular_z=0.21), STILL)
+
+
+def test_without_claims_the_classes_follow_from_the_addresses():
+    only_rest = Statement(endpoints=Endpoints(rest="http://r2"))
+    # What judges several interfaces is not judged by one of them: that would be milder than to claim it.
+    assert only_rest.claimed() == ("rest-resources", "rest-delivery", "rest-formats", "http", "safety")
+    assert only_rest.lacking()["strict-input"] == ("publishers", "subscribers")
+    assert "strict-input" in only_rest.claimed([Interface.REST])
+    assert "soap-delivery" not in only_rest.claimed([Interface.REST])
+    both = Endpoints(rest="http://r2", publishers_wsdl="x", subscribers_wsdl="y")
+    assert Statement(endpoints=both).claimed() == CLASSES
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("settle_s = 5.1", "settle_s = 5.1 must be a number from 0 to 5"),
+        ("hold_s = 0.1", "hold_s = 0.1 must be a number from 0.2 to 10"),
+        ("hold_s = 11", "hold_s = 11 must be a number from 0.2 to 10"),
+        ("tolerance = 1000", "tolerance = 1000 must be a number from 0 to 0.25"),
+        ("tolerance_abs = 0.11", "tolerance_abs = 0.11 must be a number from 0 to 0.1"),
+        ("tolerance_linear_m_s = 0.11", "tolerance_linear_m_s = 0.11 must be a number from 0 to 0.1"),
+        ("tolerance_angular_rad_s = 0.21", "tolerance_angular_rad_s = 0.21 must be a number from 0 to 0.2"),
+        ("noise.position_m = 0.06", "position_m = 0.06 must be a number from 0 to 0.05"),
+    ],
+)
+def test_a_statement_declares_within_the_contract_s_bounds(tmp_path, line, told):
+    path = tmp_path / "robot.toml"
+    path.write_text(f"[limits]\n{line}\n", encoding="utf-8")
+    with pytest.raises(StatementError, match=re.escape(told)):
+        load_statement(path)

@@ -1,0 +1,140 @@
+"""A robot of numbers and a clock of ours, for tests of what is judged of a drive, also by one who is held up."""
+
+from types import SimpleNamespace
+from typing import Any, Final
+
+from conformance.packs.table1.limits import DeclaredLimits
+from conformance.packs.table1.robot import drive
+from conformance.packs.table1.robot.drive_trace import Command, Turn
+from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
+from conformance.transport.exchange import Exchange, Request, Response
+
+WANTED: Final = Velocity(linear_x=0.5)
+SETTLE_S: Final = 1.2
+SAMPLE_S: Final = 0.2
+_LOOK_S = 0.02
+_EXCHANGE = Exchange(Request("GET", "http://robot/"), Response(200, (), b"", 1.0))
+
+
+class Clock:
+    """Stands for the module time."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+class Body:
+    """Reaches what it is told so long after it was told, and stops where it is not told again within its hold time.
+
+    It has an odometry five times a second. What it is told again does not ``renew`` it in one that is faulty, what it
+    refuses ``stops`` another one, and another one ``loses`` the first that it is told.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        takes_s: float,
+        hold_s: float,
+        *,
+        renews: bool = True,
+        stops: bool = False,
+        loses: bool = False,
+    ) -> None:
+        self.clock, self.takes_s, self.hold_s = clock, takes_s, hold_s
+        self.renews, self.stops, self.loses = renews, stops, loses
+        self.told: list[float] = []
+
+    def tell(self) -> None:
+        """Take up the velocity, or go on with it."""
+        if self.loses:
+            self.loses = False
+            return
+        if self.told and self.clock.now > self.told[-1] + self.hold_s:
+            self.told = []
+        if self.renews or not self.told:
+            self.told.append(self.clock.now)
+
+    def refuse(self, *_: object) -> None:
+        """Take no velocity."""
+        if self.stops:
+            self.told = []
+
+    @property
+    def sampled(self) -> float:
+        """When the newest odometry was taken."""
+        return self.clock.now // SAMPLE_S * SAMPLE_S
+
+    @property
+    def velocity(self) -> Velocity:
+        """What that one says."""
+        moves = bool(self.told) and self.told[0] + self.takes_s <= self.sampled <= self.told[-1] + self.hold_s
+        return WANTED if moves else STILL
+
+
+class Judge:
+    """Takes down what is judged, by requirement."""
+
+    def __init__(self) -> None:
+        self.judged: dict[str, bool] = {}
+        self.skipped: list[str] = []
+
+    def check(self, requirement: str, holds: bool, *_: object, **__: object) -> bool:  # noqa: FBT001 - as of a judge
+        self.judged[requirement] = self.judged.get(requirement, True) and holds
+        return holds
+
+    def skip(self, requirement: str, _reason: str) -> None:
+        self.skipped.append(requirement)
+
+
+class Drive(drive.Drive):
+    """Looks for as long as it is told to, which may be longer than anybody wants."""
+
+    def __init__(self, body: Body, looks: dict[int, float], hold_s: float, usual_s: float = 0.001) -> None:
+        declared = {"settle_s": SETTLE_S, "hold_s": hold_s, "tolerance_abs": 0.02}
+        limits = DeclaredLimits(**declared).resolved()
+        self.judge = Judge()
+        given: dict[str, Any] = {"limits": limits, "judge": self.judge, "settle_s": 1.25 * SETTLE_S + 0.25}
+        given |= {"sample_s": SAMPLE_S, "usual_s": usual_s, "put_velocity": body.refuse, "put_linear": body.refuse}
+        super().__init__(SimpleNamespace(**given))
+        self.body, self.looks = body, looks
+
+    def command(self, velocity: Velocity, *, integers: bool = False) -> bool:  # noqa: ARG002 - as of a drive
+        """Command the one velocity, or rest."""
+        self.tell(velocity)
+        return True
+
+    def tell(self, velocity: Velocity = WANTED, *, renewal: bool = False) -> None:
+        """The same, without an answer."""
+        sent = self.body.clock.now
+        if velocity == STILL:
+            self.body.told = []
+        else:
+            self.body.tell()
+        self.body.clock.now += self.robot.usual_s
+        self.trace = self.trace.commanded(Command(velocity, sent, self.body.clock.now, _EXCHANGE, renewal=renewal))
+
+    def _renew(self) -> None:
+        self.tell(renewal=True)
+
+    def _glance(self) -> None:
+        clock = self.body.clock
+        at = clock.now
+        clock.now += max(_LOOK_S, self.robot.usual_s)
+        # No stamp tells whether it is another sample than the one before.
+        self.trace = self.trace.looked(Turn(None, at, self.body.velocity, _EXCHANGE, None, _EXCHANGE))
+
+    def look(self) -> tuple[Velocity | None, Exchange]:
+        """Take a sample, after a while."""
+        clock = self.body.clock
+        clock.now += self.looks.get(len(self.trace.turns), max(_LOOK_S, self.look_s))
+        seen = self.body.velocity
+        odometry = Odometry(clock.now, clock.now, self.body.sampled, Pose(0.0, 0.0, 0.0), seen, _EXCHANGE)
+        self.trace = self.trace.looked(Turn(odometry, clock.now, seen, _EXCHANGE, None, _EXCHANGE))
+        return seen, _EXCHANGE

@@ -1,0 +1,48 @@
+import math
+
+import pytest
+
+from conformance.packs.table1.robot.agreement import Slack, disagreement, unstamped
+
+_SLACK = Slack(0.02, 0.05)
+
+
+def _pose(x, sec=1):
+    return {"header": {"stamp": {"sec": sec, "nanosec": 2}}, "pose": {"x": x, "covariance": [x, 0.0]}}
+
+
+def test_what_did_not_change_is_the_same_double():
+    assert disagreement(_pose(1.1), _pose(1.1), _pose(1.1), _SLACK) == ""
+    found = disagreement(_pose(1.1), _pose(math.nextafter(1.1, 2)), _pose(1.1), _SLACK)
+    assert found == "pose.x is 1.1000000000000003 for 1.1"
+
+
+@pytest.mark.parametrize(("between", "agrees"), [(1.0, True), (1.3, True), (0.93, True), (0.9, False), (1.4, False)])
+def test_what_changed_lies_between_its_neighbours_or_nearly(between, agrees):
+    assert (disagreement(_pose(1.0), _pose(between), _pose(1.3), _SLACK) == "") is agrees
+
+
+def test_what_is_missing_or_of_another_length_is_named():
+    pose = _pose(1.0)
+    assert disagreement(pose, {"header": pose["header"]}, pose, _SLACK) == "pose is missing"
+    shorter = {**pose, "pose": {"x": 1.0, "covariance": [1.0]}}
+    assert disagreement(pose, shorter, pose, _SLACK) == "pose.covariance has 1 items for 2"
+
+
+def test_a_stamp_counts_only_while_it_stands_still():
+    assert disagreement(_pose(1.0), _pose(1.0, sec=2), _pose(1.0), _SLACK) == "header.stamp.sec is 2 for 1.0"
+    assert disagreement(_pose(1.0), _pose(1.0, sec=2), _pose(1.0, sec=3), _SLACK) == ""
+
+
+def test_what_is_made_anew_is_compared_without_its_stamps():
+    poses = {"poses": [_pose(1.0), _pose(2.0)]}
+    assert unstamped(poses) == unstamped({"poses": [_pose(1.0, sec=5), _pose(2.0, sec=6)]})
+    assert unstamped(poses)["poses"][1] == {"header": {}, "pose": {"x": 2.0, "covariance": [2.0, 0.0]}}
+
+
+def test_a_quaternion_and_its_negative_are_one_orientation():
+    one = {"orientation": {"x": 0.0, "y": 0.0, "z": 0.6, "w": 0.8}}
+    other = {"orientation": {"x": -0.0, "y": -0.0, "z": -0.6, "w": -0.8}}
+    wrong = {"orientation": {"x": 0.0, "y": 0.0, "z": -0.6, "w": 0.8}}
+    assert disagreement(one, other, one, Slack()) == disagreement(other, one, one, Slack()) == ""
+    assert disagreement(one, wrong, one, Slack())

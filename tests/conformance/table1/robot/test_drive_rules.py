@@ -1,0 +1,162 @@
+"""What is said of drives that nobody drove: traces made by hand, and no robot."""
+
+import json
+
+import pytest
+
+from conformance.packs.table1.limits import DeclaredLimits
+from conformance.packs.table1.robot.drive_rules import agreement, answer_of, arrival, speed
+from conformance.packs.table1.robot.drive_trace import Command, Trace, Turn
+from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
+from conformance.transport.exchange import Exchange, Request, Response
+
+_AHEAD = Velocity(linear_x=0.3, angular_z=0.5)
+_LIMITS = DeclaredLimits(settle_s=1.0, tolerance=0.05, tolerance_abs=0.02).resolved()
+
+
+def exchange(status: int = 200, value: object = None) -> Exchange:
+    body = b"" if value is None else json.dumps(value).encode()
+    return Exchange(Request("PUT", "http://robot/"), Response(status, (), body, 1.0))
+
+
+def command(velocity: Velocity = _AHEAD, at: float = 0.0, **how) -> Command:
+    return Command(velocity, at, at + 0.01, how.pop("exchange", exchange(204)), **how)
+
+
+def turn(at: float, odometry: Velocity | None, velocity: Velocity | None, linear: Velocity | None) -> Turn:
+    read = None if odometry is None else Odometry(at, at + 0.001, at, Pose(0.0, 0.0, 0.0), odometry, exchange())
+    return Turn(read, at + 0.002, velocity, exchange(), linear, exchange())
+
+
+def driven(velocity: Velocity | None = _AHEAD, linear: Velocity | None = None, turns: int = 40, odd: int = 20) -> Trace:
+    """Four fifths of a second of going ahead, with what two resources say of it in the last turns, so many."""
+    trace = Trace(0.0).commanded(command())
+    straight = Velocity(*_AHEAD[:3])
+    for index in range(turns):
+        is_odd = index >= turns - odd
+        trace = trace.looked(
+            turn(0.02 * index, _AHEAD, velocity if is_odd else _AHEAD, linear if is_odd and linear else straight)
+        )
+    return trace
+
+
+def refuted(trace: Trace) -> set[str]:
+    return {one.requirement.split("/")[1] for one in agreement(trace, _LIMITS) if not one.holds}
+
+
+def test_readings_that_agree_are_judged_and_hold():
+    assert [one.holds for one in agreement(driven(), _LIMITS)] == [True, True]
+
+
+def test_where_answers_take_long_three_turns_without_a_command_are_judged():
+    trace, straight = Trace(0.0).commanded(command()), Velocity(*_AHEAD[:3])
+    for index in range(3):
+        assert agreement(trace, _LIMITS) == []
+        trace = trace.looked(turn(0.1 + 0.2 * index, _AHEAD, _AHEAD, straight))
+    assert [one.holds for one in agreement(trace, _LIMITS)] == [True, True]
+    assert agreement(trace.commanded(command(at=0.2)), _LIMITS) == []
+
+
+def test_a_robot_that_moves_between_two_readings_is_not_judged_by_what_else_was_read():
+    trace, straight = Trace(0.0), Velocity(*_AHEAD[:3])
+    for index, turning in enumerate((0.5, 0.9, 0.9)):
+        trace = trace.looked(turn(0.2 * index, _AHEAD, _AHEAD._replace(angular_z=turning), straight))
+    assert agreement(trace, _LIMITS) == []
+
+
+@pytest.mark.parametrize(
+    ("velocity", "linear", "found"),
+    [
+        (Velocity(linear_x=0.3), None, {"velocity-odometry"}),
+        (_AHEAD, Velocity(linear_x=0.5), {"linear-agrees"}),
+        (STILL, None, {"velocity-odometry", "linear-agrees"}),
+        (None, Velocity(linear_x=9.0), set()),
+    ],
+)
+def test_readings_that_differ_are_refuted(velocity, linear, found):
+    assert refuted(driven(velocity, linear)) == found
+
+
+def test_one_reading_that_differs_refutes_nothing():
+    assert refuted(driven(STILL, Velocity(linear_x=9.0), odd=1)) == set()
+
+
+@pytest.mark.parametrize(
+    "trace",
+    [
+        Trace(0.0),
+        driven(STILL, turns=8),
+        driven(STILL).commanded(command(at=0.79)).looked(turn(0.8, _AHEAD, _AHEAD, None)),
+        driven(STILL).looked(turn(0.8, STILL, _AHEAD, None)),
+        driven(STILL).looked(turn(0.8, None, _AHEAD, None)),
+    ],
+    ids=["nothing", "too short", "a command between", "not steady", "no odometry after it"],
+)
+def test_what_cannot_be_compared_is_not_judged(trace):
+    assert refuted(trace) == set()
+
+
+@pytest.mark.parametrize(
+    ("answer", "problem"),
+    [
+        (exchange(204), ""),
+        (exchange(200, _AHEAD.twist), ""),
+        (exchange(200, {"linear": {"x": 0.3, "y": 0, "z": 0}}), "angular is missing"),
+        (exchange(200, _AHEAD._replace(angular_z=0.4).twist), "angular z 0.4 for 0.5"),
+        (exchange(201), "status 201"),
+        (exchange(200), "no JSON"),
+    ],
+)
+def test_the_answer_to_a_command(answer, problem):
+    said = answer_of(command(exchange=answer))
+    assert said.requirement == "rest-resources/velocity-put"
+    assert said.holds == (not problem)
+    assert problem in said.found
+
+
+def test_each_way_to_command_has_a_requirement_of_its_own():
+    linear = command(exchange=exchange(200, _AHEAD.linear), linear_only=True)
+    assert (answer_of(linear).requirement, answer_of(linear).holds) == ("rest-resources/linear-put", True)
+    assert answer_of(command(integers=True)).requirement == "rest-resources/velocity-integers"
+
+
+def seen(*velocities: Velocity | None) -> Trace:
+    """One turn for each velocity, each of a sample of its own."""
+    trace = Trace(0.0)
+    for index, velocity in enumerate(velocities):
+        trace = trace.looked(turn(0.1 * index, _AHEAD, velocity, None))
+    return trace
+
+
+def test_a_velocity_is_reached_within_the_tolerance_in_the_parts_that_count():
+    def reached(wanted: Velocity, part: slice = slice(None)) -> bool:
+        return arrival("safety/stop", trace, wanted, _LIMITS, part).holds
+
+    trace = seen(*[_AHEAD._replace(linear_x=0.31)] * 3)
+    assert reached(_AHEAD)
+    assert not reached(_AHEAD._replace(angular_z=0.0))
+    assert reached(_AHEAD._replace(angular_z=0.0), slice(0, 3))
+    assert not reached(STILL)
+    trace = seen(STILL, _AHEAD, _AHEAD)
+    assert reached(_AHEAD)
+    trace = seen(None)
+    assert not reached(_AHEAD)
+    assert trace.measured == (_AHEAD,)
+
+
+def test_a_robot_is_not_faster_than_it_was_ever_asked_to_be():
+    assert speed(seen(_AHEAD, _AHEAD, _AHEAD)) is None
+    fast = _AHEAD._replace(linear_x=-0.7)
+    for velocities, holds in (((_AHEAD,) * 3, True), ((fast,) * 3, False), ((_AHEAD, fast, _AHEAD), True)):
+        trace = seen(*velocities).commanded(command()).commanded(command(STILL, at=1.0))
+        assert speed(trace).holds is holds
+
+
+def test_times_of_commands():
+    trace = Trace(5.0)
+    assert (trace.sent, trace.full_sent, trace.answered) == (5.0, 5.0, 5.0)
+    trace = trace.commanded(command(at=6.0)).commanded(command(at=7.0, linear_only=True))
+    assert (trace.sent, trace.full_sent, trace.answered) == (7.0, 6.0, 7.01)
+    trace = trace.commanded(command(at=8.0, linear_only=True, renewal=True))
+    assert (trace.sent, trace.full_sent, trace.answered) == (8.0, 6.0, 7.01)

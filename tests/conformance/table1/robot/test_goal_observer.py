@@ -1,0 +1,87 @@
+import json
+
+import pytest
+
+from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.robot.goal_observer import GoalObserver
+from conformance.packs.table1.statement import Statement
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.run import Run
+
+_BASE = "http://robot:7003"
+_JSON = (("Content-Type", "application/json"),)
+
+
+@pytest.fixture
+def api() -> RestInterface:
+    return RestInterface(Run(statement=Statement()), HttpClient(_BASE, Connection()))
+
+
+def goal(id_: str, stamp: int, x: float, header: int | None = None) -> dict:
+    pose = {"position": {"x": x, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+    return {
+        "header": {"stamp": {"sec": stamp if header is None else header, "nanosec": 0}, "frame_id": "map"},
+        "goal_id": {"stamp": {"sec": stamp, "nanosec": 7}, "id": id_},
+        "goal": {"target_pose": {"header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "map"}, "pose": pose}},
+        "status": {"code": 2, "text": ""},
+    }
+
+
+def refuted(api: RestInterface, *rounds: list[dict]) -> set[str]:
+    """What is refuted by goals as they are shown, with something put before each of the rounds."""
+    observer = GoalObserver(api)
+    url = f"{_BASE}/robot/navigation/action/goal/"
+    for shown in rounds:
+        observer.answered(Exchange(Request("PUT", url, ()), Response(201, (), b"", 1.0)))
+        for one in shown:
+            answer = Response(200, _JSON, json.dumps(one).encode(), 1.0)
+            observer.answered(Exchange(Request("GET", url, ()), answer))
+    return set(api.run.judge.refuted())
+
+
+def test_goals_of_one_piece(api):
+    assert not refuted(api, *([goal(str(n), n, n)] * 2 for n in range(6)))
+
+
+def test_a_goal_that_is_shown_late(api):
+    assert not refuted(api, *([goal(str(n - 1), n - 1, n - 1), *[goal(str(n), n, n)] * 2] for n in range(1, 7)))
+
+
+@pytest.mark.parametrize("what", ["stamp", "pose", "id"])
+def test_a_part_of_the_goal_before_is_shown_first(api, what):
+    def first(n: int) -> dict:
+        return goal(str(n - (what == "id")), n - (what == "stamp"), n - (what == "pose"), n)
+
+    assert refuted(api, *([first(n), *[goal(str(n), n, n)] * 2] for n in range(1, 7))) == {"rest-resources/goal-get"}
+
+
+def test_once_is_no_rule(api):
+    rounds = [[goal(str(n), n, n)] * 2 for n in range(1, 9)]
+    for n in (3, 6):
+        rounds[n][0] = goal(str(n + 1), n, n + 1)
+    assert not refuted(api, *rounds)
+
+
+def test_a_stamp_that_goes_on_by_itself(api):
+    # A header with the time of the answer, in whole seconds: now and then it is that of the goal before.
+    rounds = [[goal(str(n), n, n, header) for header in (n, n, n + 1)] for n in range(1, 3)]
+    rounds += [[goal(str(n), n, n, header) for header in (n, n + 1)] for n in range(3, 9)]
+    assert not refuted(api, *rounds)
+
+
+@pytest.mark.parametrize(
+    ("between", "expected"),
+    [
+        (goal("1", 1, 1.5), {"rest-resources/goal-get"}),
+        (goal("2", 1, 1), {"rest-resources/goal-get"}),
+        (goal("1", 1, 1), set()),
+        (goal("1", 1, 1) | {"status": {"code": 1, "text": "on its way"}}, set()),
+    ],
+)
+def test_a_goal_that_nobody_changed_is_shown_in_one_way(api, between, expected):
+    assert refuted(api, [goal("1", 1, 1), goal("1", 1, 1), between, goal("1", 1, 1)]) == expected
+
+
+def test_another_goal_may_follow_and_that_before_it_be_put_again(api):
+    assert not refuted(api, [goal("1", 1, 1)], [goal("2", 2, 2)], [goal("1", 3, 1)])

@@ -1,0 +1,189 @@
+import json
+import time
+from dataclasses import replace
+
+import pytest
+
+from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.limits import DeclaredLimits
+from conformance.packs.table1.robot.clock import Clock
+from conformance.packs.table1.robot.observer import Observer
+from conformance.packs.table1.statement import Statement
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.run import Run
+
+_BASE = "http://robot:7003/r2d2"
+_ZERO = dict.fromkeys("xyz", 0.0)
+
+
+def odometry(second: int = 1, **orientation: float) -> dict:
+    return {
+        "header": {"stamp": {"sec": second, "nanosec": 0}, "frame_id": "odom"},
+        "child_frame_id": "base_link",
+        "pose": {
+            "pose": {"position": _ZERO, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1} | orientation},
+            "covariance": [0] * 36,
+        },
+        "twist": {"twist": {"linear": _ZERO, "angular": _ZERO}, "covariance": [0] * 36},
+    }
+
+
+def opened(statement: Statement) -> RestInterface:
+    api = RestInterface(Run(statement=statement), HttpClient(_BASE + "/", Connection()))
+    api.client.connection.listeners.append(Observer(api, Clock()))
+    return api
+
+
+@pytest.mark.parametrize(("received_s", "refuted"), [(100.001, set()), (100.1, {"rest-resources/pose-stamp"})])
+def test_answers_of_several_clients_that_crossed_say_nothing_of_order(api, received_s, refuted):
+    request = Request("GET", _BASE + "/robot/pose/", (("Host", "robot:7003"), ("Accept", "*/*")))
+    json_type = (("Content-Type", "application/json"),)
+    for second, at in ((2, 100.0), (1, received_s)):
+        answer = Response(200, json_type, json.dumps(odometry(second)).encode(), 5.0, received_s=at)
+        for listener in api.client.connection.listeners:
+            listener.answered(Exchange(request, answer))
+    assert set(api.run.judge.refuted()) == refuted
+
+
+@pytest.fixture
+def api() -> RestInterface:
+    return opened(Statement(declared=DeclaredLimits(linear_m_s=0.5, angular_rad_s=2.0)))
+
+
+def see(
+    api: RestInterface,
+    path: str,
+    value: object,
+    *,
+    status: int = 200,
+    headers=(("Accept", "*/*"),),
+    method="GET",
+    after="",
+):
+    body = value if isinstance(value, bytes) else json.dumps(value).encode()
+    request = Request(method, _BASE + path, (("Host", "robot:7003"), *headers))
+    said = (("Content-Type", "application/json"), *((("Retry-After", after),) if after else ()))
+    exchange = Exchange(request, Response(status, said, body, 0.0))
+    for listener in api.client.connection.listeners:
+        listener.answered(exchange)
+
+
+def found(api: RestInterface) -> set[str]:
+    return set(api.run.judge.refuted())
+
+
+def test_good_readings_are_cases(api):
+    for second in (1, 1, 2):
+        see(api, "/robot/pose/", odometry(second))
+    see(api, "/robot/velocity/", {"linear": _ZERO, "angular": _ZERO, "unit": "m/s"})
+    see(api, "/robot/velocity/linear/", _ZERO)
+    assert not found(api)
+    assert api.run.judge.evidence["rest-resources/pose-type"].cases == 3
+    assert api.run.judge.evidence["rest-resources/linear-type"].cases == 1
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "requirement"),
+    [
+        ("/robot/pose/", {}, "rest-resources/pose-type"),
+        ("/robot/pose/", b"<Odometry/>", "rest-resources/pose-type"),
+        ("/robot/pose/", odometry(6, w=1.01), "rest-resources/pose-quaternion"),
+        ("/robot/pose/", odometry(6, w=0), "rest-resources/pose-quaternion"),
+        ("/robot/pose/", odometry(0), "rest-resources/pose-stamp"),
+        ("/robot/velocity/", {"linear": _ZERO}, "rest-resources/velocity-type"),
+        ("/robot/velocity/linear/", [0, 0, 0], "rest-resources/linear-type"),
+    ],
+)
+def test_one_bad_reading_among_good_ones_is_found(api, path, value, requirement):
+    see(api, "/robot/pose/", odometry(5))
+    see(api, path, value)
+    assert found(api) == {requirement}
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("/robot/velocity/", {"linear": _ZERO | {"x": 0.6}, "angular": _ZERO}),
+        ("/robot/velocity/", {"linear": _ZERO, "angular": _ZERO | {"z": -2.2}}),
+        ("/robot/velocity/linear/", _ZERO | {"y": 1.0}),
+    ],
+)
+def test_a_robot_is_too_fast_by_several_samples_never_by_one(api, path, value):
+    for second in range(1, 4):
+        assert not found(api)
+        see(api, "/robot/pose/", odometry(second))
+        see(api, path, value)
+        see(api, path, value)
+    assert found(api) == {"safety/limits-hold"}
+
+
+def test_an_error_is_no_reading(api):
+    see(api, "/robot/velocity/", {}, status=500)
+    assert found(api) == {"rest-resources/velocity-type"}
+
+
+def test_before_the_first_odometry_retry_after_is_asked_for(api):
+    see(api, "/robot/pose/", {}, status=503)
+    assert found(api) == {"rest-resources/pose-unavailable"}
+
+
+def test_an_odometry_that_was_never_missed_says_nothing_of_one_that_is(api):
+    see(api, "/robot/pose/", odometry(1))
+    assert not api.run.judge.evidence["rest-resources/pose-unavailable"].cases
+    assert not api.run.judge.evidence["rest-resources/pose-fresh"].cases
+
+
+def test_an_odometry_that_was_seen_long_ago_is_old(api, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    for seconds, old in ((0.0, False), (1.2, False), (0.2, False), (0.2, True)):
+        now[0] += seconds
+        see(api, "/robot/pose/", odometry(1))
+        assert bool(found(api)) is old
+    assert found(api) == {"rest-resources/pose-fresh"}
+
+
+@pytest.mark.parametrize(("status", "found_"), [(200, {"rest-resources/pose-fresh"}), (503, set())])
+def test_without_odometry_there_is_no_velocity(api, status, found_):
+    see(api, "/robot/pose/", {}, status=503, after="1")
+    see(api, "/robot/velocity/", {"linear": _ZERO, "angular": _ZERO}, status=status, after="1")
+    see(api, "/robot/pose/", {}, status=503, after="1")
+    assert found(api) == found_
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        {"headers": (("Accept", "application/xml"),)},
+        {"headers": (("X-Odd", "1"),)},
+        {"method": "HEAD"},
+        {"status": 429},
+    ],
+)
+def test_odd_requests_are_left_to_others(api, odd):
+    see(api, "/robot/pose/", b"", **odd)
+    assert not found(api)
+
+
+def test_without_the_token_nothing_is_judged(api):
+    api.client.connection = replace(api.client.connection, token="secret")  # noqa: S106 - no secret
+    see(api, "/robot/pose/", b"", status=401)
+    assert not found(api)
+
+
+def test_undeclared_limits_are_not_known():
+    api = opened(Statement())
+    see(api, "/robot/velocity/", {"linear": _ZERO | {"x": 3.0}, "angular": _ZERO})
+    assert not found(api)
+
+
+def test_a_limit_declared_as_high_as_one_that_nobody_declared_is_judged(api):
+    undeclared = Statement().limits
+    declared = DeclaredLimits(linear_m_s=undeclared.linear_m_s)
+    api.run.statement = Statement(declared=declared)
+    fast = _ZERO | {"x": 2 * undeclared.linear_m_s}
+    for second in range(1, 4):
+        see(api, "/robot/pose/", odometry(second))
+        see(api, "/robot/velocity/", {"linear": fast, "angular": _ZERO | {"z": 9.0}})
+    assert found(api) == {"safety/limits-hold"}

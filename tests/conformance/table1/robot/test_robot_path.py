@@ -1,0 +1,207 @@
+import math
+import random
+from dataclasses import replace
+
+import pytest
+
+from conformance.packs.table1.limits import Noise
+from conformance.packs.table1.robot.geometry import Pose, length_of, quaternion_of, wrapped, yaw_of
+from conformance.packs.table1.robot.path import judge_path
+from conformance.packs.table1.robot.robot import Odometry, Velocity
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.evidence import Judge
+
+_IDS = {"rest-resources/pose-motion", "rest-resources/pose-rotation"}
+_START = Pose(1.0, 2.0, 0.3)
+_EVIDENCE = Exchange(Request("GET", "http://robot/robot/pose/"), Response(200, (), b"", 1.0))
+
+
+def drive(v: float, w: float, start: Pose, change=lambda pose: pose, seconds: float = 1.0) -> tuple[list, list]:
+    """The odometry of an arc, read fifty times a second."""
+    trace, velocity, pose = [], Velocity(linear_x=v, angular_z=w), start
+    for step in range(int(seconds * 50)):
+        at = step / 50
+        trace.append(Odometry(at, at + 0.001, 1000.0 + at, change(pose), velocity, _EVIDENCE))
+        heading = pose.yaw + w / 100
+        pose = Pose(
+            pose.x + v / 50 * math.cos(heading), pose.y + v / 50 * math.sin(heading), wrapped(pose.yaw + w / 50)
+        )
+    return trace, [velocity] * len(trace)
+
+
+def refuted(v: float, w: float, change=lambda pose: pose, start: Pose = _START) -> set[str]:
+    judge = Judge(_IDS)
+    judge_path(judge, *drive(v, w, start, change), Noise())
+    assert sum(evidence.cases for evidence in judge.evidence.values())
+    return {id_.split("/")[1] for id_ in judge.refuted()}
+
+
+@pytest.mark.parametrize("v", [0.3, -0.3, 0.0])
+@pytest.mark.parametrize("w", [1.0, -2.5, 0.0])
+def test_a_robot_that_does_what_its_velocity_says_is_not_refuted(v, w):
+    if v or w:
+        assert refuted(v, w, start=Pose(-3.0, 5.0, 3.0)) == set()
+
+
+@pytest.mark.parametrize(
+    ("change", "v", "w", "found"),
+    [
+        (lambda pose: pose._replace(x=100 * pose.x, y=100 * pose.y), 0.3, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(x=pose.y, y=pose.x), 0.3, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(x=-pose.x, y=-pose.y), 0.3, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(x=pose.x / 2, y=pose.y / 2), 0.5, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(x=0.0, y=0.0), 0.3, 0.0, "pose-motion"),
+        (lambda pose: pose._replace(yaw=-pose.yaw), 0.0, 1.0, "pose-rotation"),
+        (lambda pose: pose._replace(yaw=0.0), 0.0, 1.0, "pose-rotation"),
+        (lambda pose: pose._replace(yaw=pose.yaw / 2), 0.0, 1.0, "pose-rotation"),
+        (lambda pose: pose._replace(yaw=math.nan), 0.0, 1.0, "pose-rotation"),
+    ],
+)
+def test_a_pose_that_moves_otherwise_is_refuted(change, v, w, found):
+    assert found in refuted(v, w, change)
+
+
+def test_what_nobody_saw_is_not_judged():
+    """A robot that stood still while its answers were held up for two seconds, and drove on."""
+    first, measured = drive(0.5, 0.5, _START)
+    gap = 2.0
+    then, more = drive(0.5, 0.5, first[-1].pose)
+    late = [
+        replace(one, sent=one.sent + 1 + gap, received=one.received + 1 + gap, stamp=one.stamp + 1 + gap)
+        for one in then
+    ]
+    judge = Judge(_IDS)
+    judge_path(judge, first + late, measured + more, Noise())
+    assert judge.evidence["rest-resources/pose-motion"].cases
+    assert not judge.refuted()
+
+
+def _held_up(w, at, lost, change=lambda pose: pose, rest=0):
+    """A robot at rest for so many readings, then on a turn; its own process stands still for 0.4 s, ``at`` in the turn.
+
+    Its clock goes on meanwhile, readings go on showing the last sample, and ``lost`` of the way is not made.
+    """
+    trace, measured = drive(0.0, w, _START, seconds=1.5)
+    still = [
+        replace(trace[0], sent=-i / 50, received=-i / 50, stamp=trace[0].stamp - i / 50) for i in range(rest, 0, -1)
+    ]
+    before, after = trace[:at], trace[at:]
+    same = [replace(before[-1], sent=before[-1].sent + i / 50, received=before[-1].sent + i / 50) for i in range(1, 20)]
+    later = [
+        replace(
+            one,
+            sent=one.sent + 0.4,
+            received=one.received + 0.4,
+            stamp=one.stamp + 0.4,
+            pose=one.pose._replace(yaw=wrapped(one.pose.yaw + 0.4 * w * (1 - lost))),
+        )
+        for one in after
+    ]
+    found = [replace(one, pose=change(one.pose)) for one in (*still, *before, *same, *later)]
+    return found, [Velocity()] * rest + measured[:at] + [measured[0]] * len(same) + measured[at:]
+
+
+@pytest.mark.parametrize("at", [5, 20, 37, 50, 70])
+@pytest.mark.parametrize("lost", [0.0, 0.75, 1.0])
+@pytest.mark.parametrize("rest", [0, 100])
+def test_odometry_that_was_held_up_once_fails_nobody(at, lost, rest):
+    judge = Judge(_IDS)
+    judge_path(judge, *_held_up(2.5, at, lost, rest=rest), Noise())
+    assert judge.evidence["rest-resources/pose-rotation"].cases
+    assert not judge.refuted()
+
+
+@pytest.mark.parametrize("at", [5, 37, 70])
+def test_odometry_that_was_held_up_once_excuses_nobody(at):
+    judge = Judge(_IDS)
+    judge_path(judge, *_held_up(1.2, at, 0.0, lambda pose: pose._replace(yaw=0.7 * pose.yaw), rest=100), Noise())
+    assert judge.refuted()
+
+
+def test_one_jump_while_many_readings_show_a_robot_at_rest_fails_nobody():
+    trace, measured = drive(0.5, 0.0, _START)
+    still = [
+        replace(trace[0], sent=-i / 50, received=-i / 50, stamp=trace[0].stamp - i / 50) for i in range(200, 0, -1)
+    ]
+    moved = [one if i < 5 else replace(one, pose=one.pose._replace(y=one.pose.y + 0.2)) for i, one in enumerate(trace)]
+    judge = Judge(_IDS)
+    judge_path(judge, still + moved, [Velocity()] * len(still) + measured, Noise())
+    assert judge.evidence["rest-resources/pose-motion"].cases
+    assert not judge.refuted()
+
+
+def test_a_robot_that_did_not_move_is_not_judged():
+    judge = Judge(_IDS)
+    judge_path(judge, *drive(0.0, 0.0, Pose(0, 0, 0)), Noise())
+    assert not any(evidence.cases for evidence in judge.evidence.values())
+
+
+def test_a_simulation_at_half_speed_goes_by_its_stamps():
+    trace, measured = drive(0.3, 0.0, Pose(0, 0, 0))
+    slow = [Odometry(2 * o.sent, 2 * o.received, o.stamp, o.pose, o.velocity, o.exchange) for o in trace]
+    judge = Judge(_IDS)
+    judge_path(judge, slow, measured, Noise())
+    assert not judge.refuted()
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0, -3.0, math.pi / 2])
+@pytest.mark.parametrize("length", [1.0, 2.0, 1e-3])
+def test_a_quaternion_of_any_length_has_its_heading(yaw, length):
+    quaternion = quaternion_of(yaw, length)
+    assert yaw_of(quaternion) == pytest.approx(yaw)
+    assert length_of(quaternion) == pytest.approx(length)
+
+
+def test_a_pose_is_seen_from_a_frame():
+    assert Pose(1.0, 0.0, 0.0).seen_from(Pose(2.0, -1.0, math.pi / 2)) == pytest.approx((2.0, 0.0, math.pi / 2))
+    assert Pose(0, 0, 0).ahead(2.0, math.pi / 2) == pytest.approx((0.0, 2.0, math.pi / 2))
+
+
+def _to_and_fro(v: float, w: float, scale: float, noise: float = 0.0) -> tuple[list, list]:
+    """One second one way, one second at rest, one second the other way; poses are ``scale`` times as far as driven."""
+    by = random.Random(7)  # noqa: S311 - no secret
+    trace, measured, pose, shown = [], [], _START, _START
+    for second, sign in enumerate((1, 0, -1)):
+        part, velocities = drive(sign * v, sign * w, pose)
+        for one in part:
+            turned = wrapped(one.pose.yaw - pose.yaw)
+            there = Pose(
+                shown.x + scale * (one.pose.x - pose.x) + by.gauss(0, noise),
+                shown.y + scale * (one.pose.y - pose.y) + by.gauss(0, noise),
+                wrapped(shown.yaw + scale * turned + by.gauss(0, noise)),
+            )
+            velocity = one.velocity._replace(
+                linear_x=one.velocity.linear_x + by.gauss(0, noise),
+                angular_z=one.velocity.angular_z + by.gauss(0, noise),
+            )
+            trace.append(replace(one, sent=one.sent + second, received=one.received + second, stamp=one.stamp + second))
+            trace[-1] = replace(trace[-1], pose=there, velocity=velocity)
+            measured.append(velocity)
+        ends = velocities[0]
+        shown = shown.ahead(scale * ends.linear_x)._replace(yaw=wrapped(shown.yaw + scale * ends.angular_z))
+        pose = pose.ahead(ends.linear_x)._replace(yaw=wrapped(pose.yaw + ends.angular_z))
+    return trace, measured
+
+
+@pytest.mark.parametrize(("v", "w"), [(0.7, 0.0), (0.0, 1.5)])
+def test_driving_back_makes_up_for_no_scale(v, w):
+    judge = Judge(_IDS)
+    judge_path(judge, *_to_and_fro(v, w, 1.3), Noise())
+    assert judge.refuted()
+
+
+@pytest.mark.parametrize(("v", "w"), [(0.7, 0.0), (0.0, 1.5)])
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.05])
+def test_noise_on_the_way_there_at_rest_and_back_fails_nobody(v, w, noise):
+    judge = Judge(_IDS)
+    judge_path(judge, *_to_and_fro(v, w, 1.0, noise), Noise(noise, noise, noise, noise))
+    assert not judge.refuted()
+
+
+@pytest.mark.parametrize(("v", "w"), [(0.7, 0.0), (0.0, 1.5)])
+def test_what_readings_far_apart_do_not_show_is_held_against_nobody(v, w):
+    # Over a slow link: the velocity had ended in between for half of the time, there and back.
+    trace, measured = _to_and_fro(v, w, 0.5)
+    judge = Judge(_IDS)
+    judge_path(judge, trace[::20], measured[::20], Noise())
+    assert not judge.refuted()

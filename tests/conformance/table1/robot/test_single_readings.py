@@ -1,0 +1,151 @@
+"""Readings of the velocity that are out now and then: of no sample that the odometry had, and of one that was out."""
+
+import pytest
+
+from conformance.packs.table1.limits import DeclaredLimits, Noise
+from conformance.packs.table1.robot.robot import STILL, Velocity
+from conformance.packs.table1.robot.single_readings import BesideOdometry, OneSample
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.evidence import Judge
+from conformance.verdict.run import Run
+
+_EXCHANGE = Exchange(Request("GET", "http://robot/"), Response(200, (), b"", 1.0))
+_ID = "rest-resources/velocity-odometry"
+_SAMPLE = "rest-resources/pose-sample"
+_FAST = Velocity(linear_x=0.3)
+_TURN_S = 0.02
+
+
+class _Run:
+    """Odometry and velocity read in turns, each turn a sample of the odometry, unless it has fewer."""
+
+    def __init__(self, sample_s: float = _TURN_S, *, requirement: str = _ID, **declared: object) -> None:
+        self.judge: Judge = Run().judge
+        limits = DeclaredLimits(tolerance_abs=0.02, **declared).resolved()
+        self.beside = BesideOdometry(self.judge, limits, requirement=requirement)
+        self.sample_s, self.now = sample_s, 100.0
+
+    def turns(self, count: int, odometry: Velocity = STILL, velocity: Velocity | None = None) -> None:
+        for _ in range(count):
+            stamp = self.now // self.sample_s * self.sample_s
+            self.beside.odometry(stamp, odometry, self.now)
+            self.beside.velocity(odometry if velocity is None else velocity, _EXCHANGE, self.now + 0.005)
+            self.now += _TURN_S
+
+    @property
+    def refuted(self) -> int:
+        return self.judge.refuted().get(_ID, 0)
+
+    @property
+    def cases(self) -> int:
+        return self.judge.counts([_ID])[_ID]
+
+
+def test_a_reading_that_is_out_again_is_judged_from_the_second_on():
+    run = _Run()
+    for number in range(4):
+        run.turns(60)
+        run.turns(1, velocity=_FAST)
+        assert run.refuted == max(0, number - 1)
+    run.turns(2)
+    assert run.refuted == 3
+
+
+def test_readings_over_soap_are_judged_by_a_requirement_of_their_own():
+    run = _Run(requirement="equivalence/velocity")
+    run.turns(60)
+    run.turns(3, velocity=_FAST)
+    run.turns(2)
+    assert run.judge.refuted() == {"equivalence/velocity": 2}
+
+
+@pytest.mark.parametrize("sample_s", [0.02, 0.05, 0.2])
+def test_readings_of_the_odometrys_samples_are_judged_and_fine(sample_s):
+    run = _Run(sample_s)
+    run.turns(60)
+    run.turns(60, _FAST)
+    assert run.cases > 40
+    assert run.refuted == 0
+
+
+def test_a_sample_that_is_out_is_everybodys():
+    run = _Run()
+    for _ in range(10):
+        run.turns(40)
+        run.turns(1, _FAST)
+    assert run.refuted == 0
+
+
+def test_a_sample_that_was_not_read_may_be_the_one_that_is_out():
+    run = _Run()
+    run.turns(20)
+    for _ in range(10):
+        run.turns(40)
+        # Of the samples that passed meanwhile the velocity's is one.
+        run.now += 0.08
+        run.turns(1, velocity=_FAST)
+        run.now += 0.08
+    assert run.refuted == 0
+
+
+def test_a_velocity_that_is_smoothed_comes_to_rest_later():
+    run = _Run()
+    for _ in range(10):
+        run.turns(40, _FAST)
+        run.turns(18, STILL, velocity=Velocity(linear_x=0.1))
+        run.turns(40)
+    assert run.refuted == 0
+
+
+def test_noise_is_no_fault():
+    run = _Run(noise=Noise(linear_m_s=0.03))
+    for _ in range(10):
+        run.turns(40)
+        run.turns(1, velocity=Velocity(linear_x=0.1))
+    assert run.refuted == 0
+
+
+def test_what_lies_between_what_the_odometry_had_is_a_velocity_that_was_smoothed():
+    run = _Run()
+    run.turns(60)
+    for _ in range(10):
+        run.turns(5, _FAST, velocity=Velocity(linear_x=0.12))
+        run.turns(40, _FAST)
+        run.turns(40)
+    assert run.refuted == 0
+
+
+def test_a_velocity_that_is_gone_while_the_robot_drives_is_judged():
+    run = _Run()
+    for _ in range(4):
+        run.turns(60, _FAST)
+        run.turns(1, _FAST, velocity=STILL)
+    run.turns(2, _FAST)
+    assert run.refuted == 3
+
+
+def _odometry(x: float) -> dict[str, object]:
+    zero = dict.fromkeys("xyz", 0.0)
+    pose = {"position": {**zero, "x": x}, "orientation": {**zero, "w": 1.0}}
+    return {"pose": {"pose": pose}, "twist": {"twist": {"linear": zero, "angular": zero}}}
+
+
+@pytest.mark.parametrize(
+    ("told", "cases", "failures"),
+    [
+        ([(1, 0.0), (1, 0.0), (1, 0.0), (1, 0.0)], 2, 0),
+        ([(1, 0.0), (1, 1.0), (1, 0.0)], 1, 1),
+        ([(1, 0.0), (1, 0.01), (1, 0.0)], 1, 0),
+        # Another sample; and a pose of the moment under a stamp that is coarse.
+        ([(1, 0.0), (2, 1.0), (3, 0.0), (3, 0.0)], 0, 0),
+        ([(1, 0.0), (1, 0.01), (1, 0.02), (1, 0.03)], 0, 0),
+        ([(1, 0.0), (1, 0.0), (2, 1.0), (2, 1.0), (2, 1.0)], 1, 0),
+    ],
+)
+def test_one_sample_is_told_in_one_way(told, cases, failures):
+    judge: Judge = Run().judge
+    sample = OneSample(judge, DeclaredLimits(tolerance_abs=0.02).resolved())
+    for stamp, x in told:
+        sample.odometry((stamp, 0), _odometry(x), _EXCHANGE)
+    assert judge.counts([_SAMPLE])[_SAMPLE] == cases
+    assert judge.refuted().get(_SAMPLE, 0) == failures

@@ -1,0 +1,187 @@
+import time
+from contextlib import contextmanager
+
+import pytest
+from toy_body import serving
+
+from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.limits import DeclaredLimits
+from conformance.packs.table1.robot.robot import Robot
+from conformance.packs.table1.robot.standstill import Standstill
+from conformance.packs.table1.statement import Statement
+from conformance.transport.client import Connection, HttpClient
+from conformance.verdict.run import Run
+
+_CANCEL, _REFUSED = "safety/cancel-stays", "safety/refused-keeps"
+_WATCH_S = 0.3
+_LATER_S = 0.15
+
+
+class Body:
+    """A robot that drives, or has a goal, from a moment on; it stops when it is told to."""
+
+    def __init__(self) -> None:
+        self.drives_at = self.goal_at = float("inf")
+        self.told: list[str] = []
+
+    def drive(self) -> None:
+        self.drives_at = time.monotonic() + _LATER_S
+
+    def answer(self, method: str, path: str, _sent: bytes) -> tuple[int, object]:
+        now = time.monotonic()
+        if method != "GET":
+            self.told.append(method)
+            self.drives_at = self.goal_at = float("inf")
+            return 204, None
+        zero = dict.fromkeys("xyz", 0.0)
+        linear = {**zero, "x": 0.3 if now > self.drives_at else 0.0}
+        if path.endswith("/goal/"):
+            return (200, _GOAL) if now > self.goal_at else (404, None)
+        if path.endswith("/linear/"):
+            return 200, linear
+        if path.endswith("/velocity/"):
+            return 200, {"linear": linear, "angular": zero}
+        return 503, None
+
+
+_POSE = {"position": dict.fromkeys("xyz", 0.0), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+_STAMP = {"sec": 1, "nanosec": 0}
+_GOAL = {
+    "header": {"stamp": _STAMP, "frame_id": "map"},
+    "goal_id": {"stamp": _STAMP, "id": "again"},
+    "goal": {"target_pose": {"header": {"stamp": _STAMP, "frame_id": "map"}, "pose": _POSE}},
+    "status": {"code": 2, "text": ""},
+}
+
+
+@contextmanager
+def _serving(body: Body):
+    declared = DeclaredLimits(linear_m_s=0.7, angular_rad_s=2.5, settle_s=0.3)
+    with serving(body) as url:
+        client = HttpClient(url, Connection())
+        yield RestInterface(Run(statement=Statement(declared=declared), allow_motion=True), client)
+        client.close()
+
+
+class Trial:
+    """Something to be tried, which a check may try again."""
+
+    def __init__(self, api: RestInterface, requirement: str, act=lambda: None) -> None:
+        self.api, self.requirement, self.act = api, requirement, act
+        self.again_at: list[float] = []
+
+    def tried(self, standstill: Standstill, *, goal: bool = False) -> None:
+        self.act()
+        standstill.tried(self.requirement, "rest", self.again, seconds=_WATCH_S, goal=goal)
+
+    def again(self) -> None:
+        self.again_at.append(time.monotonic())
+        self.act()
+        time.sleep(2 * _LATER_S)
+        velocity, exchange = Robot(self.api).velocity()
+        self.api.run.judge.check(self.requirement, velocity.linear_x == 0, exchange, "rest", cause="moves")
+
+
+def _failures(api: RestInterface) -> dict[str, int]:
+    return api.run.judge.refuted()
+
+
+def test_nothing_is_judged_where_nothing_was_tried():
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        assert not standstill.lasts
+        standstill.judge()
+        assert api.run.judge.counts([_CANCEL, _REFUSED]) == {_CANCEL: 0, _REFUSED: 0}
+    assert body.told == []
+
+
+def test_a_robot_that_stays_is_watched_as_long_as_the_last_trial_needs():
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
+        for trial in trials:
+            trial.tried(standstill, goal=True)
+        begun = time.monotonic()
+        assert standstill.lasts
+        standstill.judge()
+        assert time.monotonic() - begun > 0.9 * _WATCH_S
+        assert api.run.judge.counts([_CANCEL, _REFUSED]) == {_CANCEL: 1, _REFUSED: 1}
+        assert _failures(api) == {}
+        assert [trial.again_at for trial in trials] == [[], []]
+        standstill.judge()
+        assert api.run.judge.counts([_CANCEL]) == {_CANCEL: 1}
+    # Neither a command nor a cancellation, which would hide what was tried.
+    assert body.told == []
+
+
+def test_of_what_was_tried_the_one_that_moves_the_robot_is_found():
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        innocent, guilty = Trial(api, _CANCEL), Trial(api, _REFUSED, body.drive)
+        innocent.tried(standstill)
+        guilty.tried(standstill)
+        standstill.judge()
+        assert set(_failures(api)) == {_REFUSED}
+        assert len(innocent.again_at) == len(guilty.again_at) == 1
+
+
+def test_what_moves_the_robot_once_is_anybodys_fault():
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
+        for trial in trials:
+            trial.tried(standstill)
+        body.drive()
+        standstill.judge()
+        assert set(_failures(api)) == {_CANCEL, _REFUSED}
+        assert all(len(trial.again_at) == 1 for trial in trials)
+
+
+@pytest.mark.parametrize("counts", [True, False])
+def test_a_goal_that_comes_back_counts_where_one_was_cancelled(counts):
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        Trial(api, _CANCEL).tried(standstill, goal=counts)
+        body.goal_at = time.monotonic() + _LATER_S
+        standstill.judge()
+        assert set(_failures(api)) == ({_CANCEL} if counts else set())
+
+
+@pytest.mark.parametrize("what", ["drives_at", "goal_at"])
+def test_a_robot_that_moves_or_has_a_goal_is_not_left_as_it_is(what):
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        Trial(api, _CANCEL).tried(standstill)
+        setattr(body, what, 0.0)
+        assert not standstill.lasts
+
+
+def test_what_moved_while_something_else_was_read_is_found():
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        trial = Trial(api, _REFUSED)
+        trial.tried(standstill)
+        body.drives_at = 0.0
+        standstill.look()
+        body.drives_at = float("inf")
+        standstill.look()
+        standstill.judge()
+        assert set(_failures(api)) == {_REFUSED}
+
+
+def test_nobody_looks_when_what_was_tried_would_have_shown():
+    body = Body()
+    with _serving(body) as api:
+        standstill = Standstill(api)
+        standstill.look()
+        standstill.tried(_REFUSED, "rest", lambda: None, seconds=0.0)
+        body.drives_at = 0.0
+        standstill.look()
+        assert api.client.connection.sent == 0
