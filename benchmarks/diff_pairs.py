@@ -24,7 +24,7 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
-from conformance.contract.classes import CLASSES
+from conformance.contract.pack import Contract
 from conformance.mutation.messages import unchanged
 from conformance.mutation.mutant import Mutant
 from conformance.packs.table1.mutants import MUTANTS
@@ -90,7 +90,7 @@ def _sample(pattern: str, seed: int) -> list[Mutant]:
     chance = random.Random(seed)  # noqa: S311 - a sample, and no secret
     for mutants in by_class.values():
         chance.shuffle(mutants)
-    turns = itertools.zip_longest(*(by_class[name] for name in CLASSES if name in by_class))
+    turns = itertools.zip_longest(*(by_class[name] for name in Contract.load().classes if name in by_class))
     return [mutant for turn in turns for mutant in turn if mutant is not None]
 
 

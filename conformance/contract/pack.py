@@ -90,7 +90,7 @@ class Contract:
     publishers_path: Path | None
     subscribers_path: Path | None
     only: tuple[str, ...] = ()
-    manifest: _Manifest | None = field(default=None, repr=False)
+    manifest: _Manifest | None = field(default=None, repr=False, compare=False)
 
     @classmethod
     @cache  # reading openapi.yaml takes a third of a second

@@ -14,10 +14,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO
 
-import conformance.contract
 from conformance.selftest.servers.programs import built, check_installed, program
 
 _HERE = Path(__file__).parent
+_PACK = _HERE.parent / "packs" / "table1"
 _READY = re.compile(r"ready rest=(\S+) soap=(\S*)")
 _START_S, _STOP_S = 90.0, 10.0
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
@@ -57,7 +57,7 @@ def statement_of(kind: str) -> Path:
     """The implementation conformance statement of a robot."""
     if kind == REALISTIC:
         return _HERE.parents[1] / "reference_robot" / "realistic.toml"
-    return _HERE / "reference.toml" if kind == REFERENCE else _HERE / "independent_robots" / kind / f"{kind}.toml"
+    return _HERE / "reference.toml" if kind == REFERENCE else _PACK / "independent_robots" / kind / f"{kind}.toml"
 
 
 def check_available(kind: str) -> None:
@@ -149,11 +149,11 @@ def _command(kind: str, domain_id: int, seed: int) -> list[str]:
     if kind in ON_ROS:
         realistic = ["--realistic", "--seed", str(seed)] if kind == REALISTIC else []
         return [sys.executable, "-m", "roaas", "robot", *ports, "--domain-id", str(domain_id), *realistic]
-    folder = _HERE / "independent_robots" / kind
+    folder = _PACK / "independent_robots" / kind
     if kind == "node":
         return [program("node", "nodejs"), str(folder / "robot.js")]
     if kind == "golang":
-        return [str(built(*sorted(folder.glob("*.go")))), str(Path(conformance.contract.__file__).parent)]
+        return [str(built(*sorted(folder.glob("*.go")))), str(_PACK)]
     check_installed(*_FRAMEWORKS.get(kind, ()))
     return [sys.executable, "-m", "conformance.packs.table1.independent_robots", kind, *ports]
 

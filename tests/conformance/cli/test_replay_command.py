@@ -9,7 +9,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from click.testing import CliRunner
 
-from conformance.contract.pack import CONTRACT_VERSION
+from conformance.contract.pack import Contract
 from conformance.engine.permission import moves
 from conformance.engine.sequence import read_request, written
 from conformance.transport.exchange import Request
@@ -74,7 +74,7 @@ def _result(tmp_path, base, methods=("PUT", "GET")):
     }
     document = {
         "format": "roaas-result/1",
-        "suite": {"contract": CONTRACT_VERSION},
+        "suite": {"contract": Contract.load().version},
         "target": {"subscribers_endpoint": None},
         "requirements": [{"id": "http/declared-status", "failures": [failure]}, {"id": "http/head", "failures": []}],
     }
@@ -109,7 +109,7 @@ def test_what_an_answer_shows_by_itself_is_judged_as_in_the_run(robot, tmp_path)
     }
     document = {
         "format": "roaas-result/1",
-        "suite": {"contract": CONTRACT_VERSION},
+        "suite": {"contract": Contract.load().version},
         "target": {"rest": base},
         "seed": 0,
         "effort": "quick",

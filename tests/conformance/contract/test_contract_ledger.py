@@ -2,19 +2,25 @@
 
 import pytest
 
-from conformance.contract.classes import CLASSES, PROFILES
 from conformance.contract.ledger import LedgerError, load_ledger
-from conformance.contract.pack import CONTRACT_DIR, CONTRACT_FILES, GENERIC_CLASSES, Contract, ContractError
+from conformance.contract.pack import Contract, ContractError, generic_classes, generic_ledger
 
-LEDGER = Contract.load().ledger
+CONTRACT = Contract.load()
+LEDGER, CLASSES = CONTRACT.ledger, CONTRACT.classes
 
 
 def test_every_class_has_requirements_and_says_what_it_needs():
     by_class = {name: [item for item in LEDGER.values() if item.class_ == name] for name in CLASSES}
     assert all(len(items) >= 5 for items in by_class.values())
     assert all(f"{name}/reachable" in LEDGER for name in CLASSES if name not in {"describe", "rest-formats"})
-    assert set(PROFILES["full"]) == set(CLASSES)
-    assert set(GENERIC_CLASSES) < set(CLASSES)
+    assert set(CONTRACT.profiles["full"]) == set(CLASSES)
+    assert set(generic_classes()) < set(CLASSES)
+
+
+def test_generic_requirements_name_nothing_of_the_robot():
+    for item in generic_ledger().values():
+        assert "contract.md" not in item.source
+        assert "/robot/" not in item.text
 
 
 def test_texts_are_sentences_and_unlike_each_other():
@@ -27,7 +33,8 @@ def test_texts_are_sentences_and_unlike_each_other():
 
 
 def test_all_files_of_the_contract_are_there():
-    assert all((CONTRACT_DIR / name).is_file() for name in CONTRACT_FILES)
+    names = {path.name for path in CONTRACT.files}
+    assert {"contract.md", "openapi.yaml", "robot.wadl", "requirements.toml", "pack.toml", "publishers.wsdl"} < names
 
 
 @pytest.mark.parametrize("name", ["R2003", "R2028", "R2105", "R2201", "R2204", "R2206", "R2304", "R2401", "R2718"])
@@ -51,7 +58,7 @@ def test_rules_of_the_basic_profile_for_descriptions(name):
 def test_a_ledger_that_cannot_be_used(tmp_path, text):
     (tmp_path / "requirements.toml").write_text(text)
     with pytest.raises(LedgerError):
-        load_ledger(tmp_path / "requirements.toml")
+        load_ledger(tmp_path / "requirements.toml", CLASSES)
 
 
 def test_a_folder_that_describes_nothing(tmp_path):

@@ -1,5 +1,7 @@
 """A failure that does not come back is told as intermittent, and stays one."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from conformance.engine import intermittent
@@ -48,8 +50,8 @@ def _sent_again(monkeypatch, run, answer=_GOOD):
     """What is put down of a finding, and whether the robot was left at rest."""
     stopped = []
     monkeypatch.setattr(intermittent, "send_again", lambda request, _: Exchange(request, answer))
-    monkeypatch.setattr(intermittent, "leave_at_rest", stopped.append)
-    look_again(run, Connection(), "the interface")
+    device = SimpleNamespace(leave_at_rest=stopped.append)
+    look_again(run, Connection(), SimpleNamespace(device=device))
     return next(iter(run.judge.evidence["http/head"].findings.values())).again, bool(stopped)
 
 

@@ -2,6 +2,7 @@
 
 import pytest
 
+from conformance.contract.pack import Contract
 from conformance.fleet.fleet_file import FleetError, load_fleet, refuse_same_identity
 
 REST = 'endpoints = {{ rest = "http://127.0.0.1:{}" }}'
@@ -27,7 +28,7 @@ def test_statements_and_addresses_make_a_fleet(fleet, tmp_path):
         f'[[robot]]\nname = "kiosk"\nallow_motion = false\ntime_limit_s = 5\n{REST.format(2)}\n'
         '[[robot]]\nname = "lift"\nendpoints = { publishers_wsdl = "lift.wsdl", token_file = "token" }\n'
     )
-    courier, kiosk, lift = load_fleet(path)
+    courier, kiosk, lift = load_fleet(path, Contract.load())
     assert (courier.name, courier.statement, courier.time_limit_s) == ("courier", tmp_path / "courier.toml", 60)
     assert (courier.baseline, courier.movable) == (tmp_path / "known.toml", True)
     assert (kiosk.statement, kiosk.movable, kiosk.time_limit_s) == (None, False, 5)
@@ -56,14 +57,14 @@ def test_statements_and_addresses_make_a_fleet(fleet, tmp_path):
 )
 def test_what_does_not_fit_is_refused_by_name(fleet, text, named):
     with pytest.raises(FleetError, match=r"fleet\.toml") as refused:
-        load_fleet(fleet(text))
+        load_fleet(fleet(text), Contract.load())
     assert named in str(refused.value)
 
 
 def test_two_robots_of_one_name_are_judged_and_not_signed(fleet, tmp_path):
     (tmp_path / "twin.toml").write_text('[robot]\nname = "C"\n[endpoints]\nrest = "http://127.0.0.1:9"\n')
     path = fleet('[[robot]]\nstatement = "courier.toml"\n[[robot]]\nstatement = "twin.toml"')
-    members = load_fleet(path)
+    members = load_fleet(path, Contract.load())
     with pytest.raises(FleetError, match=r"number 1 and number 2 would be signed as the same robot, 'C'"):
         refuse_same_identity(path, members)
     refuse_same_identity(path, members[:1])

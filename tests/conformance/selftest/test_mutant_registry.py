@@ -5,8 +5,6 @@ from pathlib import Path
 import pytest
 
 from conformance.contract.classes import Level
-from conformance.contract.ledger import load_ledger
-from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.packs.table1.mutants import MUTANTS
 from conformance.selftest import coverage
 
@@ -24,7 +22,7 @@ def test_page_is_up_to_date():
 
 def test_every_must_and_should_has_a_mutant():
     shown = {id_ for mutant in MUTANTS for id_ in mutant.catches}
-    ledger = load_ledger(CONTRACT_DIR / "requirements.toml").values()
+    ledger = Contract.load().ledger.values()
     assert [
         item.id for item in ledger if item.level is not Level.MAY and not item.untestable and item.id not in shown
     ] == []

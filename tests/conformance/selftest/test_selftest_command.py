@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from conformance.cli.contract import contract
 from conformance.cli.selftest import selftest
-from conformance.contract.pack import CONTRACT_FILES
+from conformance.contract.pack import Contract
 
 
 def run(command, *words):
@@ -73,7 +73,7 @@ def test_requirements_are_listed():
 
 def test_the_contract_is_exported_and_not_over_what_is_there(tmp_path):
     assert run(contract, "export", str(tmp_path / "there")).exit_code == 0
-    assert {path.name for path in (tmp_path / "there").iterdir()} == set(CONTRACT_FILES)
+    assert {path.name for path in (tmp_path / "there").iterdir()} == {path.name for path in Contract.load().files}
     assert run(contract, "export", str(tmp_path / "there")).exit_code == 2
     assert run(contract, "export", str(tmp_path / "there"), "--force").exit_code == 0
 

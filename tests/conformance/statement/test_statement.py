@@ -1,21 +1,25 @@
 """A statement is read as it stands, and refused with the offending value."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
-from conformance.contract.classes import CLASSES
-from conformance.contract.interfaces import Interface
+from conformance.contract.pack import Contract
 from conformance.packs.table1.limits import Noise
 from conformance.packs.table1.robot.robot import STILL, Velocity, is_near
+from conformance.packs.table1.statement import Statement
 from conformance.packs.table1.thresholds import ApiStyle, Operation, Quantile, Threshold
-from conformance.statement.statement import Endpoints, Statement, StatementError, load_statement
+from conformance.statement.statement import Endpoints, StatementError, load_statement
+
+CONTRACT = Contract.load()
+ONLY_REST = replace(CONTRACT, publishers_path=None, subscribers_path=None)
 
 
 def _load(tmp_path, text):
     path = tmp_path / "robot.toml"
     path.write_text(text, encoding="utf-8")
-    return load_statement(path)
+    return load_statement(path, CONTRACT)
 
 
 def test_a_full_statement(tmp_path):
@@ -52,7 +56,7 @@ def test_a_full_statement(tmp_path):
     assert statement.robot == {"name": "R2"}
     assert statement.endpoints.publishers_wsdl == str(tmp_path / "r2.wsdl")
     assert statement.endpoints.ca_file == str(tmp_path / "ca.pem")
-    assert statement.claimed() == ("rest-resources", "rest-delivery", "soap-delivery", "safety")
+    assert statement.claimed(CONTRACT) == ("rest-resources", "rest-delivery", "soap-delivery", "safety")
     assert (statement.limits.linear_m_s, statement.limits.hold_s, statement.limits.settle_s) == (1.0, 0.5, 2.0)
     assert statement.motion.arena == (0.0, 0.0, 10.0, 5.0)
     assert statement.ros.domain_id == 7
@@ -143,12 +147,12 @@ def test_absolute_tolerances_are_declared_apart_or_by_one_figure(tmp_path):
 def test_without_claims_the_classes_follow_from_the_addresses():
     only_rest = Statement(endpoints=Endpoints(rest="http://r2"))
     # What judges several interfaces is not judged by one of them: that would be milder than to claim it.
-    assert only_rest.claimed() == ("rest-resources", "rest-delivery", "rest-formats", "http", "safety")
+    assert only_rest.claimed(CONTRACT) == ("rest-resources", "rest-delivery", "rest-formats", "http", "safety")
     assert only_rest.lacking()["strict-input"] == ("publishers", "subscribers")
-    assert "strict-input" in only_rest.claimed([Interface.REST])
-    assert "soap-delivery" not in only_rest.claimed([Interface.REST])
+    assert "strict-input" in only_rest.claimed(ONLY_REST)
+    assert "soap-delivery" not in only_rest.claimed(ONLY_REST)
     both = Endpoints(rest="http://r2", publishers_wsdl="x", subscribers_wsdl="y")
-    assert Statement(endpoints=both).claimed() == CLASSES
+    assert Statement(endpoints=both).claimed(CONTRACT) == tuple(CONTRACT.classes)
 
 
 @pytest.mark.parametrize(
@@ -168,4 +172,4 @@ def test_a_statement_declares_within_the_contract_s_bounds(tmp_path, line, told)
     path = tmp_path / "robot.toml"
     path.write_text(f"[limits]\n{line}\n", encoding="utf-8")
     with pytest.raises(StatementError, match=re.escape(told)):
-        load_statement(path)
+        load_statement(path, CONTRACT)

@@ -4,16 +4,14 @@ import json
 import math
 import re
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import yaml
 from jsonschema import Draft202012Validator
 from lxml import etree
 
-import conformance.contract
+from conformance.packs.table1.files import CONTRACT_DIR
 
-_CONTRACT = Path(conformance.contract.__file__).parent
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _MOST_ATTRIBUTES = 100
 
@@ -29,7 +27,7 @@ class NotTakenError(Exception):
 @cache
 def components() -> dict[str, Any]:
     """The schemas of the contract."""
-    found: dict[str, Any] = yaml.safe_load((_CONTRACT / "openapi.yaml").read_text(encoding="utf-8"))["components"]
+    found: dict[str, Any] = yaml.safe_load((CONTRACT_DIR / "openapi.yaml").read_text(encoding="utf-8"))["components"]
     return found
 
 

@@ -4,13 +4,12 @@ import json
 import re
 from collections.abc import Callable
 from email.message import Message
-from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 import yaml
 
-import conformance.contract
+from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.packs.table1.independent_robots.body import Body, BusyError, ConflictError, Goal, NoPlanError, stamp
 from conformance.packs.table1.independent_robots.plain import reading
 from conformance.packs.table1.independent_robots.plain.reading import RefusedError
@@ -19,7 +18,7 @@ from conformance.packs.table1.independent_robots.plain.writing import as_json, c
 
 _FRAMES = ("map", "odom")
 # The contract's own descriptions: what a vendor who builds contract-first serves.
-_CONTRACT = Path(conformance.contract.__file__).parent
+
 SENSORS = [
     {"name": "lidar", "topic": "/scan", "type": "sensor_msgs/msg/LaserScan"},
     {"name": "imu", "topic": "/imu", "type": "sensor_msgs/msg/Imu"},
@@ -203,12 +202,12 @@ class Rest:
         return Answer(204)
 
     def _openapi(self, _headers: Message, _body: bytes, _target: str) -> Answer:
-        document = yaml.safe_load((_CONTRACT / "openapi.yaml").read_text(encoding="utf-8"))
+        document = yaml.safe_load((CONTRACT_DIR / "openapi.yaml").read_text(encoding="utf-8"))
         document["servers"] = [{"url": "/"}]
         return Answer(200, json.dumps(document, default=str).encode(), "application/json")
 
     def _wadl(self, headers: Message, _body: bytes, _target: str) -> Answer:
-        wadl = (_CONTRACT / "robot.wadl").read_bytes()
+        wadl = (CONTRACT_DIR / "robot.wadl").read_bytes()
         host = str(headers.get("Host", "")).encode()
         return Answer(200, wadl.replace(b"127.0.0.1:7003", host), "application/vnd.sun.wadl+xml")
 
