@@ -16,7 +16,8 @@ from click.core import ParameterSource
 from conformance.cli.summary import print_summary
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
-from conformance.contract.pack import DEFAULT_PACK, Contract, ContractError
+from conformance.contract.locating import ContractError
+from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.places import places
 from conformance.contract.requirement_sets import RequirementSetError, judged_by
 from conformance.statement.statement import Statement, StatementError, empty_statement, load_statement

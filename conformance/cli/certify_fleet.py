@@ -14,7 +14,8 @@ from click.core import ParameterSource
 
 from conformance.commandline.result_command import CommandResult
 from conformance.commandline.terminal import inert
-from conformance.contract.pack import Contract, ContractError
+from conformance.contract.locating import ContractError
+from conformance.contract.pack import Contract
 from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, refuse_same_identity
 from conformance.fleet.member_run import Outcome
 

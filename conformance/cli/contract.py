@@ -12,7 +12,8 @@ import click
 from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.classes import Level
 from conformance.contract.ledger import Requirement
-from conformance.contract.pack import DEFAULT_PACK, Contract, ContractError
+from conformance.contract.locating import ContractError
+from conformance.contract.pack import DEFAULT_PACK, Contract
 
 _CONTRACT = click.option(
     "--contract",

@@ -11,7 +11,8 @@ import click
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
-from conformance.contract.pack import DEFAULT_PACK, Contract, ContractError
+from conformance.contract.locating import ContractError
+from conformance.contract.pack import DEFAULT_PACK, Contract
 
 _FORMAT = "roaas-result/1"
 _TIMEOUT_S = 10.0

@@ -53,7 +53,7 @@ class ConformanceClass:
         name: as in claims and requirement ids.
         title: what the class holds, in words.
         interfaces: the interfaces that it judges.
-        one_is_enough: whether one of those interfaces suffices; otherwise each that the contract describes has to answer.
+        one_is_enough: whether one of those interfaces suffices; otherwise each one that is described has to answer.
     """
 
     name: str

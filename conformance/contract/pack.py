@@ -7,13 +7,10 @@ description is judged by what binds every web API.
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import sys
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import import_module
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,36 +18,21 @@ import msgspec
 import yaml
 
 from conformance.contract.classes import FULL, ConformanceClass
+from conformance.contract.generic import LEDGER, ClassEntry, generic_classes, generic_ledger
 from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import LedgerError, Requirement, load_ledger
+from conformance.contract.locating import GENERIC_RULES, MANIFEST, ContractError, folder_of, module_of
 from conformance.contract.sections import TEXT_NAME, Section, cited_in, sections_of
-from conformance.contract.toml_file import Text, TomlFileError, read_toml
+from conformance.contract.toml_file import Text, read_toml
 
 if TYPE_CHECKING:
     from types import ModuleType
 
 #: The pack that is used where none is named.
 DEFAULT_PACK = "table1"
-ENTRY_POINTS = "roaas.packs"
-MANIFEST, LEDGER = "pack.toml", "requirements.toml"
-_SUITE = Path(__file__).parents[1]
-_BUILT_IN = _SUITE / "packs"
-#: What judges any web API: its classes, its ledger, its checks.
-GENERIC_RULES = _SUITE / "rules"
 # libyaml, where PyYAML was built with it, is ten times as fast: a third of a second of each run.
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _OPENAPI_NAMES = ("openapi.yaml", "openapi.yml", "openapi.json")
-
-
-class ContractError(TomlFileError):
-    """A contract pack that cannot be used; the message names the file and what is wrong with it."""
-
-
-class _Class(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    name: Text
-    title: Text | None = None
-    interfaces: tuple[Interface, ...] | None = None
-    one_is_enough: bool = False
 
 
 class _Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -59,15 +41,9 @@ class _Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: Text
     version: Text
     title: Text
-    class_: tuple[_Class, ...] = msgspec.field(name="class")
+    class_: tuple[ClassEntry, ...] = msgspec.field(name="class")
     plugin: Text | None = None
     profiles: dict[str, tuple[str, ...]] = {}
-
-
-class _Classes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """``rules/classes.toml``."""
-
-    class_: tuple[_Class, ...] = msgspec.field(name="class")
 
 
 @dataclass(frozen=True)
@@ -98,12 +74,12 @@ class Contract:
         """Return the pack of a name or in a folder.
 
         Of its files, ``openapi.yaml`` (or .yml, .json), one ``*.wadl``, and at most two ``*.wsdl`` describe the device:
-        the WSDL whose name holds "subscriber" is of the service that only reads, the other one of the service that acts.
+        the WSDL with "subscriber" in its name is of the service that only reads, the other of the service that acts.
 
         Raises:
             ContractError: there is no such pack, or nothing in it describes an interface, or too much does.
         """
-        directory = _folder(pack)
+        directory = folder_of(pack)
         openapi = next((directory / name for name in _OPENAPI_NAMES if (directory / name).is_file()), None)
         wsdls = sorted(directory.glob("*.wsdl"))
         reading = [path for path in wsdls if "subscriber" in path.name.lower()]
@@ -265,7 +241,7 @@ class Contract:
             return None
         named = self.manifest.plugin
         try:
-            return _module_of(self.directory / named) if named.endswith(".py") else import_module(named)
+            return module_of(self.directory / named) if named.endswith(".py") else import_module(named)
         except (ImportError, OSError, SyntaxError) as error:
             raise ContractError(
                 f"{self.directory / MANIFEST}: the plugin {named} cannot be imported: {error}"
@@ -281,60 +257,3 @@ class Contract:
         """The folders with the checks that judge by this contract: the generic suite's, then the pack's own."""
         own = self.directory / "rules"
         return (GENERIC_RULES, own) if own.is_dir() else (GENERIC_RULES,)
-
-
-def built_in_packs() -> tuple[str, ...]:
-    """Return the names of the packs that come with the suite."""
-    return tuple(sorted(path.parent.name for path in _BUILT_IN.glob(f"*/{MANIFEST}")))
-
-
-@cache
-def generic_classes() -> dict[str, ConformanceClass]:
-    """Return the conformance classes that any web API can be judged by, by name."""
-    entries = read_toml(GENERIC_RULES / "classes.toml", _Classes, ContractError).class_
-    return {
-        item.name: ConformanceClass(item.name, item.title or "", item.interfaces or (), item.one_is_enough)
-        for item in entries
-    }
-
-
-@cache
-def generic_ledger() -> dict[str, Requirement]:
-    """Return the requirements that bind every web API, by id."""
-    return load_ledger(GENERIC_RULES / LEDGER, generic_classes())
-
-
-def _folder(pack: Path | str) -> Path:
-    """Return the folder of a pack.
-
-    Raises:
-        ContractError: there is none.
-    """
-    name = str(pack)
-    if name in built_in_packs():
-        return _BUILT_IN / name
-    if Path(pack).is_dir():
-        return Path(pack)
-    for entry in entry_points(group=ENTRY_POINTS, name=name):
-        found = importlib.util.find_spec(entry.module)
-        if found is not None and found.submodule_search_locations:
-            return Path(next(iter(found.submodule_search_locations)))
-    installed = sorted(entry.name for entry in entry_points(group=ENTRY_POINTS))
-    raise ContractError(
-        f"{name} is neither a folder nor a contract pack; --contract takes a folder with openapi.yaml and/or *.wsdl "
-        f"in it, or one of {', '.join([*built_in_packs(), *installed])}"
-    )
-
-
-def _module_of(path: Path) -> ModuleType:
-    """Import a module from its file, once in a process."""
-    name = f"roaas_pack_{path.resolve().parent.name}_{path.stem}"
-    if name in sys.modules:
-        return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{path} is no Python module")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module

@@ -9,7 +9,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from conformance.contract.pack import GENERIC_RULES, LEDGER
+from conformance.contract.generic import LEDGER
+from conformance.contract.locating import GENERIC_RULES
 
 if TYPE_CHECKING:
     from conformance.contract.pack import Contract

@@ -1,8 +1,8 @@
 """Frozen sets of requirements: a robot judged by one stays judged by it, whatever a later suite adds.
 
-``sets/NAME.toml`` of a pack holds id, level and digest of the text of each requirement of a set, and never changes once it is
-published; ``python -m conformance.contract.freeze NAME`` writes one from the ledger. A suite's ledger keeps what is in
-a set as it was; what is newer is in none until the next set is frozen.
+``sets/NAME.toml`` of a pack holds id, level and text digest of each requirement. It never changes once it is published.
+``python -m conformance.contract.freeze NAME`` writes one from the ledger. A newer requirement is in no set until
+the next one is frozen.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 from urllib.parse import unquote
 
-from conformance.contract.pack import Contract, ContractError
+from conformance.contract.locating import ContractError
+from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, opened, resolved
 
 METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace")

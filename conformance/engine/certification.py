@@ -6,13 +6,11 @@ import datetime as dt
 import os
 import sys
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import pytest
 
-from conformance.api.device import fixtures_of
 from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.intermittent import look_again
@@ -138,7 +136,7 @@ def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[st
             environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
             environment.delenv("PYTEST_ADDOPTS", raising=False)
             folders = map(str, robot.run.contract.rules)
-            plugins = [ChecksPlugin(lambda: robot), teller, *map(import_module, fixtures_of(robot.run.contract))]
+            plugins = [ChecksPlugin(lambda: robot, lambda: robot.run.contract), teller]
             code = pytest.main([*folders, *options], plugins=plugins)
     except Exception as error:  # noqa: BLE001 - whatever breaks, what was judged until then is not lost
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")

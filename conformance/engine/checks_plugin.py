@@ -5,6 +5,7 @@ One object, given to pytest, is all that connects a run with its checks.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
@@ -15,11 +16,13 @@ from conformance.contract.ledger import expanded
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
+    from pathlib import Path
 
     from conformance.api.interfaces import Interfaces
     from conformance.api.rest.interface import RestInterface
     from conformance.api.soap.callable_services import SoapServices
     from conformance.api.soap.service import SoapService
+    from conformance.contract.pack import Contract
     from conformance.engine.robot_under_test import RobotUnderTest
     from conformance.statement.statement import Statement
     from conformance.transport.client import Connection, HttpClient
@@ -62,11 +65,13 @@ class ChecksPlugin:
     """A pytest plugin for one run.
 
     Args:
-        connect: gives the robot, connected; called once, and only when there is a check to run.
+        connect: returns the robot, connected; called once, and only when there is a check to run.
+        contract: returns the pack to judge by; called when the first file with checks is collected.
     """
 
-    def __init__(self, connect: Callable[[], RobotUnderTest]) -> None:
-        self._connect = connect
+    def __init__(self, connect: Callable[[], RobotUnderTest], contract: Callable[[], Contract]) -> None:
+        self._connect, self._contract = connect, contract
+        self._has_fixtures = False
         self._connected: RobotUnderTest | None = None
 
     def _robot(self) -> RobotUnderTest:
@@ -85,6 +90,17 @@ class ChecksPlugin:
         config.addinivalue_line("markers", "phase(name): when in a run a check's turn comes")
         config.addinivalue_line("markers", "motion: the check moves the robot")
         config.addinivalue_line("markers", "needs(*interfaces): rest, publishers, subscribers")
+
+    def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> None:
+        """Register the fixtures of the checks before the first file with checks is collected."""
+        if self._has_fixtures or file_path.parent.parent.name != "rules":
+            return
+        self._has_fixtures = True
+        # Imported late: the plugin is loaded in every pytest run where the suite is installed.
+        from conformance.api.device import fixtures_of  # noqa: PLC0415
+
+        for name in ("conformance.rules.fixtures", *fixtures_of(self._contract())):
+            parent.config.pluginmanager.register(import_module(name), name)
 
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         """Keep the checks that judge something claimed, in the order of their phases."""

@@ -12,6 +12,7 @@ from conformance.engine.checks_plugin import ChecksPlugin
 if TYPE_CHECKING:
     import pytest
 
+    from conformance.contract.pack import Contract
     from conformance.engine.robot_under_test import RobotUnderTest
 
 
@@ -38,4 +39,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
         return robot_from_options(config)
 
-    config.pluginmanager.register(ChecksPlugin(connect), "roaas-checks")
+    def contract() -> Contract:
+        from conformance.contract.pack import DEFAULT_PACK, Contract  # noqa: PLC0415 - see the module's docstring
+
+        return Contract.load(config.getoption("robot_contract") or DEFAULT_PACK)
+
+    config.pluginmanager.register(ChecksPlugin(connect, contract), "roaas-checks")

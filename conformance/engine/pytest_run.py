@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import msgspec
 import pytest
 
-from conformance.contract.pack import DEFAULT_PACK, Contract, ContractError
+from conformance.contract.locating import ContractError
+from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.statement import StatementError, empty_statement, load_statement
 from conformance.transport.client import Connection

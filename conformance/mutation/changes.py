@@ -17,7 +17,7 @@ Make = Callable[[], Change]
 
 JSON = "application/json"
 SOAP = "http://schemas.xmlsoap.org/soap/envelope/"
-_SUCCESS = range(200, 300)
+_SUCCESS, _REFUSED = range(200, 300), range(400, 500)
 
 
 def rest(method: str = "", *paths: str) -> Where:
@@ -72,7 +72,7 @@ def status(*values: int) -> When:
 
 def refusal(response: Response) -> bool:
     """Answers with 4xx."""
-    return 400 <= response.status < 500
+    return response.status in _REFUSED
 
 
 def anything(_answer: Response) -> bool:

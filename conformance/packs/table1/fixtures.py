@@ -1,4 +1,4 @@
-"""What goes along with every check of the paper's robot: its clock, the ROS probe, and the robot itself."""
+"""pytest fixtures of every run on the paper's robot: its clock, the ROS probe, and the robot itself."""
 
 from collections.abc import Iterator
 from contextlib import suppress

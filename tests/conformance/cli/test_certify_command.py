@@ -9,13 +9,11 @@ import threading
 import time
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import pytest
 
-from conformance import selftest
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import current, load_set
 from conformance.packs.table1.files import CONTRACT_DIR
@@ -23,7 +21,7 @@ from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, statement
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate
 from reports.attestation.statement import seed_of
 
-_INDEPENDENT_ROBOTS = Path(selftest.__file__).parent / "independent_robots"
+_INDEPENDENT_ROBOTS = CONTRACT_DIR / "independent_robots"
 
 
 def _certify(tmp_path, *arguments):
@@ -63,7 +61,7 @@ def test_what_the_run_was_given_stands_in_the_result(tmp_path, closed_port):
     _, result = _certify(tmp_path, str(statement), "--baseline", str(baseline))
     assert result["digests"]["statement"] == f"sha256:{hashlib.sha256(statement.read_bytes()).hexdigest()}"
     assert result["baseline"] == {"digest": f"sha256:{hashlib.sha256(b'').hexdigest()}"}
-    assert result["requirement_set"] == current(Contract.load().ledger).told
+    assert result["requirement_set"] == current(Contract.load(), Contract.load().ledger).told
     openapi = (CONTRACT_DIR / "openapi.yaml").read_bytes()
     assert result["digests"]["contract"]["openapi.yaml"] == f"sha256:{hashlib.sha256(openapi).hexdigest()}"
 
@@ -233,7 +231,7 @@ def test_the_suite_runs_in_somebody_elses_project(tmp_path):
 
 def test_a_frozen_set_is_what_a_run_is_scored_by(tmp_path, closed_port):
     _, result = _certify(tmp_path, "--rest", closed_port, "--requirements", "1.1")
-    assert result["requirement_set"] == load_set("1.1").told
+    assert result["requirement_set"] == load_set(Contract.load(), "1.1").told
     done, _ = _certify(tmp_path, "--rest", closed_port, "--requirements", "0.9")
     assert done.returncode == 2
     assert "'0.9'" in done.stderr

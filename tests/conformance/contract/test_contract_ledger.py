@@ -2,8 +2,10 @@
 
 import pytest
 
+from conformance.contract.generic import generic_classes, generic_ledger
 from conformance.contract.ledger import LedgerError, load_ledger
-from conformance.contract.pack import Contract, ContractError, generic_classes, generic_ledger
+from conformance.contract.locating import ContractError
+from conformance.contract.pack import Contract
 
 CONTRACT = Contract.load()
 LEDGER, CLASSES = CONTRACT.ledger, CONTRACT.classes

@@ -31,7 +31,7 @@ def test_a_contract_of_ones_own_has_no_set(tmp_path):
     (tmp_path / "openapi.yaml").write_bytes((CONTRACT_DIR / "openapi.yaml").read_bytes())
     own = Contract.load(tmp_path)
     assert judged_by(own, None) is None
-    with pytest.raises(RequirementSetError, match="has no pack.toml"):
+    with pytest.raises(RequirementSetError, match=r"has no pack\.toml"):
         judged_by(own, "1.1")
 
 

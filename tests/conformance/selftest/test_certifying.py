@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from conformance.contract.pack import Contract, ContractError
+from conformance.contract.locating import ContractError
+from conformance.contract.pack import Contract
 from conformance.selftest.certifying import Job, Outcome, robot_of, run_job
 from conformance.selftest.robots import statement_of
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from conformance.contract.classes import Level
+from conformance.contract.pack import Contract
 from conformance.packs.table1.mutants import MUTANTS
 from conformance.selftest import coverage
 

@@ -74,7 +74,7 @@ def test_a_full_statement(tmp_path):
         ("[endpoints]\ntimeout_s = -1", "[endpoints] timeout_s = -1 must be a positive number"),
         ("[claims]\nprofile = 'half'", "[claims] profile = 'half' must be one of paper, full"),
         ("[claims]\nclasses = ['rest']", "[claims] classes[0] = 'rest' must be one of rest-resources, rest-delivery,"),
-        ("[claims]\nclasses = 'http'", "[claims] classes = 'http' must be a list, each item one of rest-resources,"),
+        ("[claims]\nclasses = 'http'", "[claims] classes = 'http' must be a list, each item a string"),
         ("[limits]\nlinear_m_s = 'fast'", "[limits] linear_m_s = 'fast' must be a number, and not negative"),
         ("[limits]\nlinear_m_s = true", "[limits] linear_m_s = True must be a number, and not negative"),
         ("[limits]\nsettle_s = nan", "[limits] settle_s = nan must be a number from 0 to 5"),
@@ -106,7 +106,7 @@ def test_a_wrong_statement_is_refused_by_name(tmp_path, text, message):
 
 def test_a_statement_that_is_not_there(tmp_path):
     with pytest.raises(StatementError, match=r"robot\.toml cannot be read: No such file"):
-        load_statement(tmp_path / "robot.toml")
+        load_statement(tmp_path / "robot.toml", CONTRACT)
 
 
 def test_a_figure_is_declared_when_the_statement_names_it_whatever_its_value(tmp_path):
@@ -148,7 +148,7 @@ def test_without_claims_the_classes_follow_from_the_addresses():
     only_rest = Statement(endpoints=Endpoints(rest="http://r2"))
     # What judges several interfaces is not judged by one of them: that would be milder than to claim it.
     assert only_rest.claimed(CONTRACT) == ("rest-resources", "rest-delivery", "rest-formats", "http", "safety")
-    assert only_rest.lacking()["strict-input"] == ("publishers", "subscribers")
+    assert only_rest.lacking(CONTRACT)["strict-input"] == ("publishers", "subscribers")
     assert "strict-input" in only_rest.claimed(ONLY_REST)
     assert "soap-delivery" not in only_rest.claimed(ONLY_REST)
     both = Endpoints(rest="http://r2", publishers_wsdl="x", subscribers_wsdl="y")

@@ -2,7 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from conformance.contract.pack import Contract, ContractError
+from conformance.contract.locating import ContractError
+from conformance.contract.pack import Contract
 from conformance.documents.openapi import known_path, matching, operations_of, resources_of
 
 LIBRARY = Contract.load(Path(__file__).parent.parent / "data" / "library-contract")

@@ -1,5 +1,6 @@
 import pytest
 
+from conformance.api.device import Device
 from conformance.api.rest.calls import example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import validity
@@ -54,10 +55,10 @@ def test_requests_are_judged_by_what_they_are_on_the_wire(method, target, media_
     assert (found.verdict, found.requirement) == (verdict, requirement)
 
 
-class _Careless:
-    """A domain that fits a value to a robot by breaking it."""
+class _Careless(Device):
+    """A device that fits a value to a robot by breaking it."""
 
-    def fit(self, _id, value):
+    def fit(self, _api, _id, value):
         return {**value, "w": 1} if "linear" in value else value
 
 
@@ -65,6 +66,6 @@ def test_a_mistake_of_a_generator_is_the_suite_s():
     api = RestInterface(Run(), HttpClient("http://r2", Connection()))
     (operation,) = (item for item in operations_of(CONTRACT) if item.id == "putVelocity")
     assert example_call(api, operation).body
-    api.domain = _Careless()
+    api.device = _Careless(api.run)
     with pytest.raises(HarnessError, match="was made as a valid request, and is none"):
         example_call(api, operation)

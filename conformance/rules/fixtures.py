@@ -1,4 +1,4 @@
-"""What goes along with every check: the observers, which judge each exchange of every check."""
+"""pytest fixtures of every run: the observers, which judge each exchange of every check."""
 
 import importlib
 import threading

@@ -1,0 +1,46 @@
+"""What any web API is judged by: the generic suite's conformance classes and requirements."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import msgspec
+
+from conformance.contract.classes import ConformanceClass
+from conformance.contract.interfaces import Interface
+from conformance.contract.ledger import Requirement, load_ledger
+from conformance.contract.locating import GENERIC_RULES, ContractError
+from conformance.contract.toml_file import Text, read_toml
+
+LEDGER = "requirements.toml"
+
+
+class ClassEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A conformance class as ``classes.toml`` and ``pack.toml`` have it."""
+
+    name: Text
+    title: Text | None = None
+    interfaces: tuple[Interface, ...] | None = None
+    one_is_enough: bool = False
+
+
+class _Classes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """``rules/classes.toml``."""
+
+    class_: tuple[ClassEntry, ...] = msgspec.field(name="class")
+
+
+@cache
+def generic_classes() -> dict[str, ConformanceClass]:
+    """Return the conformance classes that any web API can be judged by, by name."""
+    entries = read_toml(GENERIC_RULES / "classes.toml", _Classes, ContractError).class_
+    return {
+        item.name: ConformanceClass(item.name, item.title or "", item.interfaces or (), item.one_is_enough)
+        for item in entries
+    }
+
+
+@cache
+def generic_ledger() -> dict[str, Requirement]:
+    """Return the requirements that bind every web API, by id."""
+    return load_ledger(GENERIC_RULES / LEDGER, generic_classes())

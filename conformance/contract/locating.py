@@ -1,0 +1,67 @@
+"""Where a contract pack is: a folder, a name that comes with the suite, or an installed package's entry point."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from conformance.contract.toml_file import TomlFileError
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+#: The group of entry points by which an installed package offers a pack.
+ENTRY_POINTS = "roaas.packs"
+MANIFEST = "pack.toml"
+_SUITE = Path(__file__).parents[1]
+_BUILT_IN = _SUITE / "packs"
+#: What judges any web API: its classes, its ledger, its checks.
+GENERIC_RULES = _SUITE / "rules"
+
+
+class ContractError(TomlFileError):
+    """A contract pack that cannot be used; the message names the file and what is wrong with it."""
+
+
+def built_in_packs() -> tuple[str, ...]:
+    """Return the names of the packs that come with the suite."""
+    return tuple(sorted(path.parent.name for path in _BUILT_IN.glob(f"*/{MANIFEST}")))
+
+
+def folder_of(pack: Path | str) -> Path:
+    """Return the folder of a pack.
+
+    Raises:
+        ContractError: there is none.
+    """
+    name = str(pack)
+    if name in built_in_packs():
+        return _BUILT_IN / name
+    if Path(pack).is_dir():
+        return Path(pack)
+    for entry in entry_points(group=ENTRY_POINTS, name=name):
+        found = importlib.util.find_spec(entry.module)
+        if found is not None and found.submodule_search_locations:
+            return Path(next(iter(found.submodule_search_locations)))
+    installed = sorted(entry.name for entry in entry_points(group=ENTRY_POINTS))
+    raise ContractError(
+        f"{name} is neither a folder nor a contract pack; --contract takes a folder with openapi.yaml and/or *.wsdl "
+        f"in it, or one of {', '.join([*built_in_packs(), *installed])}"
+    )
+
+
+def module_of(path: Path) -> ModuleType:
+    """Import a module from its file, once in a process."""
+    name = f"roaas_pack_{path.resolve().parent.name}_{path.stem}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} is no Python module")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
