@@ -92,6 +92,7 @@ _OBJECTS = 20_000
     show_default=True,
     help="Folder for the results.",
 )
+@click.option("--plan", is_flag=True, help="Print what would be done in which order; send nothing.")
 @click.option("--fleet", type=_FILE, metavar="FILE", help="Judge many robots, each in a process of its own (TOML).")
 @click.option(
     "--parallel", type=click.IntRange(min=1), metavar="N", help="With --fleet: at most N robots at once.  [default: 4]"
@@ -131,6 +132,8 @@ def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> Comma
             _check_nonce(options["nonce"])
         # Before the run: what cannot be signed by this key is told at once.
         notary = door.notary(Path(options["key"])) if options["key"] else None
+        if options["plan"]:
+            return _plan(chosen, options, contract)
         outcome = _certify(chosen, options, contract, statement)
     except (StatementError, ContractError) as error:
         raise click.UsageError(str(error)) from error
@@ -181,6 +184,16 @@ def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
     return (*contract.profiles.get(options["profile"] or "", ()), *options["classes"])
 
 
+def _plan(chosen: Statement, options: dict[str, Any], contract: Contract) -> CommandResult:
+    """Print the plan of a run."""
+    from conformance.engine.planning import plan_of  # noqa: PLC0415 - only --plan needs it
+    from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415 - as above
+
+    for line in plan_of(RobotUnderTest(_run(chosen, options, contract))):
+        click.echo(line)
+    return CommandResult(ExitCode.PASSED)
+
+
 def _init(path: Path | None, chosen: Statement, contract: Contract, *, force: bool) -> CommandResult:
     from conformance.engine.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
 
@@ -210,7 +223,7 @@ def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, sta
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.engine.suite import file_digest  # noqa: PLC0415
     from conformance.verdict.baseline import BaselineError, load_baseline  # noqa: PLC0415
-    from conformance.verdict.run import Given, Run, seed_of_nonce  # noqa: PLC0415
+    from conformance.verdict.run import Given  # noqa: PLC0415
 
     # A run makes many objects that live for a moment, and few that are garbage in circles: looking for those less often
     # than every 700 objects saves a twentieth of its processor time.
@@ -229,20 +242,26 @@ def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, sta
         )
     except (OSError, BaselineError, RequirementSetError) as error:
         raise StatementError(str(error)) from error
-    run = Run(
-        statement=chosen,
-        contract=contract,
-        allow_motion=options["allow_motion"],
-        seed=options["seed"] if options["nonce"] is None else seed_of_nonce(options["nonce"]),
-        requirement_set=requirements,
-        given=given,
-        effort=Effort(options["effort"], minutes=options["minutes"]),
-    )
-    known = {item.class_ for item in contract.ledger.values()}
-    run.claims = tuple(name for name in chosen.claimed(contract) if name in known)
+    run = _run(chosen, options, contract)
+    run.requirement_set, run.given = requirements, given
     notes = _notes(run)
     command = shlex.join(["roaas", *sys.argv[1:]])
     return judge(RobotUnderTest(run, connection), options["out"], command=command, baseline=baseline, notes=notes)
+
+
+def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
+    """Return the run that the options ask for."""
+    from conformance.verdict.run import Run, seed_of_nonce  # noqa: PLC0415 - see _certify
+
+    known = {item.class_ for item in contract.ledger.values()}
+    return Run(
+        statement=chosen,
+        contract=contract,
+        claims=tuple(name for name in chosen.claimed(contract) if name in known),
+        allow_motion=options["allow_motion"],
+        seed=options["seed"] if options["nonce"] is None else seed_of_nonce(options["nonce"]),
+        effort=Effort(options["effort"], minutes=options["minutes"]),
+    )
 
 
 def _notes(run: Run) -> tuple[str, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.intermittent import look_again
 from conformance.engine.interruption import remembered
+from conformance.engine.planning import pytest_options
 from conformance.engine.progress import Progress
 from conformance.engine.result import result_document, write_result
 from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from conformance.engine.robot_under_test import RobotUnderTest
     from conformance.verdict.run import Run
     from conformance.verdict.verdicts import Verdict
-_SUITE = Path(__file__).parents[1]
 
 
 @dataclass(frozen=True)
@@ -128,16 +127,13 @@ def draw_verdicts(run: Run) -> list[Verdict]:
 def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str]) -> bool:
     """Run pytest over the checks, and nothing of the folder that the user happens to be in; True when interrupted."""
     teller = Progress(robot, progress)
-    options = [f"--config-file={os.devnull}", f"--rootdir={_SUITE}", "--import-mode=importlib", "--capture=no"]
-    unused = ("terminal", "cacheprovider", "logging", "junitxml", "unraisableexception", "threadexception")
-    options += ["-Wignore", "--assert=plain", *(f"-pno:{name}" for name in unused)]
     try:
         with pytest.MonkeyPatch.context() as environment:
             environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
             environment.delenv("PYTEST_ADDOPTS", raising=False)
             folders = map(str, robot.run.contract.rules)
             plugins = [ChecksPlugin(lambda: robot, lambda: robot.run.contract), teller]
-            code = pytest.main([*folders, *options], plugins=plugins)
+            code = pytest.main([*folders, *pytest_options()], plugins=plugins)
     except Exception as error:  # noqa: BLE001 - whatever breaks, what was judged until then is not lost
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
         robot.run.aborted = robot.run.aborted or "the suite itself failed"

@@ -13,6 +13,8 @@ import pytest
 from conformance.contract.classes import Level
 from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import expanded
+from conformance.scenarios.plan import Step, ordered
+from conformance.scenarios.stage import STAGES, Stage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -31,15 +33,6 @@ if TYPE_CHECKING:
     from conformance.verdict.explorer import Explorer
     from conformance.verdict.run import Run
 
-# Reading first; then the drive that takes longest, what else drives the robot, and what has to leave it at rest, which
-# one watch shows of all: meanwhile, reading that needs a robot at rest. Deliveries late, because a robot drives long
-# after them, and of these last those whose messages are counted, when those of the others have arrived: meanwhile,
-# reading again. Then what is no delivery, while it is seen whether more comes of them; attacks that are one last.
-PHASES = (
-    *("reach", "reading", "drive", "motion", "standstill", "resting", "stays", "input"),
-    *("delivery", "silence", "effect", "arrival", "describe", "aside", "late", "attack", "last"),
-)
-
 _NO_ADDRESS = "the robot's {} interface has no address"
 _Interface = TypeVar("_Interface")
 
@@ -47,12 +40,6 @@ _Interface = TypeVar("_Interface")
 def is_check(item: pytest.Item) -> bool:
     """Return whether a test judges requirements."""
     return item.get_closest_marker("requirement") is not None
-
-
-def _turn(item: pytest.Item) -> tuple[int, str]:
-    """When a check's turn comes: by its phase, then by its module's name, whichever folder that is in."""
-    mark = item.get_closest_marker("phase")
-    return PHASES.index(mark.args[0]) if mark else 0, item.path.name
 
 
 def _there(interface: _Interface | None, name: Interface) -> _Interface:
@@ -84,10 +71,22 @@ class ChecksPlugin:
         marked = (id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
         return expanded(marked, self._robot().run.contract.ledger)
 
+    def step_of(self, item: pytest.Item) -> Step:
+        """Return a check's step in the plan."""
+        stage, scenario = item.get_closest_marker("phase"), item.get_closest_marker("scenario")
+        return Step(
+            name=item.name.removeprefix("test_").replace("_", " "),
+            stage=Stage(stage.args[0]) if stage else STAGES[0],
+            requirements=self.ids_of(item),
+            scenario=scenario.args[0] if scenario else None,
+            moves=item.get_closest_marker("motion") is not None,
+        )
+
     def pytest_configure(self, config: pytest.Config) -> None:
         """Register the markers."""
         config.addinivalue_line("markers", "requirement(*ids): the requirements that a check judges")
         config.addinivalue_line("markers", "phase(name): when in a run a check's turn comes")
+        config.addinivalue_line("markers", "scenario(scenario): whose trace a rule judges")
         config.addinivalue_line("markers", "motion: the check moves the robot")
         config.addinivalue_line("markers", "needs(*interfaces): rest, publishers, subscribers")
 
@@ -98,7 +97,9 @@ class ChecksPlugin:
         self._has_fixtures = True
         # Imported late: the plugin is loaded in every pytest run where the suite is installed.
         from conformance.api.device import fixtures_of  # noqa: PLC0415
+        from conformance.scenarios.collecting import RulesPlugin  # noqa: PLC0415
 
+        parent.config.pluginmanager.register(RulesPlugin(), "roaas-rules")
         for name in ("conformance.rules.fixtures", *fixtures_of(self._contract())):
             parent.config.pluginmanager.register(import_module(name), name)
 
@@ -112,7 +113,9 @@ class ChecksPlugin:
         kept = [item for item in items if not is_check(item) or not claimed.isdisjoint(self.ids_of(item))]
         dropped = [item for item in items if item not in kept]
         config.hook.pytest_deselected(items=dropped)
-        items[:] = sorted(kept, key=_turn)
+        steps = [(self.step_of(item), item) for item in kept]
+        turns = {id(step): number for number, step in enumerate(ordered([step for step, _ in steps], ledger))}
+        items[:] = [item for _, item in sorted(steps, key=lambda pair: turns[id(pair[0])])]
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> None:

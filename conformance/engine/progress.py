@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TextIO
 import pytest
 
 from conformance.contract.classes import Level
-from conformance.engine.checks_plugin import PHASES
+from conformance.scenarios.stage import STAGES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +36,7 @@ class Progress:
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
         """Say where the run is, when a phase begins and when there was nothing to read for a while."""
         mark = item.get_closest_marker("phase")
-        phase = mark.args[0] if mark else PHASES[0]
+        phase = mark.args[0] if mark else STAGES[0]
         now = time.monotonic()
         if phase != self._phase or now - self._told > _OFTEN_S:
             self._phase, self._told = phase, now

@@ -14,7 +14,18 @@ _PACKAGE = Path(__file__).parents[1]
 # The rooms that decide what is asked and what is said of it.
 # The folders of a pack that only its self-test uses.
 _SELFTEST = {"mutants", "faulty_bodies", "independent_robots"}
-JUDGING = ("contract", "statement", "transport", "documents", "verdict", "api", "rules", "engine")
+JUDGING = (
+    "contract",
+    "statement",
+    "transport",
+    "documents",
+    "verdict",
+    "observe",
+    "api",
+    "scenarios",
+    "rules",
+    "engine",
+)
 
 
 def installed(name: str) -> str:

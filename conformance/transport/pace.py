@@ -1,7 +1,6 @@
 """How fast a robot answers, and how much of a wait was the network's and not the robot's."""
 
 import threading
-import time
 
 # A link that carries fewer octets a second is none; so much longer may an exchange take, octet by octet.
 _SLOWEST_OCTETS_PER_S = 256 * 1024
@@ -9,8 +8,6 @@ _SLOWEST_OCTETS_PER_S = 256 * 1024
 _UNDER_WAY = 1024 * 1024
 # An answer is late when it takes twice the usual time and this much more, s: a segment that was lost and sent again.
 _LATE_S = 0.1
-# A robot that is always late does not get all the time in the world, s.
-_MOST_GIVEN_BACK_S = 5.0
 
 
 def time_for(octets: int) -> float:
@@ -50,23 +47,3 @@ class Pace:
         """By how much answers have been late so far, all together, s."""
         with self._lock:
             return self._lateness_s
-
-
-class Patience:
-    """A wait for what a robot has a time for: what late answers take of it is given back.
-
-    Args:
-        pace: of the robot.
-        seconds: how long the robot has, from now on.
-    """
-
-    def __init__(self, pace: Pace, seconds: float) -> None:
-        self._pace = pace
-        self._until = time.monotonic() + seconds
-        self._lateness_s = pace.lateness_s
-
-    @property
-    def over(self) -> bool:
-        """Whether the robot has had its time."""
-        given_back = min(self._pace.lateness_s - self._lateness_s, _MOST_GIVEN_BACK_S)
-        return time.monotonic() > self._until + given_back

@@ -5,10 +5,11 @@ import time
 
 import pytest
 
+from conformance.observe.polling import Patience
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError
-from conformance.transport.pace import Pace, Patience
+from conformance.transport.pace import Pace
 
 _OK = b"HTTP/1.1 204 No Content\r\n\r\n"
 

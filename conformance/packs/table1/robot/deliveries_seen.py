@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
 from conformance.api.rest.interface import RestInterface
+from conformance.observe.polling import Patience
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.message_shapes import read_as
@@ -12,7 +13,6 @@ from conformance.packs.table1.robot.probe.client import Probe, ProbeError, RosPr
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
 from conformance.packs.table1.statement import said_of
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.pace import Patience
 
 # How long messages are waited for, and how long after the last one another is still looked for, s.
 _ARRIVES_S: Final = 2.0

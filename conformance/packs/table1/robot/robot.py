@@ -13,12 +13,12 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import projected
+from conformance.observe.polling import Patience
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
 from conformance.packs.table1.statement import said_of
 from conformance.transport.exchange import Exchange
-from conformance.transport.pace import Patience
 
 POSE: Final = "/robot/pose/"
 VELOCITY: Final = "/robot/velocity/"

@@ -8,12 +8,13 @@ from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_text import read_json
+from conformance.observe.polling import Patience
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, GOAL_PATH, JSON_BODY, POSE, STILL, VELOCITY, Velocity
 from conformance.packs.table1.statement import said_of
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Response
-from conformance.transport.pace import Pace, Patience
+from conformance.transport.pace import Pace
 
 # A robot with a queue of missions starts the next one when the first is cancelled: cancel again for so long, s.
 _CANCEL_S: Final = 3.0

@@ -13,6 +13,7 @@ from conformance.api.soap.valid_messages import call_valid
 from conformance.contract.interfaces import Interface
 from conformance.documents.xml_names import ENVELOPE, clark
 from conformance.documents.xml_node import Node
+from conformance.observe.polling import Patience
 from conformance.packs.table1.robot import delivery_messages
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import goal_body, put_goal
@@ -22,7 +23,6 @@ from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.packs.table1.statement import said_of
 from conformance.transport.client import HttpClient
-from conformance.transport.pace import Patience
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 

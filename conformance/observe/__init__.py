@@ -1,0 +1,1 @@
+"""Watching a device: one clock, one way to poll."""

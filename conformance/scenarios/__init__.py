@@ -1,0 +1,1 @@
+"""Scenarios record what a device does, rules judge the record, a planner orders them."""

@@ -1,0 +1,55 @@
+"""How pytest collects rules: each is a check that has its scenario played once, and judges the trace."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from conformance.scenarios.rule import Case, Rule, record
+from conformance.scenarios.scenario import Recordings
+from conformance.scenarios.stage import Need
+
+if TYPE_CHECKING:
+    from conformance.verdict.evidence import Judge
+
+
+class RulesPlugin:
+    """A pytest plugin for one run."""
+
+    def __init__(self) -> None:
+        self.recordings = Recordings()
+
+    def pytest_pycollect_makeitem(
+        self, collector: pytest.Module | pytest.Class, name: str, obj: object
+    ) -> list[pytest.Item] | None:
+        """Make a check of a rule that a module defines."""
+        if not isinstance(obj, Rule) or obj.judge.__module__ != collector.obj.__name__:
+            return None
+        needs = obj.on.needs
+        marks = [
+            pytest.mark.requirement(obj.requirement),
+            pytest.mark.phase(obj.on.stage),
+            pytest.mark.scenario(obj.on),
+        ]
+        marks += [pytest.mark.motion] if Need.MOTION in needs else []
+        marks += [pytest.mark.needs(*(str(one) for one in needs - {Need.MOTION}))]
+        item = pytest.Function.from_parent(collector, name=name, callobj=self._check_of(obj))
+        for mark in marks:
+            item.add_marker(mark)
+        return [item]
+
+    def _check_of(self, rule: Rule) -> Any:
+        recordings = self.recordings
+
+        def check(request: pytest.FixtureRequest, judge: Judge) -> None:
+            recording = recordings.of(rule.on, request.getfixturevalue)
+            if recording.reason:
+                judge.skip(rule.requirement, recording.reason)
+                return
+            outcomes = [] if recording.trace is None else rule.outcomes(recording.trace, request.getfixturevalue)
+            record(judge, rule.requirement, outcomes)
+            if recording.error is not None and not any(isinstance(one, Case) for one in outcomes):
+                raise recording.error
+
+        return check

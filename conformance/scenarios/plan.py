@@ -1,0 +1,70 @@
+"""The plan of a run: which scenario or check has its turn when. It depends on no file's name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from conformance.scenarios.scenario import Scenario
+from conformance.scenarios.stage import STAGES, Stage
+
+
+@dataclass(frozen=True)
+class Step:
+    """One check, or one rule with its scenario.
+
+    Attributes:
+        name: of the check.
+        stage: when its turn comes.
+        requirements: ids that it judges.
+        scenario: whose trace it judges; None for a check that talks to the device itself.
+        moves: whether it may move the device.
+    """
+
+    name: str
+    stage: Stage
+    requirements: tuple[str, ...]
+    scenario: Scenario | None = None
+    moves: bool = False
+
+
+def turn_of(step: Step, ranks: Mapping[str, int]) -> tuple[int, int, str, str]:
+    """Return the key by which steps are sorted: stage, place of its first requirement in the ledger, scenario, name.
+
+    The rules of a scenario follow each other, so that a trace is judged where it was recorded.
+
+    Args:
+        step: which.
+        ranks: the place of each requirement in the ledger; of a scenario by its name, that of its first requirement.
+    """
+    first = min((ranks.get(id_, len(ranks)) for id_ in step.requirements), default=len(ranks))
+    if step.scenario is not None:
+        first = ranks.get(step.scenario.name, first)
+    return STAGES.index(step.stage), first, step.scenario.name if step.scenario else "", step.name
+
+
+def ordered(steps: Iterable[Step], ledger: Iterable[str]) -> list[Step]:
+    """Return steps in the order of their turns."""
+    steps, ranks = list(steps), {id_: number for number, id_ in enumerate(ledger)}
+    for step in steps:
+        if step.scenario is not None:
+            first = min((ranks.get(id_, len(ranks)) for id_ in step.requirements), default=len(ranks))
+            ranks[step.scenario.name] = min(first, ranks.get(step.scenario.name, first))
+    return sorted(steps, key=lambda step: turn_of(step, ranks))
+
+
+def told(steps: Sequence[Step]) -> list[str]:
+    """Return a plan in lines, stage by stage: scenarios with how they leave the device, checks by their names."""
+    lines: list[str] = []
+    stage, scenario = None, ""
+    for step in steps:
+        if step.stage != stage:
+            stage, scenario = step.stage, ""
+            lines.append(f"{stage}:")
+        if step.scenario is not None and step.scenario.name != scenario:
+            scenario = step.scenario.name
+            lines.append(f"  scenario {scenario}: {step.scenario.summary} Leaves the device {step.scenario.leaves}.")
+        indent = "    judges" if step.scenario else "  check"
+        moves = " (may move the device)" if step.moves and step.scenario is None else ""
+        lines.append(f"{indent} {step.name}{moves}: {', '.join(step.requirements)}")
+    return lines
