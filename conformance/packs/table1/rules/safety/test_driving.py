@@ -3,8 +3,10 @@
 from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
+from conformance.packs.table1.robot.goal_trace import GoalLife
 from conformance.packs.table1.robot.letting_go import ends_by
 from conformance.packs.table1.robot.robot import Robot
+from conformance.packs.table1.scenarios.goal_life import goal_life
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.scenarios.turn import turn
@@ -101,3 +103,10 @@ def watchdog(trace: Driven, robot: Robot) -> Iterator[Outcome]:
             str(last.turns[-1].velocity or ""),
             "goes on",
         )
+
+
+@rule("safety/cancel", on=(goal_life,))
+def cancel(trace: GoalLife, run: Run) -> Iterator[Outcome]:
+    """Judge that the robot stands still when its goal was cancelled."""
+    for one in trace.cancelled:
+        yield from outcomes("safety/cancel", one.drive, said_of(run).limits)
