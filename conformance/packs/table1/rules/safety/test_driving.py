@@ -4,8 +4,6 @@ from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
 from conformance.packs.table1.robot.goal_trace import GoalLife
-from conformance.packs.table1.robot.letting_go import ends_by
-from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.scenarios.goal_life import goal_life
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven
@@ -92,14 +90,14 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 
 @rule("safety/watchdog", on=(turn,))
-def watchdog(trace: Driven, robot: Robot) -> Iterator[Outcome]:
+def watchdog(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the robot comes to rest when a velocity is not renewed."""
     for tries in trace.let_go:
         last = tries[-1]
         yield Case(
-            last.rests(robot.limits),
+            last.rests(said_of(run).limits),
             last.turns[-1].velocity_exchange,
-            f"rest within {ends_by(robot.limits, robot.settle_s):.1f} s of a command that is not renewed",
+            f"rest within {trace.ends_s:.1f} s of a command that is not renewed",
             str(last.turns[-1].velocity or ""),
             "goes on",
         )
