@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
-from conformance.packs.table1.robot.goal_trace import GoalLife
+from conformance.packs.table1.robot.goal_trace import GoalLife, GoalReached
 from conformance.packs.table1.scenarios.goal_life import goal_life
+from conformance.packs.table1.scenarios.goal_reached import goal_reached
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.scenarios.turn import turn
@@ -108,3 +109,10 @@ def cancel(trace: GoalLife, run: Run) -> Iterator[Outcome]:
     """Judge that the robot stands still when its goal was cancelled."""
     for one in trace.cancelled:
         yield from outcomes("safety/cancel", one.drive, said_of(run).limits)
+
+
+@rule("safety/watchdog", on=(goal_reached,))
+def not_taken_up(trace: GoalReached, run: Run) -> Iterator[Outcome]:
+    """Judge that a velocity from before a goal is not taken up again when the goal is reached."""
+    if trace.turned is not None:
+        yield from outcomes("safety/watchdog", trace.turned, said_of(run).limits)
