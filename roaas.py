@@ -42,7 +42,7 @@ _SUMMARIES = {
     "sign": "Sign a result, so that others can check whose it is.",
     "verify": "Say what a signed certificate proves, and whether it is enough.",
     "registry": "Make a static site of signed certificates: who passed what.",
-    "selftest": "Show that the suite catches faulty robots and blames no good one.",
+    "selftest": "Show that the suite kills mutants and has no false positives on good devices.",
     "contract": "Show the requirements, export the contract's files.",
 }
 _EXTRAS = {"robot": "robot", "load": "load"}
