@@ -24,10 +24,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from conformance.contract.pack import Contract
+from conformance.mutation.programs import NotInstalledError
 from conformance.packs.table1.mutants import MUTANTS
+from conformance.packs.table1.selftest import BAROQUE, LEGACY, ON_SERVERS, PLAIN, REFERENCE
 from conformance.selftest.proxy import Proxy
-from conformance.selftest.robots import INDEPENDENT_ROBOTS, ON_SERVERS, REFERENCE, Robot, running, statement_of
-from conformance.selftest.servers.programs import NotInstalledError
+from conformance.selftest.robots import Robot, running
 
 REFERENCES = 4
 FAULTS = (
@@ -92,21 +94,21 @@ def _tell(
 def _fleet(stack: ExitStack, folder: Path) -> Iterator[tuple[str, Entry]]:
     """Start the robots; each with its name."""
     for number in range(REFERENCES):
-        robot = stack.enter_context(running(REFERENCE, FIRST_DOMAIN + number))
-        yield _entry(folder, f"reference-{number + 1}", robot, robot.rest, robot.soap, _GOOD)
-    for kind in (*INDEPENDENT_ROBOTS, *ON_SERVERS):
+        robot = stack.enter_context(running(Contract.load(), REFERENCE, FIRST_DOMAIN + number))
+        yield _entry(folder, f"reference-{number + 1}", robot, _GOOD)
+    for device in (PLAIN, BAROQUE, LEGACY, *ON_SERVERS):
         try:
-            robot = stack.enter_context(running(kind, 0))
+            robot = stack.enter_context(running(Contract.load(), device))
         except NotInstalledError as error:
-            print(f"{kind} is left out: {error}")
+            print(f"{device.name} is left out: {error}")
             continue
-        yield _entry(folder, kind, robot, robot.rest, robot.soap, _GOOD)
+        yield _entry(folder, device.name, robot, _GOOD)
     for mutant in (one for one in MUTANTS if one.name in FAULTS):
-        robot = stack.enter_context(running("baroque", 0))
-        proxy = Proxy(robot.rest, robot.soap)
+        robot = stack.enter_context(running(Contract.load(), BAROQUE))
+        proxy = Proxy(robot.rest, robot.publishers)
         stack.callback(proxy.close)
         proxy.change = mutant.make()
-        yield _entry(folder, f"faulty-{mutant.name}", robot, proxy.rest, proxy.wsdl("publisher"), _FAULTY)
+        yield _entry(folder, f"faulty-{mutant.name}", proxy.before(robot), _FAULTY)
     hanging = stack.enter_context(_never_answering())
     limit = f"time_limit_s = {HANGING_LIMIT_S}\n"
     yield "hanging", Entry(f'[[robot]]\nname = "hanging"\n{limit}endpoints = {{ rest = "{hanging}" }}\n', _ABSENT)
@@ -115,14 +117,15 @@ def _fleet(stack: ExitStack, folder: Path) -> Iterator[tuple[str, Entry]]:
     yield "down", Entry(f'[[robot]]\nname = "down"\nendpoints = {{ rest = "{down}" }}\n', _ABSENT)
 
 
-def _entry(folder: Path, name: str, robot: Robot, rest: str, soap: str, right: set[str]) -> tuple[str, Entry]:
+def _entry(folder: Path, name: str, robot: Robot, right: set[str]) -> tuple[str, Entry]:
     """A robot with a statement of its own: its kind's, with its addresses."""
-    endpoints = f'\n[endpoints]\nrest = "{rest}"\n'
-    if soap:
-        wsdls = {service: soap.replace("publisher", service) for service in ("publisher", "subscriber")}
-        endpoints += "".join(f'{service}s_wsdl = "{wsdl}"\n' for service, wsdl in wsdls.items())
+    endpoints = f'\n[endpoints]\nrest = "{robot.rest}"\n'
+    wsdls = {"publishers_wsdl": robot.publishers, "subscribers_wsdl": robot.subscribers}
+    endpoints += "".join(f'{key} = "{url}"\n' for key, url in wsdls.items() if url)
     statement = folder / f"{name}.toml"
-    statement.write_text(statement_of(robot.kind).read_text(encoding="utf-8") + endpoints, encoding="utf-8")
+    statement.write_text(
+        (robot.device.statement or Path(os.devnull)).read_text(encoding="utf-8") + endpoints, encoding="utf-8"
+    )
     return name, Entry(f'[[robot]]\nstatement = "{statement.name}"\n', right)
 
 

@@ -12,13 +12,14 @@ import sys
 from fnmatch import fnmatch
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.contract.pack import Contract
 from conformance.packs.table1.faulty_bodies import FAULTY_BODIES
+from conformance.packs.table1.selftest import with_fault
 from conformance.selftest.at_once import each_at_once
-from conformance.selftest.certifying import Job, Outcome, run_job
-from conformance.selftest.robots import running, statement_of
+from conformance.selftest.certifying import Outcome, job_at, run_job
+from conformance.selftest.robots import running
 from conformance.verdict.effort import EFFORTS
 
-_ROBOT = "baroque"
 _NO_FAULT = ""
 _TIMEOUT_S = 300.0
 
@@ -38,10 +39,9 @@ def main() -> int:
         return 1
 
     def certify(fault: str) -> tuple[str, Outcome]:
-        with running(_ROBOT, fault=fault) as robot:
-            publishers, subscribers = robot.soap, robot.soap.replace("publisher", "subscriber")
-            where = (statement_of(_ROBOT), robot.rest, publishers, subscribers)
-            return fault, run_job(Job(*where, effort=options.effort, seed=options.seed, timeout_s=_TIMEOUT_S))
+        with running(Contract.load(), with_fault(fault)) as robot:
+            job = job_at(robot, effort=options.effort, seed=options.seed, timeout_s=_TIMEOUT_S)
+            return fault, run_job(job)
 
     try:
         found = dict(each_at_once(certify, [_NO_FAULT, *names], options.parallel, _tell))

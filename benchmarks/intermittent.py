@@ -16,7 +16,7 @@ from fnmatch import fnmatch
 from typing import Any
 
 from conformance.contract.classes import Level
-from conformance.contract.ledger import load_ledger
+from conformance.contract.pack import Contract
 from conformance.mutation.changes import (
     Make,
     Where,
@@ -33,12 +33,11 @@ from conformance.mutation.changes import (
     values,
 )
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.packs.table1.mutants.paths import GOAL, PLAN, POSE, SENSORS, VELOCITY, deliveries
+from conformance.packs.table1.selftest import REFERENCE
 from conformance.selftest.at_once import each_at_once
 from conformance.selftest.certifying import Outcome, run_job
 from conformance.selftest.mutant_run import RobotPool, job_for
-from conformance.selftest.robots import REFERENCE
 from conformance.verdict.effort import EFFORTS
 
 # What the suite is to reach.
@@ -151,11 +150,10 @@ def main() -> int:
     if not names:
         print(f"no fault is named {' or '.join(options.patterns)}; there are {', '.join(FAULTS)}")
         return 1
-    must = frozenset(
-        id_ for id_, one in load_ledger(CONTRACT_DIR / "requirements.toml").items() if one.level is Level.MUST
-    )
+    contract = Contract.load()
+    must = frozenset(id_ for id_, one in contract.ledger.items() if one.level is Level.MUST)
     runs = [(name, seed) for name in names for seed in range(options.seeds)]
-    with RobotPool(REFERENCE, min(options.parallel, len(runs)), options.domain_id) as pool:
+    with RobotPool(contract, REFERENCE, min(options.parallel, len(runs)), options.domain_id) as pool:
 
         def certify(run: tuple[str, int]) -> bool:
             name, seed = run
@@ -173,7 +171,7 @@ def main() -> int:
             caught = each_at_once(certify, runs, pool.size, lambda _: None)
         except KeyboardInterrupt:
             return 130
-    print(f"caught {sum(caught)} of {len(runs)} at {options.effort}, one answer in {options.once_in}")
+    print(f"killed {sum(caught)} of {len(runs)} at {options.effort}, one answer in {options.once_in}")
     return int(sum(caught) < _CAUGHT_SHARE * len(runs))
 
 

@@ -3,7 +3,7 @@
 ``python benchmarks/verdicts.py --robot reference --seeds 30 --busy 2`` certifies the reference robot with 30 seeds, one
 after another, while two loops keep the processors busy, and prints a line for each run and a table in the end. With
 ``--link`` clients are away from the robot by such a link; ``--robot realistic`` is another robot for each seed. Both
-may be repeated: every robot is tried over every link. The exit code is 0 when nobody was blamed, at most one run in
+may be repeated: every robot is tried over every link. The exit code is 0 when there was no false positive, at most one run in
 twenty was undecided, and something was run; 1 otherwise; 130 when it was interrupted.
 """
 
@@ -18,11 +18,13 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
+from conformance.contract.pack import Contract
+from conformance.mutation.self_test import self_test_of
+from conformance.packs.table1.selftest import REFERENCE
 from conformance.selftest.controls import Case, ControlResult, run_controls
 from conformance.selftest.link import LINKS
-from conformance.selftest.robots import INDEPENDENT_ROBOTS, ON_ROS, ON_SERVERS, REFERENCE, RobotError
+from conformance.selftest.robots import RobotError
 from conformance.selftest.variants import VARIANTS, Variant
 from conformance.verdict.effort import EFFORTS
 
@@ -38,10 +40,12 @@ def main() -> int:
     # What ends a CI job takes the robots with it, like Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     options = _parser().parse_args()
-    robots, links = options.robot or [REFERENCE], options.link or [NO_LINK]
+    robots, links = options.robot or [REFERENCE.name], options.link or [NO_LINK]
     seeds = range(options.first_seed, options.first_seed + options.seeds)
+    contract = Contract.load()
+    device = self_test_of(contract).device
     cases = [
-        Case(robot, _link(name, robot), seed) for robot, name in itertools.product(robots, links) for seed in seeds
+        Case(device(robot), _link(name), seed) for robot, name in itertools.product(robots, links) for seed in seeds
     ]
     until = time.monotonic() + 60 * options.minutes
     results: list[ControlResult] = []
@@ -54,7 +58,7 @@ def main() -> int:
                     print(f"{len(cases) - len(results)} runs left out: {options.minutes:g} minutes are over")
                     break
                 results += run_controls(
-                    [case], effort=options.effort, parallel=1, domain_id=options.domain_id, tell=_tell
+                    contract, [case], effort=options.effort, parallel=1, domain_id=options.domain_id, tell=_tell
                 )
         except RobotError as error:
             print(error, file=sys.stderr)
@@ -66,13 +70,13 @@ def main() -> int:
         return 130
     tried = [result for result in results if result.outcome is not None]
     undecided = sum(_word(result) == "undecided" for result in tried)
-    blamed = any(_word(result) == "blamed" for result in tried)
-    return int(not tried or blamed or undecided > max(1, UNDECIDED_SHARE * len(tried)))
+    false = any(_word(result) == "false positive" for result in tried)
+    return int(not tried or false or undecided > max(1, UNDECIDED_SHARE * len(tried)))
 
 
 def _parser() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    robots = [*ON_ROS, *INDEPENDENT_ROBOTS, *ON_SERVERS]
+    robots = [device.name for device in self_test_of(Contract.load()).devices]
     options.add_argument("--robot", action="append", choices=robots, help="default: reference")
     links = [NO_LINK, *(link.name for link in LINKS)]
     options.add_argument("--link", action="append", choices=links, help="default: none")
@@ -95,10 +99,8 @@ def _from(least: int) -> Callable[[str], int]:
     return whole
 
 
-def _link(name: str, robot: str) -> Variant | None:
-    if name == NO_LINK:
-        return None
-    return replace(next(one for one in VARIANTS if one.link is not None and one.name == name), robot=robot)
+def _link(name: str) -> Variant | None:
+    return next((one for one in VARIANTS if one.link is not None and one.name == name), None)
 
 
 @contextlib.contextmanager
@@ -127,8 +129,8 @@ def _word(result: ControlResult) -> str:
     """What became of one run."""
     if result.outcome is None:
         return "not tried"
-    if result.blamed or result.outcome.exit_code == _NOT_CONFORMANT:
-        return "blamed"
+    if result.false_positives or result.outcome.exit_code == _NOT_CONFORMANT:
+        return "false positive"
     return "conformant" if result.outcome.exit_code == _CONFORMANT else "undecided"
 
 
@@ -140,7 +142,7 @@ def _warned(result: ControlResult) -> dict[str, str]:
 
 def _tell(result: ControlResult) -> None:
     word = _word(result)
-    why = result.blamed or (result.unjudged if word == "undecided" else {})
+    why = result.false_positives or (result.unjudged if word == "undecided" else {})
     seconds = f"{result.outcome.seconds:.1f} s" if result.outcome else result.not_tried
     print(f"{result.robot} {result.variant or NO_LINK} seed {result.seed}: {word}, {seconds}", flush=True)
     for kind, said in (("", why), ("warns: ", _warned(result))):
@@ -155,7 +157,17 @@ def _tell(result: ControlResult) -> None:
 
 def _table(results: list[ControlResult]) -> str:
     """A line for each robot and link, as Markdown."""
-    columns = ("robot", "link", "runs", "conformant", "blamed", "undecided", "verdicts", "median s", "longest s")
+    columns = (
+        "robot",
+        "link",
+        "runs",
+        "conformant",
+        "false positive",
+        "undecided",
+        "verdicts",
+        "median s",
+        "longest s",
+    )
     lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for (robot, link), group in itertools.groupby(results, lambda one: (one.robot, one.variant)):
         found = list(group)
@@ -165,7 +177,7 @@ def _table(results: list[ControlResult]) -> str:
         verdicts = {tuple(sorted(outcome.verdicts.items())) for outcome in outcomes}
         seconds = [outcome.seconds for outcome in outcomes] or [0.0]
         cells = (
-            robot, link or NO_LINK, len(found), words["conformant"], words["blamed"], words["undecided"],
+            robot, link or NO_LINK, len(found), words["conformant"], words["false positive"], words["undecided"],
             f"{len(verdicts)} different", f"{statistics.median(seconds):.1f}", f"{max(seconds):.1f}",
         )  # fmt: skip
         lines.append(f"| {' | '.join(map(str, cells))} |")

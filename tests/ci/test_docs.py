@@ -12,6 +12,8 @@ import click
 import pytest
 import yaml
 
+from conformance.contract.pack import Contract
+from conformance.packs.table1.selftest import PLAIN
 from conformance.selftest.robots import running
 from roaas import main
 
@@ -95,7 +97,7 @@ def documented(start):
 
 def test_a_newcomers_way_through_the_pages(tmp_path):
     """What the pages say of certifying, signing and showing, word for word but for the robot's address."""
-    with running("plain", 0) as robot:
+    with running(Contract.load(), PLAIN) as robot:
 
         def run(start, folder=tmp_path):
             rest = robot.rest.removeprefix("http://")

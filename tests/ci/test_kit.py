@@ -16,7 +16,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from conformance.contract.pack import Contract
 from conformance.packs.table1.mutants import MUTANTS
+from conformance.packs.table1.selftest import REFERENCE
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import running
 from reports.attestation.envelope import ENVELOPE_NAME
@@ -42,13 +44,13 @@ def programs(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def good(session_domain_id):
-    with running("reference", session_domain_id) as robot:
+    with running(Contract.load(), REFERENCE, session_domain_id) as robot:
         yield robot
 
 
 @pytest.fixture
 def broken(good):
-    proxy = Proxy(good.rest, good.soap)
+    proxy = Proxy(good.rest, good.publishers)
     proxy.change = next(one for one in MUTANTS if one.catches == ("rest-formats/xml",)).make()
     yield proxy.rest
     proxy.close()

@@ -13,6 +13,7 @@ import pytest
 
 from conformance.contract.pack import Contract
 from conformance.engine.suite import suite_digest
+from conformance.packs.table1.selftest import PLAIN
 from conformance.selftest.robots import running
 
 ROOT = Path(__file__).parents[2]
@@ -94,7 +95,7 @@ def test_its_import_names_are_nobody_elses(twice):
 
 
 def test_it_certifies_among_modules_of_the_rooms_names(installed, elsewhere):
-    with running("plain", 0) as robot:
+    with running(Contract.load(), PLAIN) as robot:
         words = ["--rest", robot.rest, "--class", "rest-formats", "--effort", "quick", "--allow-motion"]
         done = run(installed, elsewhere, "-m", "roaas", "certify", *words)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -10,6 +10,7 @@ from conformance.documents.xml_node import Node
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.robot import delivery, delivery_messages
+from conformance.packs.table1.selftest import BAROQUE
 from conformance.packs.table1.statement import Statement
 from conformance.selftest.robots import running
 from conformance.statement.statement import Endpoints
@@ -20,8 +21,8 @@ from conformance.verdict.run import Run
 
 @pytest.fixture(scope="module")
 def statement():
-    with running("baroque", 0) as robot:
-        yield Statement(endpoints=Endpoints(rest=robot.rest, publishers_wsdl=robot.soap))
+    with running(Contract.load(), BAROQUE) as robot:
+        yield Statement(endpoints=Endpoints(rest=robot.rest, publishers_wsdl=robot.publishers))
 
 
 def certified(statement, requirement, tmp_path):

@@ -6,12 +6,12 @@ import pytest
 
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
+from conformance.packs.table1.selftest import BAROQUE
 from conformance.selftest.certifying import Job, Outcome, robot_of, run_job
-from conformance.selftest.robots import statement_of
 
 
 def job(rest="http://127.0.0.1:9", **more):
-    return Job(statement_of("baroque"), rest, f"{rest}/p?wsdl", f"{rest}/s?wsdl", **more)
+    return Job(Contract.load().directory, BAROQUE.statement, rest, f"{rest}/p?wsdl", f"{rest}/s?wsdl", **more)
 
 
 def test_a_job_says_where_the_robot_is_and_what_is_claimed(tmp_path):

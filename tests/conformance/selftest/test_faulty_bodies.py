@@ -2,12 +2,14 @@
 
 import pytest
 
+from conformance.contract.pack import Contract
 from conformance.packs.table1.faulty_bodies import FAULTY_BODIES
 from conformance.packs.table1.independent_robots.baroque import BUILD
 from conformance.packs.table1.independent_robots.body import Body, pose
 from conformance.packs.table1.robot.message_shapes import ODOMETRY
-from conformance.selftest.certifying import Job, run_job
-from conformance.selftest.robots import running, statement_of
+from conformance.packs.table1.selftest import with_fault
+from conformance.selftest.certifying import job_at, run_job
+from conformance.selftest.robots import running
 
 
 @pytest.mark.parametrize("name", FAULTY_BODIES)
@@ -32,7 +34,6 @@ def test_a_faulty_body_is_asked_like_a_good_one(name):
 @pytest.mark.parametrize(("fault", "fails"), [("delivery-single-precision", True), ("", False)])
 def test_a_fault_inside_a_robot_is_seen_from_outside(fault, fails):
     requirement = "equivalence/delivery-rest"
-    with running("baroque", fault=fault) as robot:
-        where = (statement_of("baroque"), robot.rest, robot.soap, robot.soap.replace("publisher", "subscriber"))
-        outcome = run_job(Job(*where, requirements=(requirement,), timeout_s=60.0))
+    with running(Contract.load(), with_fault(fault)) as robot:
+        outcome = run_job(job_at(robot, requirements=(requirement,), timeout_s=60.0))
     assert outcome.verdicts[requirement] == ("fail" if fails else "pass"), outcome.reasons

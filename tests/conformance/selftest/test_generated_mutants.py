@@ -9,24 +9,26 @@ from conformance.contract.pack import Contract
 from conformance.documents import wsdl
 from conformance.documents.openapi import operations_of
 from conformance.mutation.messages import Request, Response
+from conformance.packs.table1.selftest import PLAIN
 from conformance.selftest.certifying import Outcome
 from conformance.selftest.comparison import SchemathesisResult
 from conformance.selftest.generated import judging
 from conformance.selftest.generated.catalogue import every_change, generated_mutants
-from conformance.selftest.generated.judging import CAUGHT, GIVEN_UP, NOT_REACHED, GeneratedResult, judge
+from conformance.selftest.generated.judging import GIVEN_UP, KILLED, NOT_REACHED, GeneratedResult, judge
 from conformance.selftest.generated.mutant import Tally
-from conformance.selftest.generated.open_places import RULES
+from conformance.selftest.generated.open_places import open_places
 from conformance.selftest.generated.operators import OPERATORS
 from conformance.selftest.generated.report import document, summary
 from conformance.selftest.generated.sampling import Rate, rate_of, rates_by, sample
 from conformance.selftest.mutant_run import RobotPool
 from conformance.selftest.report import Report
 
+CONTRACT = Contract.load()
 JSON = [("Content-Type", "application/json")]
 
 
 def named(name):
-    return next(mutant for mutant in generated_mutants() if mutant.name == name)
+    return next(mutant for mutant in generated_mutants(CONTRACT) if mutant.name == name)
 
 
 def answered(name, request, *bodies, media_type="application/json"):
@@ -54,28 +56,28 @@ def forwarded(name, request):
 
 
 def test_the_enumeration_is_whole_and_stable():
-    mutants = generated_mutants()
+    mutants = generated_mutants(CONTRACT)
     names = [mutant.name for mutant in mutants]
     assert len(names) == len(set(names)) >= 1500
     assert {mutant.operator for mutant in mutants} >= {operator.name for operator in OPERATORS}
-    contract = Contract.load()
-    operations = {operation.id for operation in operations_of(contract)}
-    for path in (contract.publishers_path, contract.subscribers_path):
+    operations = {operation.id for operation in operations_of(CONTRACT)}
+    for path in (CONTRACT.publishers_path, CONTRACT.subscribers_path):
         operations |= {operation.name for operation in wsdl.read_file(path).operations}
     assert {mutant.exchange.name for mutant in mutants} == operations
     every_change.cache_clear()
     generated_mutants.cache_clear()
-    assert [mutant.name for mutant in generated_mutants()] == names
+    assert [mutant.name for mutant in generated_mutants(CONTRACT)] == names
 
 
-def test_every_rule_that_leaves_something_open_covers_something_and_not_much():
-    for rule in RULES:
-        covered = sum(bool(rule.compiled.fullmatch(change.name)) for change in every_change())
-        assert 0 < covered < len(every_change()) / 20, rule
+def test_every_open_place_covers_something_and_not_much():
+    changes = [(change.name, change.exchange.side, change.exchange.method) for change in every_change(CONTRACT)]
+    for place in open_places(CONTRACT):
+        covered = sum(place.covers(*change) for change in changes)
+        assert 0 < covered < len(changes) / 20, place
 
 
 def test_a_sample_is_the_same_for_a_seed_and_has_every_stratum():
-    mutants = generated_mutants()
+    mutants = generated_mutants(CONTRACT)
     strata = {(mutant.operator, mutant.exchange.class_) for mutant in mutants}
     chosen = sample(mutants, len(strata), 3)
     assert {(mutant.operator, mutant.exchange.class_) for mutant in chosen} == strata
@@ -134,15 +136,15 @@ def test_a_mode_says_when():
 
 def test_a_run_that_comes_to_no_end_shows_nothing(monkeypatch):
     monkeypatch.setattr(judging, "run_job", lambda job: Outcome(-1, {}, {}, 0, job.timeout_s))
-    with RobotPool("plain", 1, 0) as pool:
+    with RobotPool(CONTRACT, PLAIN, 1) as pool:
         results = judge(pool, [named("status:getSensors:200-500")], efforts=("quick",), tell=lambda _: None)
     assert [result.outcome for result in results] == [GIVEN_UP]
-    report = Report("plain", generated_results=results)
+    report = Report(CONTRACT, "plain", generated_results=results)
     assert not report.holds
     assert "GIVEN UP status:getSensors:200-500" in report.summary()
 
 
-def test_five_mutants_are_caught_and_one_that_alters_nothing_is_told_apart():
+def test_five_mutants_are_killed_and_one_that_alters_nothing_is_told_apart():
     names = (
         "retype:getSensors:answer[].name:json",
         "default:GetPlan:request.x:soap",
@@ -151,17 +153,17 @@ def test_five_mutants_are_caught_and_one_that_alters_nothing_is_told_apart():
         "rename:GetVelocity:answer.return.linear:soap",
         "scale:getVelocity:answer.angular.x:json",
     )
-    with RobotPool("plain", 2, 0) as pool:
+    with RobotPool(CONTRACT, PLAIN, 2) as pool:
         results = judge(pool, map(named, names[:5]), efforts=("quick",), tell=lambda _: None)
-    assert {result.mutant.name: result.outcome for result in results} == dict.fromkeys(names[:5], CAUGHT)
+    assert {result.mutant.name: result.outcome for result in results} == dict.fromkeys(names[:5], KILLED)
     assert all(result.by and result.altered for result in results)
     results.append(GeneratedResult(named(names[5]), NOT_REACHED, effort="quick"))
     assert rate_of(results) == Rate(5, 0, 1)
     assert rates_by(results, "class")["rest-resources"] == Rate(3, 0, 1)
-    assert document(results, 0)["all"]["rate"] == 1.0
-    assert "5 of 5 (100.0%, at least 56.6%), 1 not reached" in summary(results)
-    report = Report("plain", generated_results=results, seed=7)
-    report.compared = [SchemathesisResult(names[0], caught=True, findings=()), SchemathesisResult(names[2], False, ())]
+    assert document(CONTRACT, results, 0)["all"]["rate"] == 1.0
+    assert "5 of 5 (100.0%, at least 56.6%), 1 not reached" in summary(CONTRACT, results)
+    report = Report(CONTRACT, "plain", generated_results=results, seed=7)
+    report.compared = [SchemathesisResult(names[0], killed=True, findings=()), SchemathesisResult(names[2], False, ())]
     page = report.matrix()
     assert "--generated 6 --seed 7 --target plain" in page
     assert "| `rest-resources` | 3 | 3 | 100.0% |" in page
@@ -169,16 +171,16 @@ def test_five_mutants_are_caught_and_one_that_alters_nothing_is_told_apart():
     assert "plain Schemathesis: 1 of 2" in page
 
 
-def test_what_is_known_to_blame_the_good_robot_shows_nothing(monkeypatch):
+def test_what_the_good_device_does_not_pass_kills_nothing(monkeypatch):
     mutant, jobs = named("status:getSensors:200-500"), []
 
-    def blames(job):
-        """Blame every robot for one requirement, and end a run for which that is enough."""
+    def refuted(job):
+        """Fail every device for one requirement, and end a run for which that is enough."""
         jobs.append(job)
         return Outcome(1, {"rest-resources/sensors-type": "fail"}, {}, 9, 0.1)
 
-    monkeypatch.setattr(judging, "run_job", blames)
-    with RobotPool("plain", 1, 0) as pool:
+    monkeypatch.setattr(judging, "run_job", refuted)
+    with RobotPool(CONTRACT, PLAIN, 1) as pool:
         (result,) = judge(pool, [mutant], efforts=("quick",), tell=lambda _: None)
     assert (result.outcome, result.by) == (NOT_REACHED, ())
     enough = [job.enough for job in jobs if job.enough]

@@ -1,29 +1,35 @@
 """Ledger, checks, mutants and the coverage page agree."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from conformance.contract.classes import Level
+from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
+from conformance.mutation.messages import unchanged
+from conformance.mutation.mutant import Mutant
+from conformance.mutation.self_test import SelfTest
 from conformance.packs.table1.mutants import MUTANTS
 from conformance.selftest import coverage
 
+CONTRACT = Contract.load()
 ROOT = Path(coverage.__file__).parents[2]
 
 
 def test_ledger_checks_and_mutants_agree():
-    assert coverage.disagreements() == []
+    assert coverage.disagreements(CONTRACT) == []
 
 
 def test_page_is_up_to_date():
     there = (ROOT / "docs" / "coverage.md").read_text(encoding="utf-8")
-    assert there == coverage.page(), "run: roaas contract coverage --out docs/coverage.md"
+    assert there == coverage.page(CONTRACT), "run: roaas contract coverage --out docs/coverage.md"
 
 
 def test_every_must_and_should_has_a_mutant():
     shown = {id_ for mutant in MUTANTS for id_ in mutant.catches}
-    ledger = Contract.load().ledger.values()
+    ledger = CONTRACT.ledger.values()
     assert [
         item.id for item in ledger if item.level is not Level.MAY and not item.untestable and item.id not in shown
     ] == []
@@ -49,7 +55,35 @@ def test_each_run_gets_a_change_of_its_own():
 
 
 def test_a_disagreement_is_told(monkeypatch):
-    monkeypatch.setattr(coverage, "checks_by_requirement", lambda: {"http/no-such": ("test_x::test_y",)})
-    told = coverage.disagreements()
+    monkeypatch.setattr(coverage, "checks_by_requirement", lambda _: {"http/no-such": ("test_x::test_y",)})
+    told = coverage.disagreements(CONTRACT)
     assert "test_x::test_y judges 'http/no-such', which the ledger does not have" in told
     assert "http/date has no check" in told
+
+
+LAMP = Contract.load(ROOT / "examples" / "lamp")
+
+
+def test_a_folder_packs_checks_are_found_by_file_and_it_needs_no_mutants():
+    assert coverage.checks_by_requirement(LAMP)["lamp/fades"] == ("test_lamp::fades",)
+    assert coverage.disagreements(LAMP) == []
+    page = coverage.page(LAMP)
+    assert "## lamp" in page
+    assert "mutants by rule" in page
+
+
+def test_a_pack_that_has_mutants_has_one_for_each_of_its_own_requirements(monkeypatch):
+    mutant = Mutant("dark", "The lamp stays dark.", ("lamp/target",), "rest", lambda: unchanged)
+    monkeypatch.setattr(coverage, "self_test_of", lambda _: SelfTest(mutants=(mutant,)))
+    assert coverage.disagreements(LAMP) == [
+        f"lamp/{name} is MUST, and no mutant shows that it is judged"
+        for name in ("state", "fades", "in-between", "out-of-range")
+    ]
+
+
+def test_a_module_with_checks_that_cannot_be_imported_is_named(tmp_path):
+    shutil.copytree(LAMP.directory, tmp_path / "lamp", ignore=shutil.ignore_patterns("__pycache__"))
+    broken = tmp_path / "lamp" / "rules" / "lamp" / "test_broken.py"
+    broken.write_text("import no_such_module\n", encoding="utf-8")
+    with pytest.raises(ContractError, match=r"test_broken\.py cannot be imported"):
+        coverage.checks_by_requirement(Contract.load(tmp_path / "lamp"))

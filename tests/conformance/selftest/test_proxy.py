@@ -7,18 +7,21 @@ import ssl
 import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 
 from conformance.mutation.changes import altered, becomes, header, instead, plain, rest, rewritten, values
 from conformance.mutation.messages import HangUpError, Response
+from conformance.mutation.self_test import GoodDevice
 from conformance.packs.table1.independent_robots.plain import serve as plain_robot
 from conformance.selftest.proxy import Proxy
+from conformance.selftest.robots import Robot
 from conformance.selftest.variants import VARIANTS, certificate
 
 
-class Robot(BaseHTTPRequestHandler):
+class Answering(BaseHTTPRequestHandler):
     """Answers with what it was asked, and counts."""
 
     protocol_version = "HTTP/1.1"
@@ -43,7 +46,7 @@ class Robot(BaseHTTPRequestHandler):
 
 @pytest.fixture
 def robot():
-    handler = type("Handler", (Robot,), {"seen": []})
+    handler = type("Handler", (Answering,), {"seen": []})
     server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
     threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True).start()
     server.seen = handler.seen
@@ -205,3 +208,19 @@ def test_the_token_variant_asks_as_rfc_9110_has_it(proxy):
     response, _ = request(proxy.rest)
     assert (response.status, "WWW-Authenticate" in response.headers) == (401, True)
     assert request(proxy.rest, Authorization=f"Bearer {variant.token}")[0].status == 200
+
+
+def test_a_device_without_soap_has_a_proxy_without_it(robot):
+    proxy = Proxy(robot.url)
+    try:
+        behind = proxy.before(Robot(Path("pack"), GoodDevice("lamp", lambda _: []), robot.url))
+        assert (behind.rest, behind.publishers, list(proxy.listens)) == (proxy.rest, "", ["rest"])
+        assert request(behind.rest)[0].status == 200
+    finally:
+        proxy.close()
+
+
+def test_wsdls_are_at_the_proxy_under_their_own_paths(proxy, robot):
+    publishers = proxy.wsdl(f"{robot.url}/turtlesim_publisher_ws?wsdl")
+    assert publishers.endswith("/turtlesim_publisher_ws?wsdl")
+    assert not publishers.startswith(robot.url)

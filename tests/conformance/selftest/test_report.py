@@ -2,11 +2,14 @@
 
 import json
 
+from conformance.contract.pack import Contract
 from conformance.packs.table1.mutants import MUTANTS
 from conformance.selftest.certifying import Outcome
 from conformance.selftest.controls import ControlResult
 from conformance.selftest.mutant_run import MutantResult
 from conformance.selftest.report import Report
+
+CONTRACT = Contract.load()
 
 
 def outcome(code, **verdicts):
@@ -14,23 +17,27 @@ def outcome(code, **verdicts):
     return Outcome(code, {id_.replace("_", "/", 1): value for id_, value in verdicts.items()}, reasons, 10, 1.0)
 
 
-def test_a_missed_mutant_and_a_blamed_robot_are_told(tmp_path):
+def test_a_survivor_and_a_false_positive_are_reported(tmp_path):
     mutant = MUTANTS[0]
     report = Report(
-        "reference", [MutantResult(mutant, missed=mutant.catches, reasons={mutant.catches[0]: "pass: pass"})]
+        CONTRACT, "reference", [MutantResult(mutant, missed=mutant.catches, reasons={mutant.catches[0]: "pass: pass"})]
     )
     report.control_results = [ControlResult("plain", "", 3, outcome(1, http_date="fail"))]
     assert not report.holds
-    assert f"MISSED {mutant.name}" in report.summary()
-    assert "BLAMED plain, seed 3, exit code 1: http/date: said" in report.summary()
+    assert f"SURVIVED {mutant.name}" in report.summary()
+    assert "FALSE POSITIVE plain, seed 3, exit code 1: http/date: said" in report.summary()
     report.write(tmp_path)
     assert json.loads((tmp_path / "selftest.json").read_text())["holds"] is False
 
 
 def test_nothing_tried_is_no_proof():
-    assert not Report("reference").holds
-    assert Report("reference", control_results=[ControlResult("plain", "", 0, outcome(0, http_date="pass"))]).holds
-    assert not Report("reference", control_results=[ControlResult("plain", "", 0, outcome(4, http_date="skip"))]).holds
+    assert not Report(CONTRACT, "reference").holds
+    assert Report(
+        CONTRACT, "reference", control_results=[ControlResult("plain", "", 0, outcome(0, http_date="pass"))]
+    ).holds
+    assert not Report(
+        CONTRACT, "reference", control_results=[ControlResult("plain", "", 0, outcome(4, http_date="skip"))]
+    ).holds
 
 
 def test_what_is_not_installed_is_said():
@@ -38,6 +45,6 @@ def test_what_is_not_installed_is_said():
         ControlResult("reference", "nginx", 0, None, "not installed: apt install nginx"),
         ControlResult("plain", "", 0, outcome(0, http_date="pass")),
     ]
-    report = Report("reference", control_results=found)
+    report = Report(CONTRACT, "reference", control_results=found)
     assert report.holds
     assert "not tried: reference (nginx): not installed: apt install nginx" in report.summary()

@@ -11,8 +11,9 @@ from web_certificate import pair
 from web_messages import delivery_envelope, delivery_path, twist
 from web_robot import eventually, running_robot, usage_error
 
+from conformance.contract.pack import Contract
+from conformance.packs.table1.selftest import REFERENCE
 from conformance.selftest.certifying import Job, run_job
-from conformance.selftest.robots import statement_of
 from reference_robot.webservices.http.address import Address
 from reference_robot.webservices.http.admission import Admission
 from reference_robot.webservices.http.authorization import Authorization
@@ -242,7 +243,8 @@ def assert_certified_over_https(served, certificate: Path) -> None:
     asked = ("http/authentication", "http/pipelining", "describe/wsdl-address", "soap-subscribers/interop")
     outcome = run_job(
         Job(
-            statement_of("reference"),
+            Contract.load().directory,
+            REFERENCE.statement,
             served.rest,
             served.publishers + "?wsdl",
             served.subscribers + "?wsdl",
