@@ -123,9 +123,8 @@ def _entry(folder: Path, name: str, robot: Robot, right: set[str]) -> tuple[str,
     wsdls = {"publishers_wsdl": robot.publishers, "subscribers_wsdl": robot.subscribers}
     endpoints += "".join(f'{key} = "{url}"\n' for key, url in wsdls.items() if url)
     statement = folder / f"{name}.toml"
-    statement.write_text(
-        (robot.device.statement or Path(os.devnull)).read_text(encoding="utf-8") + endpoints, encoding="utf-8"
-    )
+    declared = robot.device.statement.read_text(encoding="utf-8") if robot.device.statement else ""
+    statement.write_text(declared + endpoints, encoding="utf-8")
     return name, Entry(f'[[robot]]\nstatement = "{statement.name}"\n', right)
 
 

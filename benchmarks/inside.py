@@ -1,7 +1,7 @@
 """Which faults inside a robot the suite notices: in what it does, not in what is said of it on the way to a client.
 
 ``python benchmarks/inside.py`` certifies the independent robot ``baroque`` with each of its faulty bodies, and once
-without a fault, and prints a line for each and how many were caught; ``python benchmarks/inside.py 'goal-*'`` takes
+without a fault, and prints a line for each and how many were killed; ``python benchmarks/inside.py 'goal-*'`` takes
 some. No ROS is needed. ``python -m conformance.packs.table1.independent_robots baroque --fault deadband`` starts one to
 look at. The exit code is 1 when the robot without a fault is not found conformant, or no fault has such a name.
 """
@@ -48,13 +48,13 @@ def main() -> int:
     except KeyboardInterrupt:
         return 130
     caught = sum(bool(found[name].fails) for name in names if name in found)
-    print(f"caught {caught} of {len(names)} at {options.effort}, seed {options.seed}")
+    print(f"killed {caught} of {len(names)} at {options.effort}, seed {options.seed}")
     return int(found[_NO_FAULT].exit_code != ExitCode.PASSED)
 
 
 def _tell(result: tuple[str, Outcome]) -> None:
     fault, outcome = result
-    said = f"caught by {', '.join(sorted(outcome.fails)[:3])}" if outcome.fails else f"exit code {outcome.exit_code}"
+    said = f"killed by {', '.join(sorted(outcome.fails)[:3])}" if outcome.fails else f"exit code {outcome.exit_code}"
     print(f"{fault or 'no fault'}: {said} ({outcome.seconds:.0f} s)", flush=True)
 
 

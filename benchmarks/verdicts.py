@@ -3,8 +3,8 @@
 ``python benchmarks/verdicts.py --robot reference --seeds 30 --busy 2`` certifies the reference robot with 30 seeds, one
 after another, while two loops keep the processors busy, and prints a line for each run and a table in the end. With
 ``--link`` clients are away from the robot by such a link; ``--robot realistic`` is another robot for each seed. Both
-may be repeated: every robot is tried over every link. The exit code is 0 when there was no false positive, at most one run in
-twenty was undecided, and something was run; 1 otherwise; 130 when it was interrupted.
+may be repeated: every robot is tried over every link. The exit code is 0 when there was no false positive, at most one
+run in twenty was undecided, and something was run; 1 otherwise; 130 when it was interrupted.
 """
 
 import argparse
@@ -157,17 +157,7 @@ def _tell(result: ControlResult) -> None:
 
 def _table(results: list[ControlResult]) -> str:
     """A line for each robot and link, as Markdown."""
-    columns = (
-        "robot",
-        "link",
-        "runs",
-        "conformant",
-        "false positive",
-        "undecided",
-        "verdicts",
-        "median s",
-        "longest s",
-    )
+    columns = ("robot", "link", "runs", "conformant", "false", "undecided", "verdicts", "median s", "longest s")
     lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for (robot, link), group in itertools.groupby(results, lambda one: (one.robot, one.variant)):
         found = list(group)
