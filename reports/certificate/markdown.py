@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from reports.certificate.page import page_values
+from reports.findings import findings
 from reports.pages.page import markdown_page
 
 MOST_OCTETS = 512 * 1024
@@ -30,10 +31,10 @@ def certificate_markdown(result: Mapping[str, Any]) -> str:
     values = page_values(result)
     parts, left = [], MOST_OCTETS
     for verdict, heading in _HEADINGS.items():
-        found = values["certificate"].with_verdict(verdict)
+        found = sorted(values["certificate"].with_verdict(verdict), key=_urgency)
         told: list[str] = []
         for requirement in found[:_MOST_SHOWN]:
-            block = markdown_page("requirement.md.j2", r=requirement)
+            block = markdown_page("requirement.md.j2", r=requirement, found=findings([requirement], result))
             left -= len(block.encode())
             if left < 0:
                 break
@@ -41,3 +42,8 @@ def certificate_markdown(result: Mapping[str, Any]) -> str:
         if found:
             parts.append(_Part(heading, told, found[len(told) :]))
     return markdown_page("certificate.md.j2", parts=parts, most_named=_MOST_NAMED, most_groups=_MOST_GROUPS, **values)
+
+
+def _urgency(requirement: Mapping[str, Any]) -> int:
+    """The lowest number of the requirement's findings: 1 is what a vendor should look at first."""
+    return min((failure.get("number", 0) for failure in requirement["failures"]), default=0)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from reports.certificate.seal import Seal
+from reports.findings import Finding, by_cause, by_requirement, findings
 from reports.pages.page import html_page
 
 SHOWN_FAILURES = 5
@@ -66,9 +67,14 @@ class ClassSummary:
 
 @dataclass(frozen=True, slots=True)
 class Untested:
-    """Requirements of claimed classes that were not judged for one reason."""
+    """Requirements of claimed classes that were not judged for one reason.
+
+    Attributes:
+        because_of: number of the finding that kept the suite from testing them, or None.
+    """
 
     reason: str
+    because_of: int | None
     requirements: tuple[Mapping[str, Any], ...]
 
 
@@ -147,6 +153,23 @@ class Certificate:
             return "No case was executed: nothing can be said of this robot."
         return f"{open_classes} of {classes} could not be judged."
 
+    @property
+    def contract(self) -> str:
+        """The contract's title and version, and the pack that it comes from where the result says so."""
+        pack = self.result.get("pack")
+        if not pack:
+            return str(self.result["suite"]["contract"])
+        return f"{pack['title']} {pack['version']}".rstrip() + f" (pack {pack['name']})"
+
+    @property
+    def subject(self) -> str:
+        """What a conforming robot conforms to."""
+        return str(self.result.get("pack", {}).get("title", "RoAAS"))
+
+    def findings(self, verdict: str) -> list[Finding]:
+        """The findings of requirements with that verdict, in the order in which a vendor should look at them."""
+        return findings(self.with_verdict(verdict), self.result)
+
     def with_verdict(self, verdict: str) -> tuple[Mapping[str, Any], ...]:
         """Requirements of all classes with that verdict."""
         return tuple(r for c in self.classes for r in c.requirements if r["verdict"] == verdict)
@@ -182,16 +205,16 @@ def _classes(result: Mapping[str, Any]) -> Iterator[ClassSummary]:
 
 
 def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
-    groups: dict[str, list[Mapping[str, Any]]] = {}
+    groups: dict[tuple[str, int | None], list[Mapping[str, Any]]] = {}
     for summary in classes:
         if summary.verdict == "not-claimed":
             continue
         for requirement in summary.requirements:
             if requirement["verdict"] in {"skip", "error"}:
                 reason = requirement["untestable"] or requirement["reason"] or "No reason was recorded."
-                groups.setdefault(reason, []).append(requirement)
-    for reason, requirements in groups.items():
-        yield Untested(reason, tuple(requirements))
+                groups.setdefault((reason, requirement.get("because_of")), []).append(requirement)
+    for (reason, because_of), requirements in groups.items():
+        yield Untested(reason, because_of, tuple(requirements))
 
 
 def certificate_html(result: Mapping[str, Any], seal: Seal | None = None) -> str:
@@ -211,6 +234,9 @@ def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
         "result": result,
         "sections": result.get("contract_sections", {}),
         "words": VERDICT_WORDS,
+        "by_cause": by_cause,
+        "by_requirement": by_requirement,
+        "findings": findings,
         "shown_failures": SHOWN_FAILURES,
         "shown_body": SHOWN_BODY,
         "shown_curl": SHOWN_CURL,

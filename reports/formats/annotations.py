@@ -6,12 +6,11 @@ GitHub shows ten errors and ten warnings of a step and drops the rest without a 
 from collections.abc import Mapping
 from typing import Any
 
-from reports.formats.cases import Case, Outcome, cases, worst_first
+from reports.formats.cases import MESSAGE, Case, Outcome, cases, worst_first
 from reports.formats.places import places_of
 from reports.pages.untrusted import excerpt
 
 MOST = 10
-_MESSAGE = 600
 
 
 def annotations(result: Mapping[str, Any]) -> str:
@@ -28,7 +27,7 @@ def _command(result: Mapping[str, Any], case: Case) -> str:
     command = "error" if case.outcome in {Outcome.FAILED, Outcome.ERROR} else "warning"
     title = f"{case.name} ({case.outcome})"
     told = f"file={_property(place.file)},line={place.line},title={_property(title)}"
-    return f"::{command} {told}::{_data(excerpt(case.message, _MESSAGE))}"
+    return f"::{command} {told}::{_data(excerpt(case.message, MESSAGE))}"
 
 
 def _data(text: str) -> str:
@@ -37,4 +36,4 @@ def _data(text: str) -> str:
 
 
 def _property(text: str) -> str:
-    return _data(excerpt(text, _MESSAGE)).replace(":", "%3A").replace(",", "%2C")
+    return _data(excerpt(text, MESSAGE)).replace(":", "%3A").replace(",", "%2C")

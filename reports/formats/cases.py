@@ -11,8 +11,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from reports.findings import Finding, findings
 from reports.pages.untrusted import beginning
 
+MESSAGE = 1000
+"""Characters of a case's message that a format shows on one line."""
 _SHOWN_FAILURES = 10
 _SHOWN_OCTETS = 40_000
 _SHOWN_BODY = 2000
@@ -51,6 +54,7 @@ class Case:
         outcome: what became of it.
         message: one line for it; empty where there is nothing to say.
         requirement: as result.json has it; None for a class or the run.
+        findings: the requirement's findings, in the order in which a vendor should look at them.
     """
 
     name: str
@@ -58,6 +62,7 @@ class Case:
     outcome: Outcome
     message: str = ""
     requirement: Mapping[str, Any] | None = None
+    findings: Sequence[Finding] = ()
 
     @property
     def detail(self) -> str:
@@ -68,7 +73,7 @@ class Case:
         evidence = f"{self.requirement['cases']} cases by {', '.join(self.requirement['checks']) or 'no check'}"
         if self.outcome is Outcome.PASSED:
             return f"{told}\n{evidence}"
-        return "\n\n".join([told, evidence, *_findings(self.requirement["failures"])])
+        return "\n\n".join([told, evidence, *_in_full(self.findings)])
 
     @property
     def rule(self) -> str:
@@ -95,7 +100,8 @@ def cases(result: Mapping[str, Any]) -> list[Case]:
 def worst_first(found: Sequence[Case]) -> list[Case]:
     """The cases that somebody has to look at: failed, not judged, accepted, warnings."""
     order = [Outcome.FAILED, Outcome.ERROR, Outcome.ACCEPTED, Outcome.WARNING]
-    return sorted((case for case in found if case.outcome in order), key=lambda case: order.index(case.outcome))
+    shown = (case for case in found if case.outcome in order)
+    return sorted(shown, key=lambda case: (order.index(case.outcome), *(one.number or 0 for one in case.findings[:1])))
 
 
 def classes(result: Mapping[str, Any]) -> list[str]:
@@ -104,7 +110,7 @@ def classes(result: Mapping[str, Any]) -> list[str]:
 
 
 def _of_class(result: Mapping[str, Any], name: str) -> Iterator[Case]:
-    own = [_of_requirement(requirement) for requirement in result["requirements"] if requirement["class"] == name]
+    own = [_of_requirement(item, findings([item], result)) for item in result["requirements"] if item["class"] == name]
     verdict = result["classes"].get(name, "inconclusive")
     outcomes = {case.outcome for case in own}
     reason = result["class_reasons"].get(name, "")
@@ -115,12 +121,12 @@ def _of_class(result: Mapping[str, Any], name: str) -> Iterator[Case]:
     yield from own
 
 
-def _of_requirement(requirement: Mapping[str, Any]) -> Case:
-    outcome, message = _outcome(requirement)
-    return Case(requirement["id"], requirement["class"], outcome, message, requirement)
+def _of_requirement(requirement: Mapping[str, Any], found: Sequence[Finding]) -> Case:
+    outcome, message = _outcome(requirement, found)
+    return Case(requirement["id"], requirement["class"], outcome, message, requirement, found)
 
 
-def _outcome(requirement: Mapping[str, Any]) -> tuple[Outcome, str]:
+def _outcome(requirement: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Outcome, str]:
     expected = requirement.get("expected_failure")
     if expected is not None:
         until = f" until {expected['expires']}" if expected.get("expires") else ""
@@ -128,35 +134,37 @@ def _outcome(requirement: Mapping[str, Any]) -> tuple[Outcome, str]:
     verdict, reason = requirement["verdict"], requirement["untestable"] or requirement["reason"]
     outcome = _OUTCOMES[verdict]
     if outcome in {Outcome.FAILED, Outcome.WARNING}:
-        return outcome, _headline(requirement)
+        return outcome, _headline(found) or requirement["reason"] or requirement["text"]
     if verdict == "not-claimed":
         return outcome, "The class is not claimed."
     return outcome, "" if outcome is Outcome.PASSED else reason or _UNEXPLAINED[outcome]
 
 
-def _headline(requirement: Mapping[str, Any]) -> str:
-    failures = requirement["failures"]
-    if not failures:
-        return str(requirement["reason"] or requirement["text"])
-    more = f" (and {len(failures) - 1} more findings)" if len(failures) > 1 else ""
-    return f"{failures[0]['message']}{more}"
+def _headline(found: Sequence[Finding]) -> str:
+    if not found:
+        return ""
+    more = f" (and {len(found) - 1} more findings)" if len(found) > 1 else ""
+    return f"{found[0].text}{more}"
 
 
-def _findings(failures: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _in_full(found: Sequence[Finding]) -> Iterator[str]:
     shown, octets = 0, 0
-    for number, failure in enumerate(failures[:_SHOWN_FAILURES], start=1):
+    for place, finding in enumerate(found[:_SHOWN_FAILURES], start=1):
         if octets > _SHOWN_OCTETS:
             break
-        lines = [f"[{number}] {failure['message']}", f"expected: {failure['expected']}"]
+        failure = finding.failure
+        lines = [f"[{finding.number or place}] {finding.text}"]
         if failure["seen"] > 1:
-            lines.append(f"seen in {failure['seen']} cases")
+            lines.append(f"Seen in {failure['seen']} cases.")
+        if finding.blocks:
+            lines.append(f"Not tested because of it: {', '.join(finding.blocks)}.")
         if failure["request"]:
-            lines.append(f"send it again: {_cut(failure['request']['curl'], _SHOWN_CURL)}")
-        told = "\n".join([*lines, *_response(failure["response"])])
-        yield told
-        shown, octets = number, octets + len(told.encode("utf-8", "surrogatepass"))
-    if len(failures) > shown:
-        yield f"{len(failures) - shown} more findings are in result.json."
+            lines.append(f"Send it again: {_cut(failure['request']['curl'], _SHOWN_CURL)}")
+        text = "\n".join([*lines, *_response(failure["response"])])
+        yield text
+        shown, octets = place, octets + len(text.encode("utf-8", "surrogatepass"))
+    if len(found) > shown:
+        yield f"{len(found) - shown} more findings are in result.json."
 
 
 def _response(response: Mapping[str, Any] | None) -> Iterator[str]:

@@ -13,12 +13,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from reports.formats.cases import Case, Outcome, cases
+from reports.formats.cases import MESSAGE, Case, Outcome, cases
 from reports.formats.places import places_of
 from reports.pages.untrusted import excerpt, visible
 
 _SPEC = "0.0.0"
-_MESSAGE = 1000
 _STATUSES = {
     Outcome.PASSED: "passed",
     Outcome.WARNING: "passed",
@@ -67,7 +66,7 @@ def _test(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
         "filePath": place.file,
         "line": place.line,
         **({"tags": [case.requirement["level"]]} if case.requirement else {}),
-        **({"message": excerpt(case.message, _MESSAGE)} if case.message else {}),
+        **({"message": excerpt(case.message, MESSAGE)} if case.message else {}),
         **({"trace": visible(case.detail)} if case.message and case.detail else {}),
     }
 

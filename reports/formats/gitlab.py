@@ -8,11 +8,10 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from reports.formats.cases import Case, Outcome, cases, worst_first
+from reports.formats.cases import MESSAGE, Case, Outcome, cases, worst_first
 from reports.formats.places import places_of
 from reports.pages.untrusted import excerpt
 
-_MESSAGE = 600
 _SEVERITIES = {Outcome.FAILED: "critical", Outcome.ERROR: "major", Outcome.ACCEPTED: "minor", Outcome.WARNING: "minor"}
 
 
@@ -24,7 +23,7 @@ def gitlab(result: Mapping[str, Any]) -> str:
 def _entry(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
     place = places_of(result, case)[0]
     return {
-        "description": excerpt(f"{case.name}: {case.message}", _MESSAGE),
+        "description": excerpt(f"{case.name}: {case.message}", MESSAGE),
         "check_name": case.rule,
         "fingerprint": case.fingerprint,
         "severity": _SEVERITIES[case.outcome],

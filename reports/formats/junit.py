@@ -19,10 +19,9 @@ from typing import Any
 
 from lxml import etree
 
-from reports.formats.cases import Case, Outcome, cases
+from reports.formats.cases import MESSAGE, Case, Outcome, cases
 from reports.pages.untrusted import excerpt, visible
 
-_MESSAGE = 600
 _ELEMENTS = {Outcome.FAILED: "failure", Outcome.ERROR: "error", Outcome.ACCEPTED: "skipped", Outcome.SKIPPED: "skipped"}
 
 
@@ -76,7 +75,7 @@ def _element(suite: str, case: Case) -> etree._Element:
         "testcase", classname=excerpt(f"roaas.{suite}", 200), name=excerpt(case.name, 300), time="0"
     )
     if case.outcome in _ELEMENTS:
-        outcome = etree.SubElement(element, _ELEMENTS[case.outcome], message=excerpt(case.message, _MESSAGE))
+        outcome = etree.SubElement(element, _ELEMENTS[case.outcome], message=excerpt(case.message, MESSAGE))
         if case.outcome in {Outcome.FAILED, Outcome.ERROR}:
             outcome.set("type", "nonconformity" if case.outcome is Outcome.FAILED else "no-verdict")
             outcome.text = visible(case.detail)

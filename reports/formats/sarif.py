@@ -13,13 +13,12 @@ from typing import Any
 from urllib.parse import quote
 
 from reports.certificate.page import certificate
-from reports.formats.cases import Case, Outcome, cases, worst_first
+from reports.formats.cases import MESSAGE, Case, Outcome, cases, worst_first
 from reports.formats.places import Place, places_of
 from reports.formats.source_pages import page_of
 from reports.pages.untrusted import excerpt, visible
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
-_MESSAGE = 1000
 _DETAIL = 6000
 _LEVELS = {Outcome.FAILED: "error", Outcome.ERROR: "none", Outcome.ACCEPTED: "warning", Outcome.WARNING: "warning"}
 
@@ -99,5 +98,5 @@ def _location(place: Place) -> dict[str, Any]:
 
 def _text(text: str) -> str:
     """One line that a viewer shows as it is: no placeholder (SARIF 3.11.5), no link (3.11.6) comes alive in it."""
-    line = excerpt(text, _MESSAGE)
+    line = excerpt(text, MESSAGE)
     return line.replace("{", "{{").replace("}", "}}").replace("\\", "\\\\").replace("[", "\\[").replace("]", "\\]")
