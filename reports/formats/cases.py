@@ -6,6 +6,7 @@ saw none.
 """
 
 import hashlib
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -101,7 +102,12 @@ def worst_first(found: Sequence[Case]) -> list[Case]:
     """The cases that somebody has to look at: failed, not judged, accepted, warnings."""
     order = [Outcome.FAILED, Outcome.ERROR, Outcome.ACCEPTED, Outcome.WARNING]
     shown = (case for case in found if case.outcome in order)
-    return sorted(shown, key=lambda case: (order.index(case.outcome), *(one.number or 0 for one in case.findings[:1])))
+    return sorted(shown, key=lambda case: (order.index(case.outcome), _first(case)))
+
+
+def _first(case: Case) -> float:
+    """The number of the case's first finding; a class or a run without a finding comes after all findings."""
+    return case.findings[0].number or 0 if case.findings else math.inf
 
 
 def classes(result: Mapping[str, Any]) -> list[str]:

@@ -102,7 +102,7 @@ def test_how_the_runs_differ_is_told(pair):
     old, new = pair([], [])
     new["suite"]["version"] = "9.9"
     new["statement"]["robot"]["version"] = "3.0"
-    new["statement"]["motion_allowed"] = True
+    old["statement"]["motion_allowed"] = False
     found = difference(old, new)
     told = [("firmware", "2.4.1", "3.0"), ("suite", "0.1.0", "9.9"), ("motion allowed", "no", "yes")]
     assert list(found.circumstances) == told
