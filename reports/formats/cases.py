@@ -136,7 +136,7 @@ def _outcome(requirement: Mapping[str, Any], found: Sequence[Finding]) -> tuple[
     expected = requirement.get("expected_failure")
     if expected is not None:
         until = f" until {expected['expires']}" if expected.get("expires") else ""
-        return Outcome.ACCEPTED, f"Expected by the baseline{until}: {expected['reason']}"
+        return Outcome.ACCEPTED, f"Accepted by the baseline{until}: {expected['reason']}"
     verdict, reason = requirement["verdict"], requirement["untestable"] or requirement["reason"]
     outcome = _OUTCOMES[verdict]
     if outcome in {Outcome.FAILED, Outcome.WARNING}:

@@ -97,7 +97,7 @@ def test_expected_failure_is_skipped(result):
     requirement = next(r for r in result["requirements"] if r["id"] == "rest-resources/goal-delete")
     requirement.update(verdict="warn", expected_failure={"reason": "known since 2.3", "expires": "2027-01-01"})
     element = case(parsed(result), "rest-resources/goal-delete")
-    assert element.find("skipped").get("message") == "Expected by the baseline until 2027-01-01: known since 2.3"
+    assert element.find("skipped").get("message") == "Accepted by the baseline until 2027-01-01: known since 2.3"
     assert element.find("failure") is None
 
 
