@@ -1,27 +1,27 @@
 """Latency over the load: the offered rate, up to where the robot gives way, and the number of busy connections."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from reports.latency.figures.canvas import COLOUR, MARK, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, picture
 
 
-def load(result: Mapping[str, Any]) -> Picture | None:
+@picture(
+    "load",
+    "Response time under more and more load, 99th percentile as a line, median dashed. Over the offered rate: "
+    "vertical lines are the highest rate that met the criterion, hollow is a step that did not meet it. Over "
+    "the number of connections that are always busy: where latency doubles with it, the robot gives no more.",
+)
+def load(result: Mapping[str, Any]) -> Iterator[Panel]:
     """Latency over the offered rate, the knee as a vertical line; and over the number of busy connections."""
     steps = [step for step in result.get("steps", []) if step["offered_rate"] > 0]
     crowds = [one for one in result.get("over_connections", []) if one["p50_ms"] is not None]
-    with drawing():
-        panels = [_latency(steps, result.get("knee", []))] if steps else []
-        panels += [_crowd(crowds)] if crowds else []
-        return gather(
-            "load",
-            "Response time under more and more load, 99th percentile as a line, median dashed. Over the offered rate: "
-            "vertical lines are the highest rate that met the criterion, hollow is a step that did not meet it. Over "
-            "the number of connections that are always busy: where latency doubles with it, the robot gives no more.",
-            panels,
-        )
+    if steps:
+        yield _latency(steps, result.get("knee", []))
+    if crowds:
+        yield _crowd(crowds)
 
 
 def _latency(steps: Sequence[Mapping[str, Any]], knees: Sequence[Mapping[str, Any]]) -> Panel:
@@ -40,7 +40,7 @@ def _latency(steps: Sequence[Mapping[str, Any]], knees: Sequence[Mapping[str, An
             )
             for step in shown:
                 _mark(panel, step, step[key], interface)
-    log_time_axis(panel.axes, "y", "response time, ms")
+    log_time_axis(panel.axes, "response time, ms")
     _finish(panel, knees)
     return panel
 
@@ -61,7 +61,7 @@ def _crowd(crowds: Sequence[Mapping[str, Any]]) -> Panel:
                 linewidth=1.6,
                 label=f"{interface.upper()} {label}",
             )
-    log_time_axis(panel.axes, "y", "response time, ms")
+    log_time_axis(panel.axes, "response time, ms")
     panel.axes.set_xscale("log")
     panel.axes.set_xlabel("connections that are always busy")
     panel.axes.set_xticks(sorted({one["connections"] for one in crowds}))

@@ -1,11 +1,11 @@
 """Ratios with their intervals, one under the other: SOAP to REST beside the paper's, or a new run to an old one."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from reports.latency.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Picture, drawing, gather
+from reports.latency.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Picture, picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,42 +25,47 @@ def ratios(
 
     `mark` is a figure to compare with, and what it is called.
     """
-    if not rows:
-        return None
+
+    @picture(name, caption)
+    def panels() -> Iterator[Panel]:
+        if rows:
+            yield _panel(title, rows, mark)
+
+    return panels()
+
+
+def _panel(title: str, rows: Sequence[Ratio], mark: tuple[float, str] | None) -> Panel:
     told = "; ".join(f"{row.label}: {row.ratio:.3g}" for row in rows)
-    with drawing():
-        panel = Panel(title, f"{title}. {told}", height=1.45 + 0.34 * len(rows))
-        axes = panel.axes
-        axes.axvline(1.0, color=INK, linewidth=0.9)
-        if mark is not None:
-            axes.axvline(mark[0], color=PAPER_COLOUR, linestyle=(0, (4, 3)), linewidth=1.4, label=mark[1])
-        for place, row in enumerate(rows):
-            if row.interval is not None:
-                axes.plot(
-                    row.interval, [place, place], color=row.colour, linewidth=5, alpha=0.35, solid_capstyle="butt"
-                )
-            axes.plot([row.ratio], [place], "o", color=row.colour, markersize=5)
-            axes.annotate(
-                f"{row.ratio:.2f}",
-                (1.0, place),
-                (6, 0),
-                xycoords=("axes fraction", "data"),
-                textcoords="offset points",
-                va="center",
-                color=SOFT,
-            )
-        axes.set_yticks(range(len(rows)), [row.label for row in rows])
-        axes.set_ylim(len(rows) - 0.4, -0.6)
-        axes.set_xscale("log")
-        low, high = axes.get_xlim()
-        low, high = min(low, 0.8), max(high, 1.25)
-        axes.set_xlim(low, high)
-        axes.xaxis.set_minor_locator(NullLocator())
-        axes.xaxis.set_major_locator(FixedLocator(_ticks(low, high)))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.grid(visible=False, axis="y")
-        panel.legend()
-        return gather(name, caption, [panel])
+    panel = Panel(title, f"{title}. {told}", height=1.45 + 0.34 * len(rows))
+    axes = panel.axes
+    axes.axvline(1.0, color=INK, linewidth=0.9)
+    if mark is not None:
+        axes.axvline(mark[0], color=PAPER_COLOUR, linestyle=(0, (4, 3)), linewidth=1.4, label=mark[1])
+    for place, row in enumerate(rows):
+        if row.interval is not None:
+            axes.plot(row.interval, [place, place], color=row.colour, linewidth=5, alpha=0.35, solid_capstyle="butt")
+        axes.plot([row.ratio], [place], "o", color=row.colour, markersize=5)
+        axes.annotate(
+            f"{row.ratio:.2f}",
+            (1.0, place),
+            (6, 0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            va="center",
+            color=SOFT,
+        )
+    axes.set_yticks(range(len(rows)), [row.label for row in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_xscale("log")
+    low, high = axes.get_xlim()
+    low, high = min(low, 0.8), max(high, 1.25)
+    axes.set_xlim(low, high)
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_locator(FixedLocator(_ticks(low, high)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.grid(visible=False, axis="y")
+    panel.legend()
+    return panel
 
 
 def _ticks(low: float, high: float) -> list[float]:

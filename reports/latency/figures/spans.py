@@ -1,30 +1,27 @@
 """Where the time goes: the spans of a request, stacked, for the wire client and for zeep."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from reports.latency.distributions import Series
-from reports.latency.figures.canvas import INK, SPAN_COLOUR, SPAN_HATCH, Panel, Picture, drawing, gather, milliseconds
+from reports.latency.figures.canvas import INK, SPAN_COLOUR, SPAN_HATCH, Panel, milliseconds, picture
 from reports.latency.figures.spectrum import Key
 
 SPANS = ("build", "wire", "server", "parse")
 
 
-def spans(series: Mapping[Key, Series]) -> Picture | None:
+@picture(
+    "spans",
+    "What a request spends its time on, on average. Build: making the request. Wire: the client's sending, "
+    "the network and the robot's reading. Server: the robot's own work, as it states it in Server-Timing "
+    "(without that, it is part of wire). Parse: reading the answer.",
+)
+def spans(series: Mapping[Key, Series]) -> Iterator[Panel]:
     """One panel for each client: mean spans of each operation and interface, laid end to end."""
-    panels = []
-    with drawing():
-        for client in dict.fromkeys(key[1] for key in series):
-            bars = {s.name: means(s) for key, s in series.items() if key[1] == client and s.data["count"]}
-            bars = {name: parts for name, parts in bars.items() if parts}
-            if bars:
-                panels.append(_panel(client, bars))
-        return gather(
-            "spans",
-            "What a request spends its time on, on average. Build: making the request. Wire: the client's sending, "
-            "the network and the robot's reading. Server: the robot's own work, as it states it in Server-Timing "
-            "(without that, it is part of wire). Parse: reading the answer.",
-            panels,
-        )
+    for client in dict.fromkeys(key[1] for key in series):
+        bars = {s.name: means(s) for key, s in series.items() if key[1] == client and s.data["count"]}
+        bars = {name: parts for name, parts in bars.items() if parts}
+        if bars:
+            yield _panel(client, bars)
 
 
 def means(series: Series) -> dict[str, float]:

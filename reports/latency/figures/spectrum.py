@@ -4,14 +4,14 @@ The axis is 1 / (1 - quantile), logarithmic: each nine takes the same room, so t
 stalls are, is not squeezed into the last pixel.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from reports.latency.distributions import Distribution, Floats, Series
-from reports.latency.figures.canvas import COLOUR, MARK, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, picture
 
 _POINTS = 220
 _NINES = (0.0, 0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999)
@@ -19,43 +19,40 @@ _NINES = (0.0, 0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999)
 Key = tuple[str, str, str]
 
 
-def spectrum(series: Mapping[Key, Series]) -> Picture | None:
+@picture(
+    "spectrum",
+    "How long the slowest requests took. Read: at 99 %, one request in a hundred took longer than the curve "
+    "says. Solid: service time, from the moment a request was sent. Dashed: response time, from the moment "
+    "it was due, which also counts the wait behind a stalled robot. Thin: too few requests for a sure value.",
+)
+def spectrum(series: Mapping[Key, Series]) -> Iterator[Panel]:
     """One panel for each client and operation: service time as a line, response time dashed."""
-    panels = []
-    with drawing():
-        for client, operation in dict.fromkeys((key[1], key[0]) for key in series):
-            drawn = [s for key, s in series.items() if key[:2] == (operation, client) and s.service is not None]
-            if not drawn:
-                continue
-            names = " and ".join(s.data["interface"].upper() for s in drawn)
-            panel = Panel(
-                f"{operation}, {client} client",
-                f"Percentile spectrum of {names} for {operation} with the {client} client; "
-                "the table of quantiles holds its figures.",
-            )
-            for one in drawn:
-                interface = one.data["interface"]
-                if one.service is not None:
-                    curve(panel.axes, one.service, (COLOUR[interface], MARK[interface]), f"{interface.upper()} service")
-                if one.response is not None and _differ(one.service, one.response):
-                    curve(
-                        panel.axes,
-                        one.response,
-                        (COLOUR[interface], MARK[interface]),
-                        f"{interface.upper()} response",
-                        "--",
-                    )
-            quantile_axis(panel.axes, max(s.service.total for s in drawn if s.service is not None))
-            log_time_axis(panel.axes, "y", "milliseconds")
-            panel.legend()
-            panels.append(panel)
-        return gather(
-            "spectrum",
-            "How long the slowest requests took. Read: at 99 %, one request in a hundred took longer than the curve "
-            "says. Solid: service time, from the moment a request was sent. Dashed: response time, from the moment "
-            "it was due, which also counts the wait behind a stalled robot. Thin: too few requests for a sure value.",
-            panels,
+    for client, operation in dict.fromkeys((key[1], key[0]) for key in series):
+        drawn = [s for key, s in series.items() if key[:2] == (operation, client) and s.service is not None]
+        if not drawn:
+            continue
+        names = " and ".join(s.data["interface"].upper() for s in drawn)
+        panel = Panel(
+            f"{operation}, {client} client",
+            f"Percentile spectrum of {names} for {operation} with the {client} client; "
+            "the table of quantiles holds its figures.",
         )
+        for one in drawn:
+            interface = one.data["interface"]
+            if one.service is not None:
+                curve(panel.axes, one.service, (COLOUR[interface], MARK[interface]), f"{interface.upper()} service")
+            if one.response is not None and _differ(one.service, one.response):
+                curve(
+                    panel.axes,
+                    one.response,
+                    (COLOUR[interface], MARK[interface]),
+                    f"{interface.upper()} response",
+                    "--",
+                )
+        quantile_axis(panel.axes, max(s.service.total for s in drawn if s.service is not None))
+        log_time_axis(panel.axes, "milliseconds")
+        panel.legend()
+        yield panel
 
 
 def curve(axes: Axes, values: Distribution, look: tuple[str, str], label: str, dash: str = "-") -> None:

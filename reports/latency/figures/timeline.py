@@ -1,13 +1,13 @@
 """Latency over the run, with the stalls of the robot marked."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
 from matplotlib.ticker import MaxNLocator
 
-from reports.latency.figures.canvas import COLOUR, INK, MARK, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.canvas import COLOUR, INK, MARK, Panel, log_time_axis, picture
 
 _MOST_POINTS = 240
 _STALL_FACTOR = 20
@@ -57,47 +57,44 @@ def stalls(result: Mapping[str, Any]) -> list[Stall]:
     return found
 
 
-def timeline(result: Mapping[str, Any]) -> Picture | None:
+@picture(
+    "timeline",
+    "Response time over the run: the line is each interval's median, the dots its longest request, crosses "
+    "are failed requests. Yellow marks stalls: a request took 20 times as long as usual, and over 20 ms.",
+)
+def timeline(result: Mapping[str, Any]) -> Iterator[Panel]:
     """One panel for each client and operation: median and longest response time over the run."""
-    panels = []
     marks = stalls(result)
     timed = list(_timed(result))
-    with drawing():
-        for operation, client in dict.fromkeys((s["operation"], s["client"]) for s in timed):
-            drawn = [s for s in timed if (s["operation"], s["client"]) == (operation, client)]
-            own = [stall for stall in marks if stall.series[:2] == (operation, client)]
-            panel = Panel(
-                f"{operation}, {client} client",
-                f"Response times of {operation} with the {client} client over the run; "
-                f"{len(own)} {'stall' if len(own) == 1 else 'stalls'} marked.",
-            )
-            for stall in own:
-                panel.axes.axvspan(stall.start_s, stall.end_s, color=_STALL_COLOUR, alpha=0.5, linewidth=0)
-            for series in drawn:
-                _draw(panel, series)
-            log_time_axis(panel.axes, "y", "response time, ms")
-            panel.axes.xaxis.set_major_locator(MaxNLocator(7, integer=True))
-            panel.axes.set_xlabel("seconds since the start")
-            longest = max(own, key=lambda stall: stall.longest_ms or 0.0, default=None)
-            if longest is not None and longest.longest_ms is not None:
-                late = longest.end_s > 0.8 * panel.axes.get_xlim()[1]  # there is no room to the right
-                panel.axes.annotate(
-                    f"{longest.longest_ms:,.0f} ms",
-                    (longest.start_s if late else longest.end_s, longest.longest_ms),
-                    (-4 if late else 4, 0),
-                    textcoords="offset points",
-                    ha="right" if late else "left",
-                    va="center",
-                    color=INK,
-                )
-            panel.legend()
-            panels.append(panel)
-        return gather(
-            "timeline",
-            "Response time over the run: the line is each interval's median, the dots its longest request, crosses "
-            "are failed requests. Yellow marks stalls: a request took 20 times as long as usual, and over 20 ms.",
-            panels,
+    for operation, client in dict.fromkeys((s["operation"], s["client"]) for s in timed):
+        drawn = [s for s in timed if (s["operation"], s["client"]) == (operation, client)]
+        own = [stall for stall in marks if stall.series[:2] == (operation, client)]
+        panel = Panel(
+            f"{operation}, {client} client",
+            f"Response times of {operation} with the {client} client over the run; "
+            f"{len(own)} {'stall' if len(own) == 1 else 'stalls'} marked.",
         )
+        for stall in own:
+            panel.axes.axvspan(stall.start_s, stall.end_s, color=_STALL_COLOUR, alpha=0.5, linewidth=0)
+        for series in drawn:
+            _draw(panel, series)
+        log_time_axis(panel.axes, "response time, ms")
+        panel.axes.xaxis.set_major_locator(MaxNLocator(7, integer=True))
+        panel.axes.set_xlabel("seconds since the start")
+        longest = max(own, key=lambda stall: stall.longest_ms or 0.0, default=None)
+        if longest is not None and longest.longest_ms is not None:
+            late = longest.end_s > 0.8 * panel.axes.get_xlim()[1]  # there is no room to the right
+            panel.axes.annotate(
+                f"{longest.longest_ms:,.0f} ms",
+                (longest.start_s if late else longest.end_s, longest.longest_ms),
+                (-4 if late else 4, 0),
+                textcoords="offset points",
+                ha="right" if late else "left",
+                va="center",
+                color=INK,
+            )
+        panel.legend()
+        yield panel
 
 
 def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
