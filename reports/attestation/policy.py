@@ -1,4 +1,4 @@
-"""The policy: what a relying party asks of a certificate beyond its signature, each point a line of a TOML file."""
+"""The policy: what a relying party requires of a certificate besides its signature, one point a line in TOML."""
 
 import datetime as dt
 import tomllib
@@ -13,19 +13,19 @@ from reports.attestation.statement import Run, Statement, passed, seed_of
 from reports.errors import PolicyUnusableError
 
 _SKEW = dt.timedelta(minutes=5)
-"""As much as the clock of whoever certified may be ahead of ours."""
+"""How far the vendor's clock may be ahead of ours."""
 OWN = "installed"
-"""In a policy, the suite that verifies."""
+"""In a policy, this word means the suite that verifies."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """What the suite that verifies knows.
+    """What the verifying suite knows.
 
     Attributes:
-        suite: its own digest.
-        requirement_sets: name to digest.
-        profiles: name to the classes that it holds.
+        suite: its digest.
+        requirement_sets: digests by name.
+        profiles: classes by name of the profile.
     """
 
     suite: str = ""
@@ -34,21 +34,21 @@ class Known:
 
 
 class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is asked; the defaults are the default policy, and docs/certificates.md explains each.
+    """What a certificate must meet. The defaults are the default policy; docs/certificates.md explains each point.
 
     Attributes:
         robot: the robot's name, or None for any; vendor and firmware likewise.
-        verdicts: of the whole run that will do.
-        profile: whose classes have to have passed; classes: these instead.
-        suites: digests of suites that are trusted; "installed" is the one that verifies.
-        requirement_sets: names of sets that this suite knows, too.
-        efforts: how much has to have been tried.
-        motion: whether the robot has to have been moved.
-        ros: whether its ROS side has to have been watched where a class asks for it.
-        baseline: whether failures may have been accepted.
-        interrupted: whether a part of a run will do.
-        max_age_days: since the end of the run.
-        nonce: that the run has to have been made with, or None.
+        verdicts: accepted verdicts of the whole run.
+        profile: the profile whose classes must have passed, unless `classes` names them.
+        suites: digests of trusted suites; "installed" is the one that verifies.
+        requirement_sets: names of accepted sets, which the verifying suite must know.
+        efforts: accepted efforts.
+        motion: whether the robot must have been allowed to move.
+        ros: whether ROS topics must have been observed for the classes that ask for it.
+        baseline: whether accepted failures are tolerated.
+        interrupted: whether an incomplete run is tolerated.
+        max_age_days: greatest age of the run.
+        nonce: the nonce that the run must have been made with, or None.
     """
 
     robot: str | None = None
@@ -69,7 +69,7 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Point(NamedTuple):
-    """One point of a policy: its line, whether the certificate meets it, and what was found."""
+    """One point of a policy: its name, whether the certificate meets it, and what the certificate says."""
 
     name: str
     met: bool
@@ -77,10 +77,10 @@ class Point(NamedTuple):
 
 
 def read_policy(path: Path, known: Known) -> Policy:
-    """Read a policy file.
+    """Return the policy in a file.
 
     Raises:
-        PolicyUnusableError: it cannot be read, has an unknown line, or names a profile that there is not.
+        PolicyUnusableError: it cannot be read, has an unknown line, or names an unknown profile.
     """
     try:
         policy = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Policy)
@@ -94,7 +94,7 @@ def read_policy(path: Path, known: Known) -> Policy:
 
 
 def judge(statement: Statement, policy: Policy, known: Known, now: dt.datetime) -> list[Point]:
-    """Compare a verified statement with a policy, point by point."""
+    """Judge a verified statement by a policy, point by point."""
     run = statement.predicate.roaas
     return [*_who(run, policy), *_what(run, policy, known), *_how(run, policy, known), *_when(run, policy, now)]
 

@@ -1,4 +1,4 @@
-"""What a latency result says, in sentences: the verdict first, each claim with its interval."""
+"""A latency result in sentences: the verdict, and remarks with their intervals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from reports.pages.page import opened
 
 _MANY_FAR = 0.01
 PAPER = {"rest_ms": 1.5, "soap_ms": 2.5, "ratio": 1.67}
-"""What the paper reports: mean response times on localhost, and their ratio. It gives no spread and no method."""
+"""The paper's mean response times on localhost, and their ratio; it gives neither spread nor method."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Verdict:
 
     Attributes:
         tone: "good", "bad", "warning" or "quiet".
-        sentence: what was found, with its interval.
+        sentence: the result, with its interval.
     """
 
     tone: str
@@ -33,7 +33,7 @@ class Verdict:
 
 
 def verdict(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> Verdict:
-    """The result's own headline, and the tone in which it is said."""
+    """Return the result's own headline with a tone and a sign."""
     said = result["headline"]
     return Verdict(*_tone(result, series), said["words"], said["sentence"])
 
@@ -51,7 +51,7 @@ def _tone(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Serie
 
 
 def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """Further findings, a sentence each: stalls, knee, failures, and the run's own notes."""
+    """Return further observations, a sentence each: stalls, knees, failed requests, and the run's own notes."""
     return [
         *_server_share(series),
         *work(series),
@@ -69,7 +69,7 @@ def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
 
 
 def _server_share(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """How much of what SOAP takes more the server spends, by the wire client, where the robot says it."""
+    """Return how much of SOAP's extra time the server spends, if the robot states its time."""
     told = []
     for (operation, client, interface), soap in series.items():
         rest = series.get((operation, client, "rest"))
@@ -87,7 +87,7 @@ def _server_share(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
 
 
 def _further(result: Mapping[str, Any]) -> list[str]:
-    """What each interface beside SOAP and REST takes at the median."""
+    """Return how long interfaces other than SOAP and REST take at the median."""
     return [
         f"{way['interface'].capitalize()} takes {interval(way['ci95'], of_ratio=True)} times as long as REST at the "
         f"median for {way['operation']}, with the {way['client']} client (95 % interval), "
@@ -98,7 +98,7 @@ def _further(result: Mapping[str, Any]) -> list[str]:
 
 
 def _followed(result: Mapping[str, Any]) -> list[str]:
-    """How long a delivery takes over each way until the application has it."""
+    """Return how long a delivery takes over each interface until the application has received it."""
     ways = result.get("end_to_end", {}).get("ways", [])
     told = [
         f"{ms(way['to_application_ms']['p50'])} ms over {way['interface'].upper()}"
@@ -106,12 +106,12 @@ def _followed(result: Mapping[str, Any]) -> list[str]:
         if way["to_application_ms"]["p50"] is not None
     ]
     lost = sum(way["lost"] for way in ways)
-    missing = f" {lost:,} answered well never arrived." if lost else ""
-    return [f"The application has a delivery after {', '.join(told)} at the median.{missing}"] if told else []
+    missing = f" {lost:,} deliveries that the robot accepted never arrived." if lost else ""
+    return [f"Median time until the application has received a delivery: {', '.join(told)}.{missing}"] if told else []
 
 
 def _stalled(result: Mapping[str, Any]) -> list[str]:
-    """Stalls as moments of the robot: those of several series that overlap are one."""
+    """Return the stalls in one sentence; overlapping stalls of several series count as one."""
     moments: list[list[Stall]] = []
     for stall in sorted(stalls(result), key=lambda stall: stall.start_s):
         if moments and stall.start_s < max(other.end_s for other in moments[-1]):
@@ -132,7 +132,7 @@ def _stalled(result: Mapping[str, Any]) -> list[str]:
 
 
 def _two_modes(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """A sentence for each series that has two modes, and one on those of which many requests lie far off."""
+    """Return a sentence for each series with two modes, and one on series with many requests far above the median."""
     told, far = [], []
     for one in series.values():
         found = one.data.get("modes")
@@ -147,7 +147,7 @@ def _two_modes(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
             )
         elif found["beyond_five_medians"] >= _MANY_FAR:
             far.append(f"{share(found['beyond_five_medians'])} of {name}")
-    return [*told, f"Over five times the median take: {', '.join(far)}."] if far else told
+    return [*told, f"Requests over five times the median: {', '.join(far)}."] if far else told
 
 
 def _knees(result: Mapping[str, Any]) -> list[str]:
@@ -155,25 +155,25 @@ def _knees(result: Mapping[str, Any]) -> list[str]:
     explained: set[str] = set()
     for knee in result.get("knee", []):
         name = knee["interface"].upper()
-        # One criterion serves both interfaces, as a rule: it is told once.
+        # Both interfaces usually have the same criterion: it is shown once.
         criterion = "" if knee["criterion"] in explained else f" ({knee['criterion']})"
         explained.add(knee["criterion"])
         if knee["highest_rate"] is None:
-            told.append(f"{name} met the criterion at no offered rate{criterion}.")
+            told.append(f"{name} did not meet the criterion at any offered rate{criterion}.")
             continue
-        sentence = f"{name} holds up to {rate(knee['highest_rate'])} requests/s{criterion}"
+        sentence = f"{name} meets the criterion up to {rate(knee['highest_rate'])} requests/s{criterion}"
         missed = knee.get("first_rate_missed")
         if missed is None:
-            told.append(f"{sentence}, the highest rate offered: the knee lies above it.")
+            told.append(f"{sentence}, the highest rate offered: the knee is above it.")
             continue
         because = f": {knee['reason']}" if knee.get("reason") else ""
         limit = " The generator, not the robot, was the limit." if knee.get("limited_by") == "generator" else ""
-        told.append(f"{sentence}; it gave way at {rate(missed)} requests/s{because}.{limit}")
+        told.append(f"{sentence}, and no longer at {rate(missed)} requests/s{because}.{limit}")
     return told
 
 
 def _searched(result: Mapping[str, Any]) -> list[str]:
-    """Where the robot gives way, by bisection."""
+    """Return the knee of each interface that was found by bisection."""
     told = []
     for knee in result.get("knee_search", []):
         name = "REST and SOAP at once" if knee["interface"] == "both" else knee["interface"].upper()
@@ -186,7 +186,7 @@ def _searched(result: Mapping[str, Any]) -> list[str]:
         first = knee.get("errors_from")
         failing = "" if first is None else f" Requests failed from {rate(first)} requests/s on."
         told.append(
-            f"{name}: gives way at {rate(knee['rate'])} requests/s ({rate(low)} to {rate(high)}, "
+            f"{name}: the knee is at {rate(knee['rate'])} requests/s ({rate(low)} to {rate(high)}, "
             f"{knee['searches']} searches).{failing}{limit}"
         )
     return told
@@ -198,15 +198,15 @@ def _failed(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
         return ["No request failed."] if any(one.data["count"] for one in series.values()) else []
     answered = sum(one.data["count"] for one in series.values())
     counted = (
-        "they count as at least their age when they were given up"
+        "each counts with at least the time until it was given up"
         if all("counted" in one.data for one in series.values())
-        else "they are in no figure of time"
+        else "no time includes them"
     )
     return [f"{_count(errors, 'request')} of {errors + answered:,} failed; {counted}."]
 
 
 def _noted(result: Mapping[str, Any]) -> list[str]:
-    """The result's notes, which are clauses, as sentences."""
+    """Return the result's notes, which are clauses, as sentences."""
     return [f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note]
 
 

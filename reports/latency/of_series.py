@@ -1,16 +1,16 @@
-"""What is said of each series by itself: after a pause, over several repeats, and of the robot's own part in it."""
+"""Remarks on single series: the robot's own work, requests after a pause, and repeats."""
 
 from collections.abc import Mapping
 
 from reports.latency.distributions import Series
 from reports.latency.numbers import interval, ms, rate
 
-#: Where the robot's own parts differ by this factor, the interfaces make it do different work.
+#: If the robot's own times over two interfaces differ by this factor, it does different work for them.
 _OTHER_WORK = 1.5
 
 
 def work(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """Where the robot says that it is itself busy for longer over one interface than over the other."""
+    """Return a remark for each operation on which the robot itself works longer over one interface than the other."""
     told = []
     for (operation, client, interface), rest in series.items():
         soap = series.get((operation, client, "soap"))
@@ -26,7 +26,7 @@ def work(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
 
 
 def cold(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """What a request costs after a pause, beside one right behind another: a sentence for all series."""
+    """Return one sentence that compares requests after a pause with requests without one, for all series."""
     told, after, behind = [], "", ""
     for one in series.values():
         pause = one.data.get("after_pause")
@@ -41,7 +41,7 @@ def cold(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
 
 
 def _behind(spacing_s: float) -> str:
-    """How closely requests followed one another where there was no pause."""
+    """Return how closely requests followed one another without a pause."""
     if not spacing_s:
         return "right behind another request"
     limit = f"the limit of {rate(1 / spacing_s)} requests/s allows no less"
@@ -49,7 +49,7 @@ def _behind(spacing_s: float) -> str:
 
 
 def repeated(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """Whether the repeats' own intervals cover what the repeats differ by."""
+    """Return a remark for each series with repeats: how far their medians differ, and whether their intervals cover it."""
     told = []
     for one in series.values():
         repeats = [repeat for repeat in one.data.get("repeats", []) if repeat["p50"] and repeat["ci95_ms"]["p50"]]
@@ -59,6 +59,6 @@ def repeated(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
             medians = [repeat["p50"] for repeat in repeats]
             told.append(
                 f"{one.name}, {one.data['client']}: medians of {len(repeats)} repeats from {ms(min(medians))} to "
-                f"{ms(max(medians))} ms; the intervals of {missed} of them leave the median of all out."
+                f"{ms(max(medians))} ms; the intervals of {missed} of them do not contain the overall median."
             )
     return told

@@ -1,4 +1,4 @@
-"""Two runs in one drawing: the percentile spectrum of each series, old and new."""
+"""The percentile spectrum of each series in two runs, old and new."""
 
 from collections.abc import Iterator, Mapping
 
@@ -9,11 +9,11 @@ from reports.latency.figures.spectrum import Key, curve, quantile_axis
 
 @picture(
     "change",
-    "Service time at each percentile, old and new. Where the new curve lies higher, requests got slower. "
-    "Thin: too few requests for a sure value.",
+    "Service time at each percentile, old and new. Where the new curve is higher, requests got slower. "
+    "Thin lines: too few requests for a reliable value.",
 )
 def change(old: Mapping[Key, Series], new: Mapping[Key, Series]) -> Iterator[Panel]:
-    """One panel for each series that both results hold: service times, old in grey and dashed, new in colour."""
+    """Yield a panel for each series that both results hold: service times, old in grey and dashed, new in colour."""
     for key, after in new.items():
         before = old.get(key)
         if before is None or before.service is None or after.service is None:

@@ -1,4 +1,4 @@
-"""Latency over the run as it was: a heat map of all requests, and the medians of the blocks that are compared."""
+"""Latency over the run: a heat map of all requests, and the median of each block."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -10,17 +10,17 @@ from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, p
 
 
 def leading(series: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Those of the wire client, where there are some: they say most of the robot, and a page has its limits."""
+    """Return the series of the wire client if there are any: they say most about the robot, and a page has its limits."""
     return [one for one in series if one["client"] == "wire"] or list(series)
 
 
 @picture(
     "heat",
-    "The requests of the duel, by when it was sent and how long it took: the darker, the more of them. Two "
-    "bands are two modes; a step is a change of the robot or of the machine.",
+    "Requests of the alternating blocks, by when they were sent and how long they took. A darker cell holds more "
+    "requests. Two bands mean that latency has two modes. A step means that the robot or the machine changed.",
 )
 def heat(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """One panel for each series of the heat map: the darker, the more requests took so long at that time."""
+    """Yield a panel for each series of the heat map; a darker cell holds more requests."""
     found = result.get("heat_map") or {}
     edges = found.get("edges_ms", [])
     for series in leading(found.get("series", [])):
@@ -33,7 +33,7 @@ def heat(result: Mapping[str, Any]) -> Iterator[Panel]:
             ((column["t_s"], low), (column["t_s"] + found["width_s"], high), count)
             for column in columns
             for low, high, count in zip(edges, edges[1:], column["counts"], strict=False)
-            if count  # a page has no room for what is not there
+            if count  # empty cells are left out, because they would make the page large
         ]
         panel.axes.add_collection(
             PolyCollection(
@@ -54,10 +54,11 @@ _MAPS = {"rest": "Blues", "soap": "Oranges", "rosbridge": "Greens"}
 
 
 @picture(
-    "blocks", "The median of each short block of one interface. The scatter of these is where the intervals come from."
+    "blocks",
+    "The median of each short block of one interface. The confidence intervals come from the scatter of these.",
 )
 def blocks(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """One panel for each client and operation: the median of each block, which is what intervals are made from."""
+    """Yield a panel for each client and operation: the median of each block, from which intervals are computed."""
     found = leading([block for block in result.get("blocks", []) if block["phase"] == "duel"])
     kinds = ((block["client"], operation) for block in found for operation in block["p50_ms"])
     for client, operation in dict.fromkeys(kinds):

@@ -1,4 +1,4 @@
-"""Latency over the load: the offered rate, up to where the robot gives way, and the number of busy connections."""
+"""Latency over the load: over the offered rate up to saturation, and over the number of busy connections."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -10,12 +10,12 @@ from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, p
 
 @picture(
     "load",
-    "Response time under more and more load, 99th percentile as a line, median dashed. Over the offered rate: "
-    "vertical lines are the highest rate that met the criterion, hollow is a step that did not meet it. Over "
-    "the number of connections that are always busy: where latency doubles with it, the robot gives no more.",
+    "Response time under increasing load: the 99th percentile as a solid line, the median dashed. Over the offered "
+    "rate: a vertical line is the highest rate that met the criterion, a hollow marker is a step that did not. Over "
+    "the number of connections that are always busy: where latency doubles with it, the robot is saturated.",
 )
 def load(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """Latency over the offered rate, the knee as a vertical line; and over the number of busy connections."""
+    """Yield latency over the offered rate, with the knee as a vertical line, and over the number of busy connections."""
     steps = [step for step in result.get("steps", []) if step["offered_rate"] > 0]
     crowds = [one for one in result.get("over_connections", []) if one["p50_ms"] is not None]
     if steps:

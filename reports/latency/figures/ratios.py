@@ -1,4 +1,4 @@
-"""Ratios with their intervals, one under the other: SOAP to REST beside the paper's, or a new run to an old one."""
+"""Ratios with their intervals: of SOAP to REST, of a new run to an old one, or of one robot to another."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from reports.latency.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Pictu
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """One row; `interval` is the ratio's 95 % interval, or None where the run supports none."""
+    """One row; `interval` is the ratio's 95 % interval, or None if the run is too short for one."""
 
     label: str
     ratio: float
@@ -21,9 +21,9 @@ class Ratio:
 def ratios(
     name: str, title: str, rows: Sequence[Ratio], caption: str, *, mark: tuple[float, str] | None = None
 ) -> Picture | None:
-    """A panel with a dot and a bar for each row, from top to bottom, on a logarithmic axis with 1 in it.
+    """Return a panel with a dot and a bar for each row, on a logarithmic axis that includes 1; None without rows.
 
-    `mark` is a figure to compare with, and what it is called.
+    `mark` is a value to compare with, and its name.
     """
 
     @picture(name, caption)
@@ -69,7 +69,7 @@ def _panel(title: str, rows: Sequence[Ratio], mark: tuple[float, str] | None) ->
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """The finest of three scales of ticks that keeps them apart; 1 is in each."""
+    """Return the ticks of the finest scale whose labels do not overlap; each scale includes 1."""
     scales = (
         (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5),
         (0.25, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0),

@@ -1,4 +1,4 @@
-"""Where the time goes: the spans of a request, stacked, for the wire client and for zeep."""
+"""Where the time goes: the spans of a request, stacked, for each client."""
 
 from collections.abc import Iterator, Mapping
 
@@ -11,12 +11,12 @@ SPANS = ("build", "wire", "server", "parse")
 
 @picture(
     "spans",
-    "What a request spends its time on, on average. Build: making the request. Wire: the client's sending, "
-    "the network and the robot's reading. Server: the robot's own work, as it states it in Server-Timing "
-    "(without that, it is part of wire). Parse: reading the answer.",
+    "Mean time that a request spends in each part. Build: the client makes the request. Wire: the client sends, the "
+    "network transmits, the robot reads. Server: the robot's own work, as its Server-Timing header states it; "
+    "without that header it is part of wire. Parse: the client reads the response.",
 )
 def spans(series: Mapping[Key, Series]) -> Iterator[Panel]:
-    """One panel for each client: mean spans of each operation and interface, laid end to end."""
+    """Yield a panel for each client: the mean spans of each operation and interface, end to end."""
     for client in dict.fromkeys(key[1] for key in series):
         bars = {s.name: means(s) for key, s in series.items() if key[1] == client and s.data["count"]}
         bars = {name: parts for name, parts in bars.items() if parts}
@@ -25,7 +25,7 @@ def spans(series: Mapping[Key, Series]) -> Iterator[Panel]:
 
 
 def means(series: Series) -> dict[str, float]:
-    """Mean milliseconds of each span that was observed; means, unlike quantiles, add up."""
+    """Return the mean milliseconds of each observed span; means can be added, quantiles cannot."""
     observed = {name: series.data["spans_ms"][name] for name in SPANS}
     return {name: part["mean"] for name, part in observed.items() if part is not None and part["mean"] is not None}
 

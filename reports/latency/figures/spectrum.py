@@ -1,7 +1,6 @@
 """The percentile spectrum: latency over the share of requests that were faster, on HdrHistogram's axis.
 
-The axis is 1 / (1 - quantile), logarithmic: each nine takes the same room, so that the tail, where a robot's
-stalls are, is not squeezed into the last pixel.
+The axis is 1 / (1 - quantile), logarithmic: 90 %, 99 % and 99.9 % are equally far apart, so that the tail is readable.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,12 +20,12 @@ Key = tuple[str, str, str]
 
 @picture(
     "spectrum",
-    "How long the slowest requests took. Read: at 99 %, one request in a hundred took longer than the curve "
-    "says. Solid: service time, from the moment a request was sent. Dashed: response time, from the moment "
-    "it was due, which also counts the wait behind a stalled robot. Thin: too few requests for a sure value.",
+    "Time at each percentile. At 99 %, one request in a hundred took longer than the curve shows. Solid: service "
+    "time, counted from when a request was sent. Dashed: response time, counted from when it was due, so that "
+    "waiting for a stalled robot is included. Thin lines: too few requests for a reliable value.",
 )
 def spectrum(series: Mapping[Key, Series]) -> Iterator[Panel]:
-    """One panel for each client and operation: service time as a line, response time dashed."""
+    """Yield a panel for each client and operation: service time as a solid line, response time dashed."""
     for client, operation in dict.fromkeys((key[1], key[0]) for key in series):
         drawn = [s for key, s in series.items() if key[:2] == (operation, client) and s.service is not None]
         if not drawn:
@@ -56,7 +55,7 @@ def spectrum(series: Mapping[Key, Series]) -> Iterator[Panel]:
 
 
 def curve(axes: Axes, values: Distribution, look: tuple[str, str], label: str, dash: str = "-") -> None:
-    """Draw one distribution in a colour and with a mark; thin where the values are too few for an interval."""
+    """Draw one distribution; the line is thin where there are too few values for an interval."""
     colour, mark = look
     reach = float(np.log10(max(values.total, 10)))
     at = 1 - 10.0 ** -np.linspace(0.0, reach, _POINTS)
@@ -70,7 +69,7 @@ def curve(axes: Axes, values: Distribution, look: tuple[str, str], label: str, d
 
 
 def quantile_axis(axes: Axes, total: int) -> None:
-    """Make the x axis HdrHistogram's, as far as `total` values reach."""
+    """Give the x axis HdrHistogram's scale, as far as `total` values reach."""
     end = float(max(total, 10))
     axes.set_xscale("log")
     axes.set_xlim(1.0, end)
@@ -87,7 +86,7 @@ def _nines(at: Floats) -> Floats:
 
 
 def _differ(service: Distribution | None, response: Distribution) -> bool:
-    """Whether a second curve would show anything; in the closed model both times are one."""
+    """Return whether the two curves differ; in the closed model they are the same."""
     return service is None or not (
         np.array_equal(service.low_ms, response.low_ms) and np.array_equal(service.counts, response.counts)
     )

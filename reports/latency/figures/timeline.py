@@ -17,10 +17,10 @@ _STALL_COLOUR = "#F0E442"
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """A time, counted from the run's start, in which a request waited far longer than usual.
+    """A period, counted from the start of the run, in which a request waited far longer than usual.
 
     Attributes:
-        longest_ms: the longest response time in it; None where not one request came back.
+        longest_ms: the longest response time in it; None if no request was answered.
         series: operation, client, interface.
     """
 
@@ -31,10 +31,9 @@ class Stall:
 
 
 def stalls(result: Mapping[str, Any]) -> list[Stall]:
-    """Intervals whose longest response took 20 times the series' usual one and over 20 ms, runs of them as one.
+    """Return intervals whose longest response took 20 times the usual time and over 20 ms, adjacent ones as one stall.
 
-    The usual one is the median over intervals of the interval's own median. An interval in which every
-    request failed counts as well.
+    The usual time is the median of the intervals' medians. An interval in which every request failed counts as well.
     """
     found: list[Stall] = []
     for series in _timed(result):
@@ -59,11 +58,11 @@ def stalls(result: Mapping[str, Any]) -> list[Stall]:
 
 @picture(
     "timeline",
-    "Response time over the run: the line is each interval's median, the dots its longest request, crosses "
-    "are failed requests. Yellow marks stalls: a request took 20 times as long as usual, and over 20 ms.",
+    "Response time over the run. Line: median of each interval. Markers: its longest request. Crosses: failed "
+    "requests. Yellow: stalls, in which a request took 20 times as long as usual and over 20 ms.",
 )
 def timeline(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """One panel for each client and operation: median and longest response time over the run."""
+    """Yield a panel for each client and operation: median and longest response time over the run."""
     marks = stalls(result)
     timed = list(_timed(result))
     for operation, client in dict.fromkeys((s["operation"], s["client"]) for s in timed):
@@ -102,7 +101,7 @@ def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
     points = _thinned([point for point in series["points"] if point["p50_ms"] is not None])
     colour = COLOUR[interface]
     times = [point["t_s"] for point in points]
-    # Unlike dashes keep the two apart where colours are one grey.
+    # Different dashes distinguish the two where both colours are printed as the same grey.
     dash = "-" if interface == "rest" else (0, (5, 1.5))
     panel.axes.plot(
         times,
@@ -137,7 +136,7 @@ def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
 
 
 def _thinned(points: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """At most a few hundred points: of each group the one with the longest request, so that no stall is lost."""
+    """Return at most a few hundred points: of each group the one with the longest request, so that stalls remain."""
     step = -(-len(points) // _MOST_POINTS) or 1
     groups = (points[start : start + step] for start in range(0, len(points), step))
     return [max(group, key=lambda point: point["max_ms"] or 0.0) for group in groups]

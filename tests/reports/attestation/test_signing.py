@@ -87,9 +87,9 @@ def test_only_ed25519_keys_are_taken(tmp_path, kind):
 
 def test_keys_are_not_taken_for_one_another(tmp_path):
     generate(tmp_path)
-    with pytest.raises(KeyUnusableError, match="no private key"):
+    with pytest.raises(KeyUnusableError, match="not a private key"):
         signer_of(tmp_path / PUBLIC_NAME)
-    with pytest.raises(KeyUnusableError, match="no public key"):
+    with pytest.raises(KeyUnusableError, match="not a public key"):
         public_key(tmp_path / PRIVATE_NAME)
 
 
@@ -173,7 +173,7 @@ def test_commands_from_key_to_verdict(desk, tmp_path):
     accepted = run(verify, *arguments, "--policy", lenient, "--result", desk.folder)
     assert accepted.exit_code == 0, accepted.output
     assert "ACCEPTED" in accepted.stdout
-    assert "the holder of this key says that this run took place" in " ".join(accepted.stdout.split())
+    assert "the holder of this key vouches that this run took place" in " ".join(accepted.stdout.split())
     assert "Not proved: that the robot is genuine" in " ".join(accepted.stdout.split())
     refused = run(verify, *arguments, "--policy", lenient, "--nonce", "monday")
     assert refused.exit_code == 1

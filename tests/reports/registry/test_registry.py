@@ -144,10 +144,10 @@ def test_what_does_not_verify_is_listed_and_nothing_of_it_is_shown(host):
     assert list(index(host)) == ["Courier 7"]
     refused = [row.text_content() for row in page_of(host.site / "index.html").xpath("//table[@class='stacked']//td")]
     assert sorted(refused) == [
-        "It is no envelope with one signature.",
-        "It is signed by a key that is none of this registry's.",
-        "Its signature is not by the key that it names, over a certificate of a run.",
-        "Its signature is not by the key that it names, over a certificate of a run.",
+        "It is not an envelope with one signature.",
+        "It is signed by a key that this registry does not trust.",
+        "Its signature does not verify with the key that it names, or it is not a certificate of a run.",
+        "Its signature does not verify with the key that it names, or it is not a certificate of a run.",
     ]
     for foreign in ("Impostor", "Secret-token-4711", str(host.folder), "garbled"):
         assert foreign not in host.text()
@@ -203,7 +203,7 @@ def test_an_envelope_that_holds_what_is_not_known_is_not_handed_on(host, monkeyp
     assert host.build().exit_code == 0
     assert index(host)["Courier 7"][0] == "conformant"
     assert list((host.site / "envelopes").glob("*")) == []
-    assert "it holds what this registry does not know" in host.text()
+    assert "it holds fields that this registry does not know" in host.text()
 
 
 def test_hostile_names_are_shown_and_do_nothing(host, hostile_text):
