@@ -181,7 +181,7 @@ def _settled(change: Change, together: int, asked: float) -> Change:
 
 
 def widened(ratio: float, interval: tuple[float, float], together: int) -> tuple[float, float]:
-    """Return the interval of one of `together` ratios, widened so that all hold simultaneously (normal on a log scale)."""
+    """Return one of `together` intervals, widened so that all hold simultaneously (normal on a log scale)."""
     alone, all_of_them = (NormalDist().inv_cdf(1 - (1 - _CONFIDENCE) / 2 / count) for count in (1, together))
     factor = all_of_them / alone
     low, high = (math.log(bound / ratio) * factor for bound in interval)
@@ -266,7 +266,7 @@ def _remarks(
     yield from _uncounted(old_series, new_series)
     for interface, (was, now) in _knees(old, new).items():
         if was != now:
-            yield f"{interface.upper()} met the criterion up to {rate(was)} requests/s before, and up to {rate(now)} now."
+            yield f"{interface.upper()} met the criterion up to {rate(was)} requests/s, and now up to {rate(now)}."
 
 
 def _uncounted(

@@ -108,8 +108,8 @@ def _ratios(changes: Sequence[Change]) -> Any:
         "ratios",
         "new over old, service time",
         rows,
-        "New service time divided by the old one, with 95 % intervals. Right of 1 requests got slower. The table has the "
-        "noise of each series: a change within the noise does not count.",
+        "New service time divided by the old one, with 95 % intervals. Right of 1 requests got slower. A change within "
+        "the noise, which is in the table, does not count.",
     )
 
 

@@ -60,7 +60,7 @@ def _run(result: Mapping[str, Any]) -> Run:
 
 
 def history_csv(runs: Sequence[Run]) -> str:
-    """Return a row for each run: its time, the robot's version, and the quantiles that every run has, in milliseconds."""
+    """Return a row for each run: time, robot's version, and the quantiles that every run has, in milliseconds."""
     columns = {
         f"{operation}_{interface}_{client}_{quantile}_ms": ((operation, client, interface), quantile)
         for operation, client, interface in runs[-1].series

@@ -49,7 +49,7 @@ def _behind(spacing_s: float) -> str:
 
 
 def repeated(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """Return a remark for each series with repeats: how far their medians differ, and whether their intervals cover it."""
+    """Return a remark for each series with repeats: how their medians differ, and whether their intervals cover it."""
     told = []
     for one in series.values():
         repeats = [repeat for repeat in one.data.get("repeats", []) if repeat["p50"] and repeat["ci95_ms"]["p50"]]

@@ -70,7 +70,7 @@ class Matrix:
         return tuple(dict.fromkeys(name for row in self.rows for name in row.marks))
 
     def trusted(self, row: Row) -> str:
-        """Return the numbers of the columns that are green in a row; the filter uses numbers, so no name enters the CSS."""
+        """Return the numbers of a row's green columns; the filter uses numbers, so that no name enters the CSS."""
         numbers = (number for number, name in enumerate(self.classes) if row.marks.get(name) is Mark.TRUSTED)
         return " ".join(map(str, numbers))
 

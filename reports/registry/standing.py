@@ -14,8 +14,8 @@ from reports.registry.entries import Certificate
 
 SUPERSEDED = "superseded"
 UNNAMED = "names no robot"
-# Points of a policy that keep a certificate from counting, with the site's words. The other points concern the whole run
-# (verdicts, classes), while a registry answers class by class, or a single request (nonce).
+# Points of a policy that keep a certificate from counting, with the site's words. The other points concern the whole
+# run (verdicts, classes), while a registry answers class by class, or a single request (nonce).
 _WORDS = {
     "max_age_days": "expired",
     "requirement_sets": "another requirement set",

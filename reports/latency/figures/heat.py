@@ -10,7 +10,7 @@ from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, p
 
 
 def leading(series: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the series of the wire client if there are any: they say most about the robot, and a page has its limits."""
+    """Return the series of the wire client if there are any, so that the page stays small."""
     return [one for one in series if one["client"] == "wire"] or list(series)
 
 
@@ -53,10 +53,7 @@ def heat(result: Mapping[str, Any]) -> Iterator[Panel]:
 _MAPS = {"rest": "Blues", "soap": "Oranges", "rosbridge": "Greens"}
 
 
-@picture(
-    "blocks",
-    "The median of each short block of one interface. The confidence intervals come from the scatter of these.",
-)
+@picture("blocks", "The median of each short block of one interface. The confidence intervals come from their scatter.")
 def blocks(result: Mapping[str, Any]) -> Iterator[Panel]:
     """Yield a panel for each client and operation: the median of each block, from which intervals are computed."""
     found = leading([block for block in result.get("blocks", []) if block["phase"] == "duel"])

@@ -15,7 +15,7 @@ from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, p
     "the number of connections that are always busy: where latency doubles with it, the robot is saturated.",
 )
 def load(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """Yield latency over the offered rate, with the knee as a vertical line, and over the number of busy connections."""
+    """Yield latency over the offered rate, with knees as vertical lines, and over the number of busy connections."""
     steps = [step for step in result.get("steps", []) if step["offered_rate"] > 0]
     crowds = [one for one in result.get("over_connections", []) if one["p50_ms"] is not None]
     if steps:

@@ -66,19 +66,11 @@ def key_beside_the_signature(desk):
 
 
 ENVELOPES = [
-    ("swapped subject", lambda desk: desk.edit_payload("result.json", "other.json"), "not made by your key over this"),
-    (
-        "edited class",
-        lambda desk: desk.edit_payload('"safety":"pass"', '"safety":"fail"'),
-        "not made by your key over this",
-    ),
-    (
-        "hidden baseline",
-        lambda desk: desk.edit_payload('"accepted":[]', '"accepted" :[]'),
-        "not made by your key over this",
-    ),
+    ("swapped subject", lambda desk: desk.edit_payload("result.json", "other.json"), "not made by your key"),
+    ("edited class", lambda desk: desk.edit_payload('"safety":"pass"', '"safety":"fail"'), "not made by your key"),
+    ("hidden baseline", lambda desk: desk.edit_payload('"accepted":[]', '"accepted" :[]'), "not made by your key"),
     ("own key", own_key, "foreign key"),
-    ("own key under my name", own_key_under_my_name, "not made by your key over this"),
+    ("own key under my name", own_key_under_my_name, "not made by your key"),
     ("key inside the envelope", lambda desk: desk.edit(publicKey="…"), "unknown field `publicKey`"),
     ("key beside the signature", key_beside_the_signature, "unknown field `publicKey`"),
     ("other payload type", lambda desk: desk.edit(payloadType="application/json"), "payload type"),
