@@ -1,7 +1,7 @@
 """Findings of a conformance result, in words: the same on every page and in every CI format.
 
-Since version 1.2 a failure's `message` says what the suite did, what it expected by which rule, and what it got. Before
-1.2 `message` held only what the suite got; the text is composed here.
+Since version 1.2 a failure's `message` says what the suite sent, what it expected by which rule, and what it got.
+Before 1.2 `message` held only what the suite got; then the text is composed here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,9 +11,9 @@ from typing import Any
 
 CAUSES = {
     "no-response": "No response",
+    "hang": "No complete response in time",
     "server-error": "Server error",
     "unreadable": "Unreadable response",
-    "hang": "No complete response in time",
     "rule": "Rule not met",
 }
 """Kinds of causes, the most urgent first, with the heading that pages show."""
@@ -35,31 +35,32 @@ class Finding:
 
     @property
     def number(self) -> int | None:
-        """The finding's number in the result; None before version 1.2."""
+        """Return the finding's number in the result; None before version 1.2."""
         number: int | None = self.failure.get("number")
         return number
 
     @property
     def cause(self) -> str:
-        """The kind of cause, one of `CAUSES`."""
+        """Return the kind of cause, one of `CAUSES`."""
         return str(self.failure.get("cause", "rule"))
 
     @property
     def subject(self) -> str:
-        """Method and path of the request, or the requirement's id where no single request shows the failure."""
+        """Return method and path of the request, or the requirement's id if no single request shows the failure."""
         request = self.failure["request"]
         sent = f"{request['method']} {request['url']}" if request else str(self.requirement["id"])
         return str(self.failure.get("subject") or sent)
 
     @property
     def text(self) -> str:
-        """What the suite did, what it expected by which rule, and what it got."""
+        """Return what the suite sent, what it expected by which rule, and what it got."""
         if "observed" in self.failure:
             return str(self.failure["message"])
-        did = f"The suite sent {self.subject}. " if self.failure["request"] else ""
-        rule = f" ({self.requirement['source']})" if self.requirement["source"] else ""
+        sent = f"Sent `{self.subject}`. " if self.failure["request"] else ""
+        rule = ", ".join(filter(None, (self.requirement["id"], self.requirement["source"])))
         expected, got = (self.failure[key].rstrip(". ") for key in ("expected", "message"))
-        return f"{did}Expected{rule}: {expected}. Got: {got}."
+        seen = f" Seen {self.failure['seen']:,} times." if self.failure["seen"] > 1 else ""
+        return f"{sent}Expected {expected} ({rule}). Got {got}.{seen}"
 
 
 def findings(requirements: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -> list[Finding]:

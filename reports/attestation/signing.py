@@ -40,6 +40,4 @@ def _agree(path: Path, result: Mapping[str, Any]) -> None:
         if item["verdict"] == "fail" and item["class"] in passed:
             raise ResultInvalidError(f"{path}: it says that class {item['class']} passed, although {item['id']} failed")
     if result["verdict"] == "conformant" and (not passed or passed != claimed):
-        raise ResultInvalidError(
-            f"{path}: it says that the robot is conformant, although not all claimed classes passed"
-        )
+        raise ResultInvalidError(f"{path}: it says conformant, although not all claimed classes passed")

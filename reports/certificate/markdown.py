@@ -1,6 +1,6 @@
-"""The certificate's short form, for a pull request and for the summary of a CI job: Markdown of bounded size.
+"""The certificate's short form for a pull request or the summary of a CI job: Markdown of limited size.
 
-GitHub refuses a job summary of more than 1 MiB whole, so that the worst run would be the one of which nothing is seen.
+GitHub drops a job summary of more than 1 MiB, so a very bad run would show nothing.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from reports.findings import findings
 from reports.pages.page import markdown_page
 
 MOST_OCTETS = 512 * 1024
-"""Of what is told of single requirements; verdict, classes and reasons are bounded by their number."""
+"""Limit for the details of single requirements; the number of verdicts, classes and reasons is limited as well."""
 _MOST_SHOWN = 30
 _MOST_NAMED = 500
 _MOST_GROUPS = 30
@@ -19,7 +19,7 @@ _HEADINGS = {"fail": "What failed", "warn": "Warnings"}
 
 
 class _Part(NamedTuple):
-    """Requirements of one verdict: those that are told in full, and the rest."""
+    """Requirements of one verdict: those shown in full, and the rest."""
 
     heading: str
     told: Sequence[str]
@@ -27,7 +27,7 @@ class _Part(NamedTuple):
 
 
 def certificate_markdown(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as Markdown of less than 1 MiB."""
+    """Return a valid `roaas-result/1` document as Markdown of less than 1 MiB."""
     values = page_values(result)
     parts, left = [], MOST_OCTETS
     for verdict, heading in _HEADINGS.items():
@@ -45,5 +45,5 @@ def certificate_markdown(result: Mapping[str, Any]) -> str:
 
 
 def _urgency(requirement: Mapping[str, Any]) -> int:
-    """The lowest number of the requirement's findings: 1 is what a vendor should look at first."""
+    """Return the lowest number of the requirement's findings: 1 is what a vendor should look at first."""
     return min((failure.get("number", 0) for failure in requirement["failures"]), default=0)

@@ -1,6 +1,6 @@
-"""GitHub's workflow commands: the worst cases as annotations, at most ten, and how many more there are.
+"""GitHub's workflow commands: the ten worst cases as annotations, and the number of the others.
 
-GitHub shows ten errors and ten warnings of a step and drops the rest without a word.
+GitHub shows ten errors and ten warnings of a step and silently drops the rest.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ MOST = 10
 
 
 def annotations(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as workflow commands, a line each."""
+    """Return a valid `roaas-result/1` document as workflow commands, one a line."""
     found = worst_first(cases(result))
     lines = [_command(result, case) for case in found[:MOST]]
     if len(found) > MOST:
@@ -31,7 +31,7 @@ def _command(result: Mapping[str, Any], case: Case) -> str:
 
 
 def _data(text: str) -> str:
-    """What could end a command is escaped: a robot's words start none of their own."""
+    """Escape what could end a command, so that a robot's text cannot start another one."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 

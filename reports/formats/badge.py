@@ -1,4 +1,4 @@
-"""A badge, as shields' endpoint reads it: green for a conforming robot and for nothing else."""
+"""A badge in the format of shields' endpoint: green for a conforming robot only."""
 
 import json
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ _COLOURS = {"conformant": "brightgreen", "not-conformant": "red", "inconclusive"
 
 
 def badge(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as a badge."""
+    """Return a valid `roaas-result/1` document as a badge."""
     verdict, colour = VERDICT_WORDS[result["verdict"]].lower(), _COLOURS[result["verdict"]]
     values = list(result["classes"].values())
     told = f"{verdict} ({values.count('pass')} of {len(values)} classes)"

@@ -1,8 +1,7 @@
-"""A conformance result as test cases: what every format of a CI system is written from.
+"""A conformance result as test cases, from which every CI format is written.
 
-One case for each requirement. A class whose verdict no case of its own explains (a missing prerequisite, nothing
-executed) gets a case of its own, and so does a run that nothing explains: no reader sees green where the suite
-saw none.
+There is a case for each requirement. A class whose verdict no requirement explains (a missing prerequisite, nothing
+executed) gets a case of its own, and so does a run without any verdict. So no CI system shows green by mistake.
 """
 
 import hashlib
@@ -24,12 +23,12 @@ _SHOWN_CURL = 8000
 
 
 class Outcome(StrEnum):
-    """What became of a case; the worst first."""
+    """The outcome of a case."""
 
     FAILED = "failed"
-    ERROR = "error"  # it could not be judged
-    ACCEPTED = "accepted"  # it failed, and the baseline expects that until a day
-    WARNING = "warning"  # a SHOULD was not kept, which breaks no build
+    ERROR = "error"  # could not be judged
+    ACCEPTED = "accepted"  # failed, and the baseline accepts that until a date
+    WARNING = "warning"  # a SHOULD is not met, which breaks no build
     PASSED = "passed"
     SKIPPED = "skipped"
 
@@ -50,10 +49,10 @@ class Case:
     """One test case: of a requirement, a class or the run.
 
     Attributes:
-        name: the requirement's id, `class NAME`, or `run`.
+        name: id of the requirement, `class NAME`, or `run`.
         class_name: the conformance class; empty for the run.
-        outcome: what became of it.
-        message: one line for it; empty where there is nothing to say.
+        outcome: its outcome.
+        message: one line on it, or empty.
         requirement: as result.json has it; None for a class or the run.
         findings: the requirement's findings, in the order in which a vendor should look at them.
     """
@@ -67,7 +66,7 @@ class Case:
 
     @property
     def detail(self) -> str:
-        """What belongs to it in full; empty where nothing was judged."""
+        """Return all details; empty if nothing was judged."""
         if self.requirement is None or self.outcome is Outcome.SKIPPED:
             return ""
         told = f"{self.requirement['level']}: {self.requirement['text']}\nSource: {self.requirement['source']}"
@@ -78,17 +77,17 @@ class Case:
 
     @property
     def rule(self) -> str:
-        """A name that stays the same from run to run."""
+        """Return a name that is the same in every run."""
         return self.name.replace(" ", "/")
 
     @property
     def fingerprint(self) -> str:
-        """The rule's name as 64 hexadecimal digits."""
+        """Return a digest of the rule's name, 64 hexadecimal digits."""
         return hashlib.sha256(f"roaas/1 {self.rule}".encode()).hexdigest()
 
 
 def cases(result: Mapping[str, Any]) -> list[Case]:
-    """The cases of a valid `roaas-result/1` document, class by class."""
+    """Return the cases of a valid `roaas-result/1` document, class by class."""
     found = [case for name in classes(result) for case in _of_class(result, name)]
     if not found or (
         result["verdict"] != "conformant"
@@ -99,19 +98,19 @@ def cases(result: Mapping[str, Any]) -> list[Case]:
 
 
 def worst_first(found: Sequence[Case]) -> list[Case]:
-    """The cases that somebody has to look at: failed, not judged, accepted, warnings."""
+    """Return the cases that need attention: failed, not judged, accepted, warnings; the most urgent finding first."""
     order = [Outcome.FAILED, Outcome.ERROR, Outcome.ACCEPTED, Outcome.WARNING]
     shown = (case for case in found if case.outcome in order)
     return sorted(shown, key=lambda case: (order.index(case.outcome), _first(case)))
 
 
 def _first(case: Case) -> float:
-    """The number of the case's first finding; a class or a run without a finding comes after all findings."""
+    """Return the number of the case's first finding; cases without a finding come last."""
     return case.findings[0].number or 0 if case.findings else math.inf
 
 
 def classes(result: Mapping[str, Any]) -> list[str]:
-    """The names of all classes, those of requirements whose class has no verdict included."""
+    """Return the names of all classes, including classes without a verdict."""
     return list(dict.fromkeys([*result["classes"], *(r["class"] for r in result["requirements"])]))
 
 
@@ -160,8 +159,6 @@ def _in_full(found: Sequence[Finding]) -> Iterator[str]:
             break
         failure = finding.failure
         lines = [f"[{finding.number or place}] {finding.text}"]
-        if failure["seen"] > 1:
-            lines.append(f"Seen in {failure['seen']} cases.")
         if finding.blocks:
             lines.append(f"Not tested because of it: {', '.join(finding.blocks)}.")
         if failure["request"]:
@@ -178,9 +175,9 @@ def _response(response: Mapping[str, Any] | None) -> Iterator[str]:
         return
     took = "" if response["elapsed_ms"] is None else f" after {response['elapsed_ms']:.1f} ms"
     if response["status"] is None:
-        yield f"no response{took}: {response.get('error') or 'no reason was recorded'}"
+        yield f"No response{took}: {response.get('error') or 'no reason was recorded'}"
         return
-    yield f"answered {response['status']}{took}"
+    yield f"Response {response['status']}{took}"
     if response["body"]:
         yield _cut(response["body"], _SHOWN_BODY, response.get("body_length"))
 

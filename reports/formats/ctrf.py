@@ -3,7 +3,7 @@
 | outcome | becomes |
 |---|---|
 | passed, warning | `passed`; a warning has its message |
-| failed, error | `failed`: readers show `other` in no colour, and what was not judged is not green |
+| failed, error | `failed`: readers show `other` without a colour, and a case without a verdict must not look green |
 | accepted | `other` |
 | skipped | `skipped` |
 """
@@ -29,7 +29,7 @@ _STATUSES = {
 
 
 def ctrf(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as a CTRF report."""
+    """Return a valid `roaas-result/1` document as a CTRF report."""
     tests = [_test(result, case) for case in cases(result)]
     statuses = [test["status"] for test in tests]
     start = _milliseconds(result["started"])
@@ -60,7 +60,7 @@ def _test(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
         "name": case.name,
         "status": _STATUSES[case.outcome],
         "rawStatus": case.outcome,
-        # No time is known for a single requirement.
+        # The time of a single requirement is not measured.
         "duration": 0,
         "suite": [case.class_name or "roaas"],
         "filePath": place.file,

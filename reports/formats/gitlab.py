@@ -1,7 +1,7 @@
-"""GitLab's code quality report: what a merge request shows as new and as resolved.
+"""GitLab's code quality report, from which a merge request shows new and resolved failures.
 
-Fingerprints are of the requirement alone, so that the same failure is the same entry in every run, whatever values
-the robot answered with. What was not judged is an entry as well.
+A fingerprint depends only on the requirement, so that the same failure is the same entry in every run, whatever values
+the robot returned. A requirement without a verdict is an entry as well.
 """
 
 import json
@@ -16,7 +16,7 @@ _SEVERITIES = {Outcome.FAILED: "critical", Outcome.ERROR: "major", Outcome.ACCEP
 
 
 def gitlab(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as a code quality report."""
+    """Return a valid `roaas-result/1` document as a code quality report."""
     return json.dumps([_entry(result, case) for case in worst_first(cases(result))], indent=1) + "\n"
 
 

@@ -35,7 +35,7 @@ def test_one_suite_for_each_class_and_one_case_for_each_requirement(result):
     [
         ("rest-resources/pose-type", None),
         ("http/malformed-request", None),
-        ("rest-resources/goal-delete", "failure"),
+        ("http/declared-status", "failure"),
         ("xml-security/responsive", "error"),
         ("rest-resources/pose-unavailable", "skipped"),
         ("rest-resources/sensors-unique", "skipped"),
@@ -73,7 +73,7 @@ def test_what_a_finding_blocks_is_skipped_because_of_it(result):
 
 
 def test_warning_breaks_no_build_and_is_told(result):
-    assert "WARNING: The suite sent" in case(parsed(result), "http/malformed-request").findtext("system-out")
+    assert "WARNING: Sent the bytes `" in case(parsed(result), "http/malformed-request").findtext("system-out")
 
 
 def test_class_that_failed_without_a_failing_requirement_is_red(result):
@@ -94,9 +94,9 @@ def test_nothing_judged_is_an_error(result):
 
 
 def test_expected_failure_is_skipped(result):
-    requirement = next(r for r in result["requirements"] if r["id"] == "rest-resources/goal-delete")
+    requirement = next(r for r in result["requirements"] if r["id"] == "http/declared-status")
     requirement.update(verdict="warn", expected_failure={"reason": "known since 2.3", "expires": "2027-01-01"})
-    element = case(parsed(result), "rest-resources/goal-delete")
+    element = case(parsed(result), "http/declared-status")
     assert element.find("skipped").get("message") == "Accepted by the baseline until 2027-01-01: known since 2.3"
     assert element.find("failure") is None
 
