@@ -80,8 +80,8 @@ def _server_share(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
         if "server" in rest_parts and "server" in soap_parts and extra > 0:
             server = soap_parts["server"] - rest_parts["server"]
             told.append(
-                f"Of the {ms(extra)} ms that SOAP takes more for {operation} on average, the server spends "
-                f"{ms(server)} ms."
+                f"SOAP takes {ms(extra)} ms longer than REST for {operation} on average; "
+                f"{ms(server)} ms of that is the server's own work."
             )
     return told
 
@@ -122,10 +122,10 @@ def _stalled(result: Mapping[str, Any]) -> list[str]:
         return []
     longest = max((stall for moment in moments for stall in moment), key=lambda stall: stall.longest_ms or 0.0)
     operation, client, interface = longest.series
-    told = "no request was answered" if longest.longest_ms is None else f"{ms(longest.longest_ms)} ms"
-    which = "" if len(moments) == 1 else ", the longest"
+    told = "no request was answered" if longest.longest_ms is None else f"a request took {ms(longest.longest_ms)} ms"
+    which = "" if len(moments) == 1 else "; the longest"
     sentence = (
-        f"{_count(len(moments), 'stall')}{which} in seconds {longest.start_s:.0f} to {longest.end_s:.0f}: {told} "
+        f"{_count(len(moments), 'stall')}{which} in seconds {longest.start_s:.0f} to {longest.end_s:.0f} of the run: {told} "
         f"({operation}, {interface.upper()}, {client})."
     )
     return [sentence]
@@ -200,7 +200,7 @@ def _failed(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
     counted = (
         "each counts with at least the time until it was given up"
         if all("counted" in one.data for one in series.values())
-        else "no time includes them"
+        else "the times do not include them"
     )
     return [f"{_count(errors, 'request')} of {errors + answered:,} failed; {counted}."]
 

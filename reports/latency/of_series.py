@@ -19,8 +19,8 @@ def work(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
         spent = [float((one.data["spans_ms"]["server"] or {}).get("p50") or 0.0) for one in (rest, soap)]
         if 0 < _OTHER_WORK * min(spent) <= max(spent):
             told.append(
-                f"{operation.capitalize()}: the robot itself is busy for {ms(spent[0])} ms over REST and "
-                f"{ms(spent[1])} ms over SOAP at the median (its Server-Timing): that is not the same work."
+                f"{operation.capitalize()}: by its Server-Timing header the robot itself works for {ms(spent[0])} ms over "
+                f"REST and {ms(spent[1])} ms over SOAP at the median. That is not the same work."
             )
     return told
 
