@@ -9,7 +9,7 @@ class Stage(StrEnum):
 
     Reading comes first. Then the drive that takes longest, other drives, and the attempts that must
     leave it at rest, which one watch covers; meanwhile it is read at rest. Deliveries come late, because a robot drives
-    long after them; the last of them are those whose messages are counted. Whatever starts no delivery is sent while the
+    Reading comes first. Then the longest drive, other drives, and the attempts that must
     suite waits for more of them.
     """
 
