@@ -96,17 +96,17 @@ def read_policy(path: Path, known: Known) -> Policy:
 def judge(statement: Statement, policy: Policy, known: Known, now: dt.datetime) -> list[Point]:
     """Judge a verified statement by a policy, point by point."""
     run = statement.predicate.roaas
-    return [*_who(run, policy), *_what(run, policy, known), *_how(run, policy, known), *_when(run, policy, now)]
+    return [*_robot(run, policy), *_verdict(run, policy, known), *_run(run, policy, known), *_time(run, policy, now)]
 
 
-def _who(run: Run, policy: Policy) -> Iterator[Point]:
+def _robot(run: Run, policy: Policy) -> Iterator[Point]:
     for line, found in (("robot", run.robot.name), ("vendor", run.robot.vendor), ("firmware", run.robot.version)):
         wanted = policy.firmware if line == "firmware" else getattr(policy, line)
         asked = "" if wanted in {None, found} else f"; you asked for {wanted!r}"
         yield Point(line, not asked, f"{found or 'not named'}{asked}")
 
 
-def _what(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
+def _verdict(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
     yield Point("verdicts", run.verdict in policy.verdicts, run.verdict)
     wanted = known.profiles.get(policy.profile, ()) if policy.classes is None else policy.classes
     there = passed(run)
@@ -123,7 +123,7 @@ def _what(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
     )
 
 
-def _how(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
+def _run(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
     trusted = {known.suite if digest == OWN else digest for digest in policy.suites} - {""}
     unknown = "" if run.suite.digest in trusted else ", which is not known"
     yield Point("suites", not unknown, f"RoAAS {run.suite.version}, {run.suite.digest}{unknown}")
@@ -148,7 +148,7 @@ def _requirement_set(run: Run, policy: Policy, known: Known) -> Point:
     return Point("requirement_sets", not wrong, wrong or (found.name if found else ""))
 
 
-def _when(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
+def _time(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
     if run.ended is None:
         yield Point("max_age_days", met=False, found=f"{run.finished[:40]!r} is no time in UTC")
     else:

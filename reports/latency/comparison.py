@@ -17,7 +17,7 @@ from statistics import NormalDist
 from typing import Any
 
 from reports.errors import ResultsIncompatibleError
-from reports.latency.distributions import Series, all_series
+from reports.latency.distributions import AllSeries, Series, all_series
 from reports.latency.numbers import rate
 
 QUANTILES = ("p50", "p99")
@@ -74,8 +74,8 @@ class Comparison:
 
     old: Mapping[str, Any]
     new: Mapping[str, Any]
-    old_series: Mapping[tuple[str, str, str], Series]
-    new_series: Mapping[tuple[str, str, str], Series]
+    old_series: AllSeries
+    new_series: AllSeries
     changes: tuple[Change, ...]
     remarks: tuple[str, ...]
 
@@ -244,10 +244,7 @@ def judge(interval: tuple[float, float], threshold: float, asked: float) -> str:
 
 
 def _remarks(
-    old: Mapping[str, Any],
-    new: Mapping[str, Any],
-    old_series: Mapping[tuple[str, str, str], Series],
-    new_series: Mapping[tuple[str, str, str], Series],
+    old: Mapping[str, Any], new: Mapping[str, Any], old_series: AllSeries, new_series: AllSeries
 ) -> Iterator[str]:
     for word, result in (("old", old), ("new", new)):
         if not result["valid"]:
@@ -269,15 +266,13 @@ def _remarks(
             yield f"{interface.upper()} met the criterion up to {rate(was)} requests/s, and now up to {rate(now)}."
 
 
-def _uncounted(
-    old_series: Mapping[tuple[str, str, str], Series], new_series: Mapping[tuple[str, str, str], Series]
-) -> Iterator[str]:
+def _uncounted(old_series: AllSeries, new_series: AllSeries) -> Iterator[str]:
     for word, series in (("old", old_series), ("new", new_series)):
         if any(one.data["errors"] and "counted" not in one.data for one in series.values()):
             yield f"The {word} result is of an earlier version: its times do not include failed requests."
 
 
-def _failed(series: Mapping[tuple[str, str, str], Series]) -> float:
+def _failed(series: AllSeries) -> float:
     failed = sum(int(one.data["errors"]) for one in series.values())
     return failed / max(1, failed + sum(int(one.data["count"]) for one in series.values()))
 

@@ -120,7 +120,11 @@ class Series:
         return f"{self.data['operation']}, {self.data['interface'].upper()}"
 
 
-def all_series(result: Mapping[str, Any], path: str) -> dict[tuple[str, str, str], Series]:
+AllSeries = Mapping[tuple[str, str, str], Series]
+"""The series of a result by operation, client and interface."""
+
+
+def all_series(result: Mapping[str, Any], path: str) -> AllSeries:
     """Return every series by operation, client and interface, wire before zeep and REST before SOAP."""
     found = {}
     for index, data in enumerate(result["series"]):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from reports.latency import against
-from reports.latency.distributions import Series
+from reports.latency.distributions import AllSeries
 from reports.latency.figures.spans import means
 from reports.latency.figures.timeline import Stall, stalls
 from reports.latency.numbers import interval, ms, rate, share
@@ -32,13 +32,13 @@ class Verdict:
     sentence: str
 
 
-def verdict(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> Verdict:
+def verdict(result: Mapping[str, Any], series: AllSeries) -> Verdict:
     """Return the result's own headline with a tone and a sign."""
     said = result["headline"]
     return Verdict(*_tone(result, series), said["words"], said["sentence"])
 
 
-def _tone(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> tuple[str, str]:
+def _tone(result: Mapping[str, Any], series: AllSeries) -> tuple[str, str]:
     outcomes = {threshold["outcome"] for threshold in result.get("thresholds", [])}
     following = (result.get("against") or {}).get("verdict")
     if not result["valid"] or "missed" in outcomes:
@@ -50,7 +50,7 @@ def _tone(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Serie
     return ("good" if outcomes else "quiet"), "✓"
 
 
-def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
     """Return further observations, a sentence each: stalls, knees, failed requests, and the run's own notes."""
     return [
         *_server_share(series),
@@ -68,7 +68,7 @@ def remarks(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
     ]
 
 
-def _server_share(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+def _server_share(series: AllSeries) -> list[str]:
     """Return how much of SOAP's extra time the server spends, if the robot states its time."""
     told = []
     for (operation, client, interface), soap in series.items():
@@ -125,13 +125,13 @@ def _stalled(result: Mapping[str, Any]) -> list[str]:
     told = "no request was answered" if longest.longest_ms is None else f"a request took {ms(longest.longest_ms)} ms"
     which = "" if len(moments) == 1 else "; the longest"
     sentence = (
-        f"{_count(len(moments), 'stall')}{which} in seconds {longest.start_s:.0f} to {longest.end_s:.0f} of the run: {told} "
-        f"({operation}, {interface.upper()}, {client})."
+        f"{_count(len(moments), 'stall')}{which} in seconds {longest.start_s:.0f} to {longest.end_s:.0f} of the run: "
+        f"{told} ({operation}, {interface.upper()}, {client})."
     )
     return [sentence]
 
 
-def _two_modes(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+def _two_modes(series: AllSeries) -> list[str]:
     """Return a sentence for each series with two modes, and one on series with many requests far above the median."""
     told, far = [], []
     for one in series.values():
@@ -192,7 +192,7 @@ def _searched(result: Mapping[str, Any]) -> list[str]:
     return told
 
 
-def _failed(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+def _failed(result: Mapping[str, Any], series: AllSeries) -> list[str]:
     errors = sum(one.data["errors"] for one in series.values())
     if not errors and not result.get("errors"):
         return ["No request failed."] if any(one.data["count"] for one in series.values()) else []

@@ -1,15 +1,13 @@
 """Remarks on single series: the robot's own work, requests after a pause, and repeats."""
 
-from collections.abc import Mapping
-
-from reports.latency.distributions import Series
+from reports.latency.distributions import AllSeries
 from reports.latency.numbers import interval, ms, rate
 
 #: If the robot's own times over two interfaces differ by this factor, it does different work for them.
 _OTHER_WORK = 1.5
 
 
-def work(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+def work(series: AllSeries) -> list[str]:
     """Return a remark for each operation on which the robot itself works longer over one interface than the other."""
     told = []
     for (operation, client, interface), rest in series.items():
@@ -19,13 +17,13 @@ def work(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
         spent = [float((one.data["spans_ms"]["server"] or {}).get("p50") or 0.0) for one in (rest, soap)]
         if 0 < _OTHER_WORK * min(spent) <= max(spent):
             told.append(
-                f"{operation.capitalize()}: by its Server-Timing header the robot itself works for {ms(spent[0])} ms over "
-                f"REST and {ms(spent[1])} ms over SOAP at the median. That is not the same work."
+                f"{operation.capitalize()}: by its Server-Timing header the robot itself works for {ms(spent[0])} ms "
+                f"over REST and {ms(spent[1])} ms over SOAP at the median. That is not the same work."
             )
     return told
 
 
-def cold(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+def cold(series: AllSeries) -> list[str]:
     """Return one sentence that compares requests after a pause with requests without one, for all series."""
     told, after, behind = [], "", ""
     for one in series.values():
@@ -48,7 +46,7 @@ def _behind(spacing_s: float) -> str:
     return f"{spacing_s * 1e3:g} ms after the start of the one before ({limit})"
 
 
-def repeated(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+def repeated(series: AllSeries) -> list[str]:
     """Return a remark for each series with repeats: how their medians differ, and whether their intervals cover it."""
     told = []
     for one in series.values():

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from reports.latency import against
-from reports.latency.distributions import Series, all_series
+from reports.latency.distributions import AllSeries, all_series
 from reports.latency.figures.canvas import COLOUR, INK, Picture
 from reports.latency.figures.heat import blocks, heat
 from reports.latency.figures.load import load
@@ -67,7 +67,7 @@ def latency_markdown(result: Mapping[str, Any], path: str = "latency.json") -> s
     return markdown_page("latency.md.j2", **_values(result, series))
 
 
-def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> dict[str, Any]:
+def _values(result: Mapping[str, Any], series: AllSeries) -> dict[str, Any]:
     return {
         "result": result,
         "series": list(series.values()),
@@ -91,7 +91,7 @@ def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
     }
 
 
-def _missing(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
+def _missing(series: AllSeries) -> list[str]:
     """Return why values are missing, each reason once."""
     reasons = (reason for one in series.values() for reason in one.data.get("reasons", {}).values())
     return sorted({reason.rpartition("; ")[2] for reason in reasons})
@@ -112,7 +112,7 @@ def _rounds(result: Mapping[str, Any]) -> list[str]:
     return told
 
 
-def paper_rows(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[PaperRow]:
+def paper_rows(result: Mapping[str, Any], series: AllSeries) -> list[PaperRow]:
     """Return the paper's means, followed by this run's for each operation and client."""
     means_compared = {(c["operation"], c["client"]): c for c in result["comparisons"] if c["quantile"] == "mean"}
     rows = [PaperRow("the paper, delivery", PAPER["rest_ms"], PAPER["soap_ms"], PAPER["ratio"], None)]
@@ -132,7 +132,7 @@ def paper_rows(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], 
     return rows
 
 
-def _pictures(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> dict[str, Picture | None]:
+def _pictures(result: Mapping[str, Any], series: AllSeries) -> dict[str, Picture | None]:
     return {
         "against": against.picture(result),
         "ratios": _ratio_picture(result),

@@ -1,10 +1,10 @@
 """The percentile spectrum of each series in two runs, old and new."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
-from reports.latency.distributions import Series
+from reports.latency.distributions import AllSeries
 from reports.latency.figures.canvas import COLOUR, SOFT, Panel, log_time_axis, picture
-from reports.latency.figures.spectrum import Key, curve, quantile_axis
+from reports.latency.figures.spectrum import curve, quantile_axis
 
 
 @picture(
@@ -12,7 +12,7 @@ from reports.latency.figures.spectrum import Key, curve, quantile_axis
     "Service time at each percentile, old and new. Where the new curve is higher, requests got slower. "
     "Thin lines: too few requests for a reliable value.",
 )
-def change(old: Mapping[Key, Series], new: Mapping[Key, Series]) -> Iterator[Panel]:
+def change(old: AllSeries, new: AllSeries) -> Iterator[Panel]:
     """Yield a panel for each series that both results hold: service times, old in grey and dashed, new in colour."""
     for key, after in new.items():
         before = old.get(key)

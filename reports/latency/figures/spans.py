@@ -2,9 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 
-from reports.latency.distributions import Series
+from reports.latency.distributions import AllSeries, Series
 from reports.latency.figures.canvas import INK, SPAN_COLOUR, SPAN_HATCH, Panel, milliseconds, picture
-from reports.latency.figures.spectrum import Key
 
 SPANS = ("build", "wire", "server", "parse")
 
@@ -15,7 +14,7 @@ SPANS = ("build", "wire", "server", "parse")
     "network transmits, the robot reads. Server: the robot's own work, as its Server-Timing header states it; "
     "without that header it is part of wire. Parse: the client reads the response.",
 )
-def spans(series: Mapping[Key, Series]) -> Iterator[Panel]:
+def spans(series: AllSeries) -> Iterator[Panel]:
     """Yield a panel for each client: the mean spans of each operation and interface, end to end."""
     for client in dict.fromkeys(key[1] for key in series):
         bars = {s.name: means(s) for key, s in series.items() if key[1] == client and s.data["count"]}

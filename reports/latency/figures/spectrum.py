@@ -3,19 +3,17 @@
 The axis is 1 / (1 - quantile), logarithmic: 90 %, 99 % and 99.9 % are equally far apart, so that the tail is readable.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from reports.latency.distributions import Distribution, Floats, Series
+from reports.latency.distributions import AllSeries, Distribution, Floats
 from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, picture
 
 _POINTS = 220
 _NINES = (0.0, 0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999)
-
-Key = tuple[str, str, str]
 
 
 @picture(
@@ -24,7 +22,7 @@ Key = tuple[str, str, str]
     "time, counted from when a request was sent. Dashed: response time, counted from when it was due, so that "
     "waiting for a stalled robot is included. Thin lines: too few requests for a reliable value.",
 )
-def spectrum(series: Mapping[Key, Series]) -> Iterator[Panel]:
+def spectrum(series: AllSeries) -> Iterator[Panel]:
     """Yield a panel for each client and operation: service time as a solid line, response time dashed."""
     for client, operation in dict.fromkeys((key[1], key[0]) for key in series):
         drawn = [s for key, s in series.items() if key[:2] == (operation, client) and s.service is not None]
