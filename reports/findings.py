@@ -75,13 +75,13 @@ def findings(requirements: Sequence[Mapping[str, Any]], result: Mapping[str, Any
 
 
 def by_requirement(found: Sequence[Finding]) -> Iterator[tuple[Mapping[str, Any], list[Finding]]]:
-    """Group findings that follow one another and belong to one requirement."""
+    """Yield each requirement with those of its findings that follow one another."""
     for _, group in groupby(found, key=lambda finding: finding.requirement["id"]):
         own = list(group)
         yield own[0].requirement, own
 
 
 def by_cause(found: Sequence[Finding]) -> Iterator[tuple[str, list[Finding]]]:
-    """Group findings by the kind of their cause, the most urgent kind first."""
+    """Yield the heading of each kind of cause with its findings, the most urgent kind first."""
     for cause in sorted({finding.cause for finding in found}, key=list(CAUSES).index):
         yield CAUSES[cause], [finding for finding in found if finding.cause == cause]

@@ -1,6 +1,6 @@
 """A latency result in sentences: the verdict, and remarks with their intervals."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,9 +68,8 @@ def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
     ]
 
 
-def _server_share(series: AllSeries) -> list[str]:
-    """Return how much of SOAP's extra time the server spends, if the robot states its time."""
-    told = []
+def _server_share(series: AllSeries) -> Iterator[str]:
+    """Yield how much of SOAP's extra time the server spends, if the robot states its time."""
     for (operation, client, interface), soap in series.items():
         rest = series.get((operation, client, "rest"))
         if (client, interface) != ("wire", "soap") or rest is None:
@@ -79,26 +78,25 @@ def _server_share(series: AllSeries) -> list[str]:
         extra = sum(soap_parts.values()) - sum(rest_parts.values())
         if "server" in rest_parts and "server" in soap_parts and extra > 0:
             server = soap_parts["server"] - rest_parts["server"]
-            told.append(
+            yield (
                 f"SOAP takes {ms(extra)} ms longer than REST for {operation} on average; "
                 f"{ms(server)} ms of that is the server's own work."
             )
-    return told
 
 
-def _further(result: Mapping[str, Any]) -> list[str]:
-    """Return how long interfaces other than SOAP and REST take at the median."""
-    return [
-        f"{way['interface'].capitalize()} takes {interval(way['ci95'], of_ratio=True)} times as long as REST at the "
-        f"median for {way['operation']}, with the {way['client']} client (95 % interval), "
-        f"{ms(way['minus_rest_ms'])} ms more."
-        for way in result.get("further_interfaces", [])
-        if way["quantile"] == "p50" and way["ci95"]
-    ]
+def _further(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how long interfaces other than SOAP and REST take at the median."""
+    for way in result.get("further_interfaces", []):
+        if way["quantile"] == "p50" and way["ci95"]:
+            yield (
+                f"{way['interface'].capitalize()} takes {interval(way['ci95'], of_ratio=True)} times as long as REST "
+                f"at the median for {way['operation']}, with the {way['client']} client (95 % interval), "
+                f"{ms(way['minus_rest_ms'])} ms more."
+            )
 
 
-def _followed(result: Mapping[str, Any]) -> list[str]:
-    """Return how long a delivery takes over each interface until the application has received it."""
+def _followed(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how long a delivery takes over each interface until the application has received it."""
     ways = result.get("end_to_end", {}).get("ways", [])
     told = [
         f"{ms(way['to_application_ms']['p50'])} ms over {way['interface'].upper()}"
@@ -107,11 +105,12 @@ def _followed(result: Mapping[str, Any]) -> list[str]:
     ]
     lost = sum(way["lost"] for way in ways)
     missing = f" {lost:,} deliveries that the robot accepted never arrived." if lost else ""
-    return [f"Median time until the application has received a delivery: {', '.join(told)}.{missing}"] if told else []
+    if told:
+        yield f"Median time until the application has received a delivery: {', '.join(told)}.{missing}"
 
 
-def _stalled(result: Mapping[str, Any]) -> list[str]:
-    """Return the stalls in one sentence; overlapping stalls of several series count as one."""
+def _stalled(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the stalls in one sentence; overlapping stalls of several series count as one."""
     moments: list[list[Stall]] = []
     for stall in sorted(stalls(result), key=lambda stall: stall.start_s):
         if moments and stall.start_s < max(other.end_s for other in moments[-1]):
@@ -119,21 +118,20 @@ def _stalled(result: Mapping[str, Any]) -> list[str]:
         else:
             moments.append([stall])
     if not moments:
-        return []
+        return
     longest = max((stall for moment in moments for stall in moment), key=lambda stall: stall.longest_ms or 0.0)
     operation, client, interface = longest.series
     told = "no request was answered" if longest.longest_ms is None else f"a request took {ms(longest.longest_ms)} ms"
     which = "" if len(moments) == 1 else "; the longest"
-    sentence = (
+    yield (
         f"{_count(len(moments), 'stall')}{which} in seconds {longest.start_s:.0f} to {longest.end_s:.0f} of the run: "
         f"{told} ({operation}, {interface.upper()}, {client})."
     )
-    return [sentence]
 
 
-def _two_modes(series: AllSeries) -> list[str]:
-    """Return a sentence for each series with two modes, and one on series with many requests far above the median."""
-    told, far = [], []
+def _two_modes(series: AllSeries) -> Iterator[str]:
+    """Yield a sentence for each series with two modes, and one on series with many requests far above the median."""
+    far = []
     for one in series.values():
         found = one.data.get("modes")
         if found is None:
@@ -141,17 +139,17 @@ def _two_modes(series: AllSeries) -> list[str]:
         name = f"{one.name} ({one.data['client']} client)"
         if found["split_ms"] is not None:
             usual, other = found["medians_ms"]
-            told.append(
+            yield (
                 f"{name} has two modes: {share(found['share_above'])} of the requests take more than "
                 f"{ms(found['split_ms'])} ms, about {ms(other)} ms, and the others about {ms(usual)} ms."
             )
         elif found["beyond_five_medians"] >= _MANY_FAR:
             far.append(f"{share(found['beyond_five_medians'])} of {name}")
-    return [*told, f"Requests over five times the median: {', '.join(far)}."] if far else told
+    if far:
+        yield f"Requests over five times the median: {', '.join(far)}."
 
 
-def _knees(result: Mapping[str, Any]) -> list[str]:
-    told: list[str] = []
+def _knees(result: Mapping[str, Any]) -> Iterator[str]:
     explained: set[str] = set()
     for knee in result.get("knee", []):
         name = knee["interface"].upper()
@@ -159,55 +157,54 @@ def _knees(result: Mapping[str, Any]) -> list[str]:
         criterion = "" if knee["criterion"] in explained else f" ({knee['criterion']})"
         explained.add(knee["criterion"])
         if knee["highest_rate"] is None:
-            told.append(f"{name} did not meet the criterion at any offered rate{criterion}.")
+            yield f"{name} did not meet the criterion at any offered rate{criterion}."
             continue
         sentence = f"{name} meets the criterion up to {rate(knee['highest_rate'])} requests/s{criterion}"
         missed = knee.get("first_rate_missed")
         if missed is None:
-            told.append(f"{sentence}, the highest rate offered: the knee is above it.")
+            yield f"{sentence}, the highest rate offered: the knee is above it."
             continue
         because = f": {knee['reason']}" if knee.get("reason") else ""
         limit = " The generator, not the robot, was the limit." if knee.get("limited_by") == "generator" else ""
-        told.append(f"{sentence}, and no longer at {rate(missed)} requests/s{because}.{limit}")
-    return told
+        yield f"{sentence}, and no longer at {rate(missed)} requests/s{because}.{limit}"
 
 
-def _searched(result: Mapping[str, Any]) -> list[str]:
-    """Return the knee of each interface that was found by bisection."""
-    told = []
+def _searched(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the knee of each interface that was found by bisection."""
     for knee in result.get("knee_search", []):
         name = "REST and SOAP at once" if knee["interface"] == "both" else knee["interface"].upper()
         if knee["rate"] is None:
             held = knee.get("held_up_to")
-            told.append(f"{name}: no knee up to {rate(held)} requests/s." if held else f"{name}: no knee was found.")
+            yield f"{name}: no knee up to {rate(held)} requests/s." if held else f"{name}: no knee was found."
             continue
         low, high = knee["interval"]
         limit = " The generator, not the robot, was the limit." if knee.get("limited_by") == "generator" else ""
         first = knee.get("errors_from")
         failing = "" if first is None else f" Requests failed from {rate(first)} requests/s on."
-        told.append(
+        yield (
             f"{name}: the knee is at {rate(knee['rate'])} requests/s ({rate(low)} to {rate(high)}, "
             f"{knee['searches']} searches).{failing}{limit}"
         )
-    return told
 
 
-def _failed(result: Mapping[str, Any], series: AllSeries) -> list[str]:
+def _failed(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]:
     errors = sum(one.data["errors"] for one in series.values())
     if not errors and not result.get("errors"):
-        return ["No request failed."] if any(one.data["count"] for one in series.values()) else []
+        if any(one.data["count"] for one in series.values()):
+            yield "No request failed."
+        return
     answered = sum(one.data["count"] for one in series.values())
     counted = (
         "each counts with at least the time until it was given up"
         if all("counted" in one.data for one in series.values())
         else "the times do not include them"
     )
-    return [f"{_count(errors, 'request')} of {errors + answered:,} failed; {counted}."]
+    yield f"{_count(errors, 'request')} of {errors + answered:,} failed; {counted}."
 
 
-def _noted(result: Mapping[str, Any]) -> list[str]:
-    """Return the result's notes, which are clauses, as sentences."""
-    return [f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note]
+def _noted(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the result's notes, which are clauses, as sentences."""
+    yield from (f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note)
 
 
 def _count(number: int, noun: str) -> str:

@@ -1,5 +1,7 @@
 """Remarks on single series: the robot's own work, requests after a pause, and repeats."""
 
+from collections.abc import Iterator
+
 from reports.latency.distributions import AllSeries
 from reports.latency.numbers import interval, ms, rate
 
@@ -7,24 +9,22 @@ from reports.latency.numbers import interval, ms, rate
 _OTHER_WORK = 1.5
 
 
-def work(series: AllSeries) -> list[str]:
-    """Return a remark for each operation on which the robot itself works longer over one interface than the other."""
-    told = []
+def work(series: AllSeries) -> Iterator[str]:
+    """Yield a remark for each operation on which the robot itself works longer over one interface than the other."""
     for (operation, client, interface), rest in series.items():
         soap = series.get((operation, client, "soap"))
         if interface != "rest" or client != "wire" or soap is None:
             continue
         spent = [float((one.data["spans_ms"]["server"] or {}).get("p50") or 0.0) for one in (rest, soap)]
         if 0 < _OTHER_WORK * min(spent) <= max(spent):
-            told.append(
+            yield (
                 f"{operation.capitalize()}: by its Server-Timing header the robot itself works for {ms(spent[0])} ms "
                 f"over REST and {ms(spent[1])} ms over SOAP at the median. That is not the same work."
             )
-    return told
 
 
-def cold(series: AllSeries) -> list[str]:
-    """Return one sentence that compares requests after a pause with requests without one, for all series."""
+def cold(series: AllSeries) -> Iterator[str]:
+    """Yield one sentence that compares requests after a pause with requests without one, for all series."""
     told, after, behind = [], "", ""
     for one in series.values():
         pause = one.data.get("after_pause")
@@ -33,9 +33,8 @@ def cold(series: AllSeries) -> list[str]:
             sure = f" ({interval(bounds)})" if bounds else ""
             after, behind = f"after a pause of {pause['pause_s']:g} s", _behind(pause["spacing_s"])
             told.append(f"{one.name} {ms(pause['cold_ms']['p50'])} ms{sure} and {ms(pause['warm_ms']['p50'])} ms")
-    if not told:
-        return []
-    return [f"Medians {after}, and {behind}: {'; '.join(told)}."]
+    if told:
+        yield f"Medians {after}, and {behind}: {'; '.join(told)}."
 
 
 def _behind(spacing_s: float) -> str:
@@ -46,17 +45,15 @@ def _behind(spacing_s: float) -> str:
     return f"{spacing_s * 1e3:g} ms after the start of the one before ({limit})"
 
 
-def repeated(series: AllSeries) -> list[str]:
-    """Return a remark for each series with repeats: how their medians differ, and whether their intervals cover it."""
-    told = []
+def repeated(series: AllSeries) -> Iterator[str]:
+    """Yield a remark for each series with repeats: how their medians differ, and whether their intervals cover it."""
     for one in series.values():
         repeats = [repeat for repeat in one.data.get("repeats", []) if repeat["p50"] and repeat["ci95_ms"]["p50"]]
         whole = one.data["service_ms"]["p50"]
         if len(repeats) > 1 and whole:
             missed = sum(not low <= whole <= high for low, high in (repeat["ci95_ms"]["p50"] for repeat in repeats))
             medians = [repeat["p50"] for repeat in repeats]
-            told.append(
+            yield (
                 f"{one.name}, {one.data['client']}: medians of {len(repeats)} repeats from {ms(min(medians))} to "
                 f"{ms(max(medians))} ms; the intervals of {missed} of them do not contain the overall median."
             )
-    return told
