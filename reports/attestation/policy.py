@@ -102,7 +102,7 @@ def judge(statement: Statement, policy: Policy, known: Known, now: dt.datetime) 
 def _robot(run: Run, policy: Policy) -> Iterator[Point]:
     for line, found in (("robot", run.robot.name), ("vendor", run.robot.vendor), ("firmware", run.robot.version)):
         wanted = policy.firmware if line == "firmware" else getattr(policy, line)
-        asked = "" if wanted in {None, found} else f"; you asked for {wanted!r}"
+        asked = "" if wanted in {None, found} else f"; the policy requires {wanted!r}"
         yield Point(line, not asked, f"{found or 'not named'}{asked}")
 
 
@@ -111,56 +111,59 @@ def _verdict(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
     wanted = known.profiles.get(policy.profile, ()) if policy.classes is None else policy.classes
     there = passed(run)
     missing = [name for name in wanted if name not in there]
-    told = f"{', '.join(there) or 'none'} passed"
+    text = f"{', '.join(there) or 'none'} passed"
     yield Point(
-        "classes", not missing and bool(there), f"{told}; not passed: {', '.join(missing)}" if missing else told
+        "classes", not missing and bool(there), f"{text}; not passed: {', '.join(missing)}" if missing else text
     )
     accepted = f": {', '.join(run.accepted)}" if run.accepted else ""
     used = run.baseline is not None or bool(run.accepted) or run.accepted_until is not None
-    yield Point("baseline", policy.baseline or not used, f"failures were accepted{accepted}" if used else "none")
     yield Point(
-        "interrupted", policy.interrupted or not run.interrupted, "a part of a run" if run.interrupted else "no"
+        "baseline",
+        policy.baseline or not used,
+        f"failures were accepted{accepted}" if used else "no failure was accepted",
     )
+    text = "the run was interrupted" if run.interrupted else "the run is complete"
+    yield Point("interrupted", policy.interrupted or not run.interrupted, text)
 
 
 def _run(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
     trusted = {known.suite if digest == OWN else digest for digest in policy.suites} - {""}
-    unknown = "" if run.suite.digest in trusted else ", which is not known"
+    unknown = "" if run.suite.digest in trusted else ", which the policy does not trust"
     yield Point("suites", not unknown, f"RoAAS {run.suite.version}, {run.suite.digest}{unknown}")
     yield _requirement_set(run, policy, known)
     yield Point("efforts", run.effort in policy.efforts, run.effort)
     moved = "the robot was allowed to move" if run.motion_allowed else "the robot was not allowed to move"
     yield Point("motion", run.motion_allowed or not policy.motion, moved)
     black_box = [name for name in passed(run) if run.views.get(name) == "black box"]
-    told = f"seen as a black box: {', '.join(black_box)}" if black_box else "no class was a black box"
-    yield Point("ros", not (policy.ros and black_box), told)
+    text = f"ROS topics not observed: {', '.join(black_box)}" if black_box else "observed where a passed class uses it"
+    yield Point("ros", not (policy.ros and black_box), text)
 
 
 def _requirement_set(run: Run, policy: Policy, known: Known) -> Point:
     found = run.requirement_set
     wrong = ""
     if found is None:
-        wrong = "none that is frozen: a contract of its own"
+        wrong = "none: the run used an own contract"
     elif found.name not in policy.requirement_sets:
-        wrong = f"{found.name}, which is not accepted"
+        wrong = f"{found.name}, which the policy does not accept"
     elif known.requirement_sets.get(found.name) != found.digest:
-        wrong = f"{found.name}, with other requirements than are known by that name"
+        wrong = f"{found.name}, but with other requirements than the set {found.name} of this suite"
     return Point("requirement_sets", not wrong, wrong or (found.name if found else ""))
 
 
 def _time(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
     if run.ended is None:
-        yield Point("max_age_days", met=False, found=f"{run.finished[:40]!r} is no time in UTC")
+        yield Point("max_age_days", met=False, found=f"{run.finished[:40]!r} is not a time in UTC")
     else:
         age = now - run.ended
-        told = f"the run ended on {run.ended:%Y-%m-%d %H:%M} UTC"
+        text = f"the run ended on {run.ended:%Y-%m-%d %H:%M} UTC"
         days = f", {age.days} days ago" if age.days > 0 else ""
-        yield Point("max_age_days", -_SKEW <= age <= dt.timedelta(days=policy.max_age_days), told + days)
+        yield Point("max_age_days", -_SKEW <= age <= dt.timedelta(days=policy.max_age_days), text + days)
     if policy.nonce is None:
-        told, fresh = "you asked for none", True
+        text, fresh = "you gave no nonce", True
     elif run.nonce != policy.nonce:
-        told, fresh = f"the run has {run.nonce!r}, and you gave {policy.nonce!r}", False
+        text, fresh = f"the run has {run.nonce!r}, but you gave {policy.nonce!r}", False
     else:
-        told, fresh = "yours", run.seed == seed_of(policy.nonce)
-        told += "" if fresh else f", and its seed {run.seed} does not follow from it"
-    yield Point("nonce", fresh, told)
+        text, fresh = "the one that you gave", run.seed == seed_of(policy.nonce)
+        text += "" if fresh else f", but the seed {run.seed} was not derived from it"
+    yield Point("nonce", fresh, text)

@@ -15,10 +15,10 @@ def headline(found: Difference) -> str:
     """Return a summary in a sentence."""
     counts = [f"{len(changes)} {kind}" for kind, changes in found.groups.items() if kind in _TONES]
     still = f"{found.still_failing} still failing" if found.still_failing else ""
-    told = ", ".join([*counts, *filter(None, [still])]) or "no requirement changed its verdict"
+    summary = ", ".join([*counts, *filter(None, [still])]) or "no requirement changed its verdict"
     number = len(found.regressions)
     worse = f"{number} {'regression' if number == 1 else 'regressions'}" if number else "No regression"
-    return f"{worse}: {told}."
+    return f"{worse}: {summary}."
 
 
 def difference_text(found: Difference) -> str:

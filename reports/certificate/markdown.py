@@ -22,7 +22,7 @@ class _Part(NamedTuple):
     """Requirements of one verdict: those shown in full, and the rest."""
 
     heading: str
-    told: Sequence[str]
+    in_full: Sequence[str]
     rest: Sequence[Mapping[str, Any]]
 
 
@@ -32,15 +32,15 @@ def certificate_markdown(result: Mapping[str, Any]) -> str:
     parts, left = [], MOST_OCTETS
     for verdict, heading in _HEADINGS.items():
         found = sorted(values["certificate"].with_verdict(verdict), key=_urgency)
-        told: list[str] = []
+        in_full: list[str] = []
         for requirement in found[:_MOST_SHOWN]:
             block = markdown_page("requirement.md.j2", r=requirement, found=findings([requirement], result))
             left -= len(block.encode())
             if left < 0:
                 break
-            told.append(block)
+            in_full.append(block)
         if found:
-            parts.append(_Part(heading, told, found[len(told) :]))
+            parts.append(_Part(heading, in_full, found[len(in_full) :]))
     return markdown_page("certificate.md.j2", parts=parts, most_named=_MOST_NAMED, most_groups=_MOST_GROUPS, **values)
 
 

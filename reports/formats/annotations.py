@@ -26,8 +26,8 @@ def _command(result: Mapping[str, Any], case: Case) -> str:
     place = places_of(result, case)[0]
     command = "error" if case.outcome in {Outcome.FAILED, Outcome.ERROR} else "warning"
     title = f"{case.name} ({case.outcome})"
-    told = f"file={_property(place.file)},line={place.line},title={_property(title)}"
-    return f"::{command} {told}::{_data(excerpt(case.message, MESSAGE))}"
+    properties = f"file={_property(place.file)},line={place.line},title={_property(title)}"
+    return f"::{command} {properties}::{_data(excerpt(case.message, MESSAGE))}"
 
 
 def _data(text: str) -> str:

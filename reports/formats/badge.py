@@ -13,9 +13,9 @@ def badge(result: Mapping[str, Any]) -> str:
     """Return a valid `roaas-result/1` document as a badge."""
     verdict, colour = VERDICT_WORDS[result["verdict"]].lower(), _COLOURS[result["verdict"]]
     values = list(result["classes"].values())
-    told = f"{verdict} ({values.count('pass')} of {len(values)} classes)"
+    text = f"{verdict} ({values.count('pass')} of {len(values)} classes)"
     if result.get("accepted_until"):
-        told, colour = f"{verdict}, known failures until {result['accepted_until']}", "orange"
+        text, colour = f"{verdict}, known failures until {result['accepted_until']}", "orange"
     if result.get("interrupted"):
-        told, colour = f"{verdict}, interrupted", "red" if verdict == "not conformant" else "lightgrey"
-    return json.dumps({"schemaVersion": 1, "label": "RoAAS", "message": told, "color": colour}, indent=1) + "\n"
+        text, colour = f"{verdict}, interrupted", "red" if verdict == "not conformant" else "lightgrey"
+    return json.dumps({"schemaVersion": 1, "label": "RoAAS", "message": text, "color": colour}, indent=1) + "\n"

@@ -69,11 +69,11 @@ class Case:
         """Return all details; empty if nothing was judged."""
         if self.requirement is None or self.outcome is Outcome.SKIPPED:
             return ""
-        told = f"{self.requirement['level']}: {self.requirement['text']}\nSource: {self.requirement['source']}"
+        rule = f"{self.requirement['level']}: {self.requirement['text']}\nSource: {self.requirement['source']}"
         evidence = f"{self.requirement['cases']} cases by {', '.join(self.requirement['checks']) or 'no check'}"
         if self.outcome is Outcome.PASSED:
-            return f"{told}\n{evidence}"
-        return "\n\n".join([told, evidence, *_in_full(self.findings)])
+            return f"{rule}\n{evidence}"
+        return "\n\n".join([rule, evidence, *_in_full(self.findings)])
 
     @property
     def rule(self) -> str:

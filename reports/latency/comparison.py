@@ -148,9 +148,9 @@ def _same_cap(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, 
     """Refuse two closed-model results with different caps, because times under a cap include waiting for the cap."""
     caps = [(plan.get("limits") or {}).get("max_rate") for plan in (old, new)]
     if new["model"] == "closed" and caps[0] != caps[1]:
-        told = [f"a cap of {rate(cap)} requests/s" if cap is not None else "no cap" for cap in caps]
+        limits = [f"a cap of {rate(cap)} requests/s" if cap is not None else "no cap" for cap in caps]
         raise ResultsIncompatibleError(
-            f"{names[0]} was measured under {told[0]} and {names[1]} under {told[1]}: throttled users wait for the "
+            f"{names[0]} was measured under {limits[0]} and {names[1]} under {limits[1]}: throttled users wait for the "
             "cap and not for the robot. Measure both under the same [load] max_rate."
         )
 

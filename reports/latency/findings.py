@@ -98,15 +98,15 @@ def _further(result: Mapping[str, Any]) -> Iterator[str]:
 def _followed(result: Mapping[str, Any]) -> Iterator[str]:
     """Yield how long a delivery takes over each interface until the application has received it."""
     ways = result.get("end_to_end", {}).get("ways", [])
-    told = [
+    parts = [
         f"{ms(way['to_application_ms']['p50'])} ms over {way['interface'].upper()}"
         for way in ways
         if way["to_application_ms"]["p50"] is not None
     ]
     lost = sum(way["lost"] for way in ways)
     missing = f" {lost:,} deliveries that the robot accepted never arrived." if lost else ""
-    if told:
-        yield f"Median time until the application has received a delivery: {', '.join(told)}.{missing}"
+    if parts:
+        yield f"Median time until the application has received a delivery: {', '.join(parts)}.{missing}"
 
 
 def _stalled(result: Mapping[str, Any]) -> Iterator[str]:
@@ -121,11 +121,11 @@ def _stalled(result: Mapping[str, Any]) -> Iterator[str]:
         return
     longest = max((stall for moment in moments for stall in moment), key=lambda stall: stall.longest_ms or 0.0)
     operation, client, interface = longest.series
-    told = "no request was answered" if longest.longest_ms is None else f"a request took {ms(longest.longest_ms)} ms"
+    what = "no request was answered" if longest.longest_ms is None else f"a request took {ms(longest.longest_ms)} ms"
     which = "" if len(moments) == 1 else "; the longest"
     yield (
         f"{_count(len(moments), 'stall')}{which} in seconds {longest.start_s:.0f} to {longest.end_s:.0f} of the run: "
-        f"{told} ({operation}, {interface.upper()}, {client})."
+        f"{what} ({operation}, {interface.upper()}, {client})."
     )
 
 

@@ -25,16 +25,16 @@ def work(series: AllSeries) -> Iterator[str]:
 
 def cold(series: AllSeries) -> Iterator[str]:
     """Yield one sentence that compares requests after a pause with requests without one, for all series."""
-    told, after, behind = [], "", ""
+    text, after, behind = [], "", ""
     for one in series.values():
         pause = one.data.get("after_pause")
         if pause and pause["cold_ms"]["p50"] is not None and pause["warm_ms"]["p50"] is not None:
             bounds = pause["cold_ci95_ms"]
             sure = f" ({interval(bounds)})" if bounds else ""
             after, behind = f"after a pause of {pause['pause_s']:g} s", _behind(pause["spacing_s"])
-            told.append(f"{one.name} {ms(pause['cold_ms']['p50'])} ms{sure} and {ms(pause['warm_ms']['p50'])} ms")
-    if told:
-        yield f"Medians {after}, and {behind}: {'; '.join(told)}."
+            text.append(f"{one.name} {ms(pause['cold_ms']['p50'])} ms{sure} and {ms(pause['warm_ms']['p50'])} ms")
+    if text:
+        yield f"Medians {after}, and {behind}: {'; '.join(text)}."
 
 
 def _behind(spacing_s: float) -> str:

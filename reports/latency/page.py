@@ -99,17 +99,17 @@ def _missing(series: AllSeries) -> list[str]:
 
 def _rounds(result: Mapping[str, Any]) -> list[str]:
     """Return what the medians' intervals were resampled from, by operation and client."""
-    told = []
+    lines = []
     for entry in result["comparisons"]:
         rounds = entry.get("rounds")
         if entry["quantile"] == "p50" and rounds:
             before, after = (rounds["autocorrelation"][key] for key in ("pairs", "rounds"))
             known = "" if before is None or after is None else f", autocorrelation {after:.2f} (of pairs {before:.2f})"
-            told.append(
+            lines.append(
                 f"{rounds['number']} rounds of {rounds['pairs']} pairs of blocks for {entry['operation']}, "
                 f"{entry['client']}{known}"
             )
-    return told
+    return lines
 
 
 def paper_rows(result: Mapping[str, Any], series: AllSeries) -> list[PaperRow]:

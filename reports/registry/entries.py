@@ -1,7 +1,7 @@
-"""What a registry is made of: envelopes that one of its keys signed, and those that are refused.
+"""The envelopes of a registry: those that one of its keys signed, and those that are refused.
 
-Of an envelope that does not verify nothing is believed, so nothing of it is shown either: the site says why in words of
-its own, and names the file by its digest. What is wrong in detail is for whoever builds the site.
+Nothing from a refused envelope is shown. The site identifies its file by digest and gives a reason in its own words; the
+person who builds the site sees the details.
 """
 
 from collections.abc import Iterable, Mapping
@@ -43,7 +43,7 @@ class Certificate:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the envelope's file, in hexadecimal."""
+        """Return the SHA-256 of the envelope's file, in hexadecimal."""
         return sha256(self.octets)
 
 

@@ -23,8 +23,8 @@ _WORDS = {
     "efforts": "too little effort",
     "motion": "was not allowed to move",
     "baseline": "with accepted failures",
-    "interrupted": "a part of a run",
-    "ros": "seen as a black box",
+    "interrupted": "an incomplete run",
+    "ros": "ROS topics not observed",
     "robot": "another robot",
     "vendor": "another vendor",
     "firmware": "another firmware",
@@ -38,7 +38,7 @@ class Standing:
 
     Attributes:
         against: why it does not count, in a few words each; empty if it counts.
-        details: what it says at each point of the policy that it does not meet.
+        details: each point of the policy that it does not meet, with what it says.
         until: when it expires, or None if its time cannot be read.
     """
 
@@ -121,7 +121,7 @@ def _standing(certificate: Certificate, policy: Policy, known: Known, now: dt.da
     return Standing(
         certificate,
         (*_own(certificate, first=first), *(_word(point, certificate, now) for point in counted)),
-        tuple(point.found for point in counted),
+        tuple(f"{_word(point, certificate, now)}: {point.found}" for point in counted),
         _after(certificate.run.ended, policy.max_age_days),
     )
 

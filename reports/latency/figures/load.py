@@ -41,8 +41,8 @@ def _latency(steps: Sequence[Mapping[str, Any]], knees: Sequence[Mapping[str, An
 
 
 def _crowd(crowds: Sequence[Mapping[str, Any]]) -> Panel:
-    told = "; ".join(f"{one['interface'].upper()}, {one['connections']}: {one['rate']:,.0f}/s" for one in crowds)
-    panel = Panel("latency over connections", f"Response time over the number of busy connections. Answered: {told}.")
+    text = "; ".join(f"{one['interface'].upper()}, {one['connections']}: {one['rate']:,.0f}/s" for one in crowds)
+    panel = Panel("latency over connections", f"Response time over the number of busy connections. Answered: {text}.")
     _lines(panel, crowds, "connections")
     panel.axes.set_xlabel("connections that are always busy")
     panel.axes.set_xticks(sorted({one["connections"] for one in crowds}))

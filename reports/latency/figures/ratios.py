@@ -35,8 +35,8 @@ def ratios(
 
 
 def _panel(title: str, rows: Sequence[Ratio], mark: tuple[float, str] | None) -> Panel:
-    told = "; ".join(f"{row.label}: {row.ratio:.3g}" for row in rows)
-    panel = Panel(title, f"{title}. {told}", height=1.45 + 0.34 * len(rows))
+    text = "; ".join(f"{row.label}: {row.ratio:.3g}" for row in rows)
+    panel = Panel(title, f"{title}. {text}", height=1.45 + 0.34 * len(rows))
     axes = panel.axes
     axes.axvline(1.0, color=INK, linewidth=0.9)
     if mark is not None:

@@ -30,11 +30,11 @@ def means(series: Series) -> dict[str, float]:
 
 
 def _panel(client: str, bars: Mapping[str, Mapping[str, float]]) -> Panel:
-    told = "; ".join(
+    text = "; ".join(
         f"{name}: " + ", ".join(f"{span} {time:.3g} ms" for span, time in parts.items()) for name, parts in bars.items()
     )
     panel = Panel(
-        f"{client} client", f"Mean time spent with the {client} client. {told}", height=1.5 + 0.42 * len(bars)
+        f"{client} client", f"Mean time spent with the {client} client. {text}", height=1.5 + 0.42 * len(bars)
     )
     longest = max(sum(parts.values()) for parts in bars.values())
     for span in SPANS:

@@ -75,7 +75,7 @@ NOT_GREEN = [
     ({"effort": "quick"}, "too little effort"),
     ({"statement__motion_allowed": False}, "was not allowed to move"),
     ({"baseline": {"digest": "sha256:" + "1" * 64}}, "with accepted failures"),
-    ({"interrupted": True}, "a part of a run"),
+    ({"interrupted": True}, "an incomplete run"),
     ({"statement__robot": {}}, "names no robot"),
 ]
 
