@@ -86,13 +86,20 @@ def test_pages_and_ci_formats_are_written(results):
     assert "Lamp contract" in (folder / "good" / "certificate.html").read_text(encoding="utf-8")
 
 
-def test_a_signed_certificate_is_verified_and_registered(results, tmp_path):
+def test_a_signed_certificate_is_verified_and_registered(results):
     folder, _ = results
     key = folder / "keys" / PUBLIC_NAME
     done = roaas("verify", folder / "good" / "certificate.intoto.json", "--key", key, "--result", folder / "good")
     assert "lamp" in done.output.lower(), done.output
     site = roaas("registry", "--help")
     assert site.exit_code == 0
+
+
+def test_recorded_traces_are_judged_again_without_the_device(results):
+    folder, _ = results
+    for name, code in (("good", 0), ("broken", 1)):
+        done = roaas("replay", folder / name, "lamp/fades", "--recorded", "--contract", LAMP)
+        assert (done.exit_code, "lamp/fades" in done.output) == (code, True), done.output
 
 
 def test_two_results_are_compared(results):

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from conformance.packs.table1.robot.drive_trace import Trace
+from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.plan import Start
 from conformance.transport.exchange import Exchange
 
 
@@ -86,3 +88,38 @@ class GoalLife:
     second: Put | None = None
     renamed: bool | None = None
     cancelled: tuple[Cancelled, ...] = ()
+
+
+@dataclass(frozen=True)
+class GoalReached:
+    """A goal that the robot drove to, or did not.
+
+    Attributes:
+        put: of the PUT.
+        there: the goal, in the frame of goals.
+        here: where the robot was in the end.
+        way_m: how far the robot came from where it was at first, m; has_to_m: how far it has to come at least.
+        left_m: how far it still is from the goal, m; reached_m: how near it has to come.
+        drive: all that was read on the way.
+        read: the last GET of the goal.
+        ended: whether there was no goal any more.
+        undecided: whether the robot was still on its way when the time was over.
+        turned: the drive behind it, which shows whether a velocity from before the goal is taken up again; or None.
+        start: where a plan begins behind it; or None.
+        again: of the PUT of the same goal, once it had ended; or None.
+    """
+
+    put: Exchange
+    there: Pose | None = None
+    here: Pose | None = None
+    way_m: float = 0.0
+    has_to_m: float = 0.0
+    left_m: float = 0.0
+    reached_m: float = 0.0
+    drive: Trace | None = None
+    read: Exchange | None = None
+    ended: bool = False
+    undecided: bool = False
+    turned: Trace | None = None
+    start: Start | None = None
+    again: Exchange | None = None

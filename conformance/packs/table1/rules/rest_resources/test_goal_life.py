@@ -80,7 +80,7 @@ def goal_repeat(trace: GoalLife) -> Iterator[Outcome]:
     for one in trace.repeated:
         accepted, changed = one.exchange.response.status in REPEATED, one.differs
         # A robot that shows one stamp in two readings shows another one for another goal.
-        stamps = trace.stamps if trace.first is not None and one.body is trace.first.body else ()
+        stamps = trace.stamps if trace.first is not None and one.body == trace.first.body else ()
         if not changed and len(stamps) > 1 and stamps[0] == stamps[1] != one.shown["goal_id"]["stamp"]:
             changed = f"goal_id.stamp {one.shown['goal_id']['stamp']} for {stamps[0]}"
         yield Case(
