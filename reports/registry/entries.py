@@ -1,7 +1,7 @@
 """The envelopes of a registry: those that one of its keys signed, and those that are refused.
 
-Nothing from a refused envelope is shown. The site identifies its file by digest and gives a reason in its own words; the
-person who builds the site sees the details.
+Nothing from a refused envelope is shown. The site identifies its file by digest and gives a reason in its own words.
+The person who builds the site sees the details.
 """
 
 from collections.abc import Iterable, Mapping
