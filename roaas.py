@@ -133,9 +133,12 @@ class FrontDoor:
             click.echo(f"no history: {error}", err=True)
 
     @staticmethod
-    def known() -> dict[str, Any]:
-        """What the installed suite knows: its digest, the requirement sets, the profiles."""
-        known: dict[str, Any] = import_module("conformance.engine.suite").known()
+    def known(pack: str | None) -> dict[str, Any]:
+        """Return what the installed suite knows of a contract pack: digest, requirement sets, profiles."""
+        try:
+            known: dict[str, Any] = import_module("conformance.engine.suite").known(pack)
+        except import_module("conformance.contract.locating").ContractError as error:
+            raise click.UsageError(str(error)) from error
         return known
 
 

@@ -12,7 +12,7 @@ from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public
 from reports.attestation.statement import RESULT_SUBJECT
 from reports.attestation.verifying import NOT_PROVED, PROVED, Verification
 from reports.attestation.verifying import verify as verified
-from reports.cli.options import FILE, FOLDER, FrontDoor, policy_of
+from reports.cli.options import CONTRACT, FILE, FOLDER, FrontDoor, policy_of
 from reports.errors import EnvelopeRefusedError
 from reports.pages.untrusted import excerpt
 
@@ -36,15 +36,25 @@ def keygen(directory: Path) -> None:
 @click.argument("file", type=FILE)
 @click.option("--key", required=True, type=FILE, metavar="PUB", help="Public key (PEM) of the signer whom you trust.")
 @click.option("--policy", type=FILE, help="What a certificate must meet (TOML).  [default: the strict policy]")
+@CONTRACT
 @click.option("--nonce", help="The nonce that you gave to the vendor: the run must have been made with it.")
 @click.option("--result", type=FOLDER, metavar="DIR", help="Compare DIR/result.json and DIR/certificate.html as well.")
 @click.pass_obj
-def verify(door: FrontDoor, file: Path, key: Path, policy: Path | None, nonce: str | None, result: Path | None) -> None:
+def verify(
+    door: FrontDoor,
+    file: Path,
+    key: Path,
+    *,
+    policy: Path | None,
+    pack: str | None,
+    nonce: str | None,
+    result: Path | None,
+) -> None:
     """Check the signature of a certificate, and whether it meets your policy. No network is needed.
 
     Exit code: 0 accepted; 1 refused; 2 wrong usage, or a file cannot be read.
     """
-    wanted, known = policy_of(door, policy)
+    wanted, known = policy_of(door, policy, pack)
     if nonce is not None:
         wanted = msgspec.structs.replace(wanted, nonce=nonce)
     trusted = public_key(key)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from reports.cli.options import FILE, FOLDER, PATH, FrontDoor, policy_of
+from reports.cli.options import CONTRACT, FILE, FOLDER, PATH, FrontDoor, policy_of
 from reports.pages.untrusted import excerpt
 from reports.registry.entries import Certificate, Refused, find_envelopes, read_entries, read_keys
 from reports.registry.site import INDEX, write_site
@@ -34,16 +34,19 @@ def registry() -> None:
     metavar="FILE",
     help="What a certificate must meet to count (TOML).  [default: the strict policy]",
 )
+@CONTRACT
 @click.option("--out", required=True, type=FOLDER, metavar="SITE", help="Folder of the site.")
 @click.pass_obj
-def build(door: FrontDoor, envelopes: tuple[Path, ...], keys: Path, policy: Path | None, out: Path) -> None:
+def build(
+    door: FrontDoor, envelopes: tuple[Path, ...], keys: Path, *, policy: Path | None, pack: str | None, out: Path
+) -> None:
     """Write SITE from ENVELOPES: files, or folders in which certificate.intoto.json is looked for at any depth.
 
     The site works without a network. Exit code: 0 every envelope verifies; 1 the site is written, and some envelopes
     were refused; 2 wrong usage, or a file cannot be read.
     """
     now = dt.datetime.now(dt.UTC)
-    wanted, known = policy_of(door, policy)
+    wanted, known = policy_of(door, policy, pack)
     trusted, private = read_keys(keys)
     entries = read_entries(find_envelopes(envelopes), trusted)
     found = histories((one for one in entries if isinstance(one, Certificate)), wanted, known, now)
