@@ -11,9 +11,9 @@ from click.testing import CliRunner
 
 from conformance.contract.pack import Contract
 from conformance.engine.permission import moves
-from conformance.engine.sequence import read_request, written
+from conformance.engine.recorded import read_request, written
 from conformance.transport.exchange import Request
-from conformance.verdict.evidence import Sent
+from conformance.verdict.finding import Sent
 from roaas import main
 
 
