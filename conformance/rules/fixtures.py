@@ -14,7 +14,7 @@ from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Listener
-from conformance.verdict.evidence import Observers
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 # What is imported late because few commands need it, and is needed later in a run.

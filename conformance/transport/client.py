@@ -140,7 +140,8 @@ class HttpClient:
         request = Request(method, f"{self.scheme}://{self.authority}{self.prefix}{path}", shown, body)
         endpoint = request.endpoint
         if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
-            problem = f"the request was not sent, because {endpoint} did not respond {_HANGS} times"
+            hung = endpoint.replace(f"{self.scheme}://{self.authority}", "", 1)
+            problem = f"the request was not sent, because {hung} did not respond {_HANGS} times"
             raise NoAnswerError(Unanswered(request, problem, NoAnswer.CIRCUIT_OPEN))
         deadline = timeout_s or self.connection.timeout_s
         started = time.monotonic()

@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from conformance.contract.classes import CauseKind
-from conformance.transport.exchange import Listener, NoAnswer, Unanswered
+from conformance.transport.exchange import NoAnswer, Unanswered
 from conformance.verdict.finding import Finding, Sent, causes_of, kind_of, observed_in, subject_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
 
     from conformance.contract.ledger import Requirement
-    from conformance.transport.exchange import Attempt, Exchange, Request
+    from conformance.transport.exchange import Attempt, Request
 
 # Findings of one requirement that are kept: those that break its rule, and those whose cause others may meet as well.
 MAX_FINDINGS = 5
@@ -263,6 +263,10 @@ class Judge:
         """Return how many cases each of the requirements has."""
         return {id_: self.evidence[id_].cases for id_ in ids if id_ in self.evidence}
 
+    def cases(self, requirement: str) -> int:
+        """Return how many cases a requirement has; 0 for one that the contract at hand does not have."""
+        return self.evidence[requirement].cases if requirement in self.evidence else 0
+
     def stopped(self, requirement: str, reason: str) -> None:
         """Say that a requirement was not tested because the run was called off, and why."""
         evidence = self.evidence.get(requirement)
@@ -272,28 +276,3 @@ class Judge:
             self.error(requirement, reason)
         elif not evidence.findings:
             evidence.because = self.ended_by
-
-
-class Observers(Listener):
-    """Has observers judge every exchange; what they judge holds for every response, errors included.
-
-    Args:
-        judge: takes what they see.
-        observers: each is shown every exchange.
-    """
-
-    def __init__(self, judge: Judge, observers: Iterable[Listener]) -> None:
-        self._judge = judge
-        self._observers = tuple(observers)
-
-    def answered(self, exchange: Exchange) -> None:
-        """Show an exchange to each observer."""
-        with self._judge.observing():
-            for observer in self._observers:
-                observer.answered(exchange)
-
-    def unanswered(self, request: Unanswered) -> None:
-        """Show a request without a response to each observer."""
-        with self._judge.observing():
-            for observer in self._observers:
-                observer.unanswered(request)

@@ -139,7 +139,8 @@ def causes_of(kind: CauseKind, exchange: Attempt | None) -> set[str]:
     """
     if kind is CauseKind.RULE or exchange is None:
         return set()
-    parts = [kind.value, exchange.request.endpoint]
+    # HEAD is GET without its content: one handler answers both (RFC 9110 9.3.2).
+    parts = [kind.value, exchange.request.endpoint.replace("HEAD ", "GET ", 1)]
     if isinstance(exchange, Exchange):
         parts.append(f"{exchange.response.status}")
         if kind is CauseKind.UNREADABLE:
@@ -171,7 +172,7 @@ def observed_in(exchange: Attempt | None, found: str) -> str:
         return f"{came}: {found}" if found else came
     rest = said.removeprefix(status)
     # "200 with application/json" and the like name the media type themselves.
-    return said if rest.startswith((" with", " as")) else f"{came}{rest}"
+    return said if rest.startswith((" with ", " as ")) else f"{came}{rest}"
 
 
 def _described(request: Request) -> str:

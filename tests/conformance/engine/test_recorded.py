@@ -30,7 +30,7 @@ def test_how_often_it_comes_back(monkeypatch, again, expected):
     assert finding.again == expected
     verdict = verdict_of(run.contract.ledger["http/head"], evidence, run.claims)
     assert verdict.value == "fail"
-    assert ("intermittent: it came back 2 of 5 times" in verdict.reason) == (expected[0] < 5)
+    assert ("Intermittent: sent again, it failed 2 of 5 times" in verdict.reason) == (expected[0] < 5)
 
 
 def test_an_observer_s_word_counts_more_than_the_status(monkeypatch):

@@ -160,8 +160,14 @@ def _displace(robot: Robot, judge: Judge, second: dict[str, Any], pose: Pose) ->
     goal, exchange = robot.goal()
     if goal is None and arrived(robot, pose):
         return
-    filled = goal is not None and goal["goal_id"]["id"] not in {"", _ID}
-    judge.check("rest-resources/goal-fills-in", filled, exchange, "a header and a goal_id of the robot's own")
+    id_ = "" if goal is None else goal["goal_id"]["id"]
+    judge.check(
+        "rest-resources/goal-fills-in",
+        id_ not in {"", _ID},
+        exchange,
+        "the active goal with a header and a goal_id of the robot's own",
+        found="no active goal" if goal is None else f"goal_id.id {id_!r}",
+    )
 
 
 def _judge_none(robot: Robot, judge: Judge) -> None:
