@@ -15,7 +15,7 @@ from conformance.api.rest.observers import Observer
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.pytest_run import connection_of
-from conformance.engine.recorded import is_same, read_request, send_again
+from conformance.engine.resending import is_same, read_request, send_again
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.statement import empty_statement
 from conformance.transport.client import Connection, HttpClient

@@ -10,7 +10,7 @@ from msgspec.structs import asdict
 
 from conformance.commandline.atomic_write import write_atomically
 from conformance.contract.interfaces import Interface
-from conformance.engine.recorded import written
+from conformance.engine.resending import written
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
 from conformance.transport.exchange import Unanswered
 from conformance.verdict.verdicts import overall, views

@@ -96,7 +96,7 @@ class Judge:
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
         self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
         self._findings = 0
-        self._observing = threading.local()
+        self._by_rule = threading.local()
 
     def begin(self, check_name: str) -> None:
         """Begin a check: what was sent before does not lead to its findings."""
@@ -108,13 +108,13 @@ class Judge:
         self._sent.append(Sent(time.monotonic(), request))
 
     @contextmanager
-    def observing(self) -> Iterator[None]:
-        """Let what is judged meanwhile, in this thread, count as rules for every response, server errors included."""
-        self._observing.on = True
+    def by_rule(self) -> Iterator[None]:
+        """Let what is judged meanwhile, in this thread, be rules of their own for whatever came, errors included."""
+        self._by_rule.on = True
         try:
             yield
         finally:
-            self._observing.on = False
+            self._by_rule.on = False
 
     def _led_to(self, exchange: Attempt | None) -> tuple[Sent, ...]:
         """The requests up to that of an exchange, which may have gone over a socket that nobody listens to."""
@@ -172,7 +172,7 @@ class Judge:
         subject: str,
     ) -> None:
         """Put a failed case down: as one more of a finding that there is, or as a new one."""
-        kind = self._kind(requirement, exchange)
+        kind = self._kind(requirement, exchange, found)
         observed = observed_in(exchange, found)
         causes = causes_of(kind, exchange)
         # Without a word of the check, two causes are two findings, even where the texts are alike.
@@ -209,11 +209,11 @@ class Judge:
         )
         self.met.append(finding)
 
-    def _kind(self, requirement: str, exchange: Attempt | None) -> CauseKind:
+    def _kind(self, requirement: str, exchange: Attempt | None, found: str) -> CauseKind:
         """Return the kind of cause that keeps a requirement from being met."""
-        kind = kind_of(exchange)
+        kind = kind_of(exchange, found)
         forbids = self._ledger[requirement].forbids if requirement in self._ledger else ()
-        return CauseKind.RULE if getattr(self._observing, "on", False) and kind not in forbids else kind
+        return CauseKind.RULE if getattr(self._by_rule, "on", False) and kind not in forbids else kind
 
     def require(
         self,

@@ -116,17 +116,21 @@ def in_full(finding: Finding) -> str:
     return f"{finding.text}{curl}"
 
 
-def kind_of(exchange: Attempt | None) -> CauseKind:
-    """Return the kind of cause that an exchange is by itself; RULE where a well-formed response came."""
+def kind_of(exchange: Attempt | None, found: str = "") -> CauseKind:
+    """Return the kind of cause that an exchange is by itself; RULE where a well-formed response came.
+
+    Where a check found something else than that, such as an effect of the request, the finding breaks its own rule.
+    """
     if isinstance(exchange, Unanswered):
-        return _KINDS[exchange.kind]
+        return _KINDS[exchange.kind] if not found or exchange.problem in found else CauseKind.RULE
     if exchange is None:
         return CauseKind.RULE
     response = exchange.response
     if response.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
         # SOAP says what is wrong with a request by a fault with status 500 (BP 1.1 R1126).
         fault = response.status == HTTPStatus.INTERNAL_SERVER_ERROR and _FAULT.search(response.body)
-        return CauseKind.RULE if fault else CauseKind.SERVER_ERROR
+        says_so = not found or str(response.status) in found
+        return CauseKind.SERVER_ERROR if says_so and not fault else CauseKind.RULE
     if response.body and unreadable(response.media_type, response.body):
         return CauseKind.UNREADABLE
     return CauseKind.RULE

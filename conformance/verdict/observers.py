@@ -27,12 +27,12 @@ class Observers(Listener):
 
     def answered(self, exchange: Exchange) -> None:
         """Show an exchange to each observer."""
-        with self._judge.observing():
+        with self._judge.by_rule():
             for observer in self._observers:
                 observer.answered(exchange)
 
     def unanswered(self, request: Unanswered) -> None:
         """Show a request without a response to each observer."""
-        with self._judge.observing():
+        with self._judge.by_rule():
             for observer in self._observers:
                 observer.unanswered(request)

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from conformance.contract.pack import Contract
 from conformance.engine.permission import moves
-from conformance.engine.recorded import read_request, written
+from conformance.engine.resending import read_request, written
 from conformance.transport.exchange import Request
 from conformance.verdict.finding import Sent
 from roaas import main

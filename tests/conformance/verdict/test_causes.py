@@ -98,7 +98,7 @@ def test_a_finding_of_several_causes_is_hidden_only_when_all_are_told():
 
 def test_what_an_observer_sees_holds_for_errors_as_well():
     run = _run((_READ, _error()))
-    with run.judge.observing():
+    with run.judge.by_rule():
         run.judge.check(_DATE, False, _error(), "Date")
         run.judge.check(_STATUS, False, _error(), "a declared status")
     assert _told(run)[1] == [(_STATUS, 1, (_READ,)), (_DATE, 2, ())]
@@ -146,3 +146,14 @@ def test_a_baseline_that_accepts_what_waits_still_does():
     assert (applied.value, applied.because.number, "known" in applied.reason) == ("warn", 1, True)
     (expired,) = apply_baseline([verdict], [entry], dt.date(2031, 1, 1))
     assert expired.value == "skip"
+
+
+def test_an_effect_that_a_check_found_is_no_cause_of_others():
+    run = _run((_STATUS, _error()))
+    run.judge.check(_READ, False, _error(), "a robot at rest", found="the robot moved by 0.3 m")
+    run.judge.check(_XML, False, _closed(), "a robot at rest", found="the robot moved by 0.3 m")
+    assert {(requirement, blocks) for requirement, _, blocks in _told(run)[1]} == {
+        (_STATUS, ()),
+        (_READ, ()),
+        (_XML, ()),
+    }
