@@ -147,12 +147,7 @@ class Observer(Listener):
         ):
             if said.verdict == verdict and (crashed or verdict == INVALID):
                 api.run.judge.check(
-                    id_,
-                    not crashed,
-                    exchange,
-                    expected,
-                    found=f"status {status}{retry} for {request.method}",
-                    cause=f"{status} {operation}",
+                    id_, not crashed, exchange, expected, found=f"status {status}{retry}", cause=f"{status} {operation}"
                 )
 
 
