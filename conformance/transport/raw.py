@@ -10,6 +10,7 @@ import socket
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from http import HTTPStatus
 
 import h11
 
@@ -71,6 +72,13 @@ def chunked(body: bytes, size: int, extension: bytes = b"", trailers: bytes = b"
     pieces = (body[start : start + size] for start in range(0, len(body), size))
     chunks = b"".join(b"%x%b\r\n%b\r\n" % (len(piece), extension, piece) for piece in pieces)
     return chunks + b"0%b\r\n%b\r\n" % (extension, trailers)
+
+
+def refuses_chunks(attempt: Attempt) -> bool:
+    """Return whether a server of HTTP/1.0, which has no chunks, asks for a length (RFC 9112 6.1)."""
+    if isinstance(attempt, Unanswered):
+        return False
+    return attempt.response.http_version == "HTTP/1.0" and attempt.response.status == HTTPStatus.LENGTH_REQUIRED
 
 
 def talk(

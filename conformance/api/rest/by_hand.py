@@ -3,21 +3,40 @@
 h11 stands for the robot's server: what it does not take as one request or several, no robot is sent as valid.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 from urllib.parse import urlsplit
 
 import h11
 
+from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.transport import raw
+from conformance.transport.exchange import Attempt
 from conformance.verdict.evidence import HarnessError
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
-    from conformance.api.rest.interface import RestInterface
+def ask(api: RestInterface, method: str, path: str, *fields: str, body: bytes = b"", **how: Any) -> Attempt:
+    """Send one valid request over a socket of its own, and return what became of it.
+
+    Args:
+        api: the robot's REST interface.
+        method: as on the wire.
+        path: below the base URL.
+        fields: whole lines, without line ends.
+        body: as on the wire, in chunks if the fields say so.
+        how: deadline and pauses, as raw.talk() has them.
+
+    Raises:
+        HarnessError: the request is not valid by the contract.
+        NoAnswerError: no connection could be opened.
+    """
+    return ask_octets(api, raw.head(api.client, method, path, *fields) + body, method, **how)
+
+
+def ask_octets(api: RestInterface, octets: bytes, method: str = "GET", **how: Any) -> Attempt:
+    """Send the octets of one valid request, and return what became of it; as ask()."""
+    return raw.read_one(api.client, octets, talk(api, octets, answers=1, **how), method)[0]
 
 
 def talk(api: RestInterface, octets: bytes, *, answers: int = 0, refused: bool = False, **how: Any) -> raw.RawAnswer:

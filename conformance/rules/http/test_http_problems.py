@@ -1,4 +1,4 @@
-"""Problems: an error says in words what was wrong, and where (RFC 9457 3.1.4)."""
+"""Problem documents: an error says in words what was wrong, and where (RFC 9457 3.1.4)."""
 
 from functools import partial
 
@@ -28,7 +28,7 @@ _TEXT = "roaas-no-number"
 @pytest.mark.phase("reading")
 @pytest.mark.requirement(*_IDS, "rest-formats/problem-xml", "strict-input/query-parameter")
 def test_problem_of_a_query(api: RestInterface, judge: Judge) -> None:
-    """A query parameter that is no number is named, and so is what stood there instead."""
+    """Send text for a number in a query: the problem names the parameter and the text."""
     numbers = {"number", "integer"}
     tried = 0
     for call in reads(api):
@@ -55,7 +55,7 @@ def test_problem_of_a_query(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.phase("input")
 @pytest.mark.requirement(*_IDS, "rest-formats/problem-xml", "strict-input/json-missing", "strict-input/json-type")
 def test_problem_of_a_body(api: RestInterface) -> None:
-    """A field that is missing or of another type is named in the problem."""
+    """Send bodies with a field that is missing or of another type: the problem names it."""
     api.device.halt(api)
     for operation in applicable_operations(api, (), lambda item: JSON in item.bodies, "takes JSON"):
         call = example_call(api, operation)
@@ -75,6 +75,6 @@ def test_problem_of_a_body(api: RestInterface) -> None:
                 malformed=item.malformed,
             )
         for item in made[:1]:
-            # The observers judge in which format it is refused.
+            # The observers judge the format of the refusal.
             call.carrying(item.body).send(api, ("Accept", "application/xml"))
     api.device.halt(api)

@@ -1,6 +1,6 @@
-"""Schemathesis over the contract's OpenAPI: examples, coverage, fuzzing and a walk along its links.
+"""Schemathesis over the contract's OpenAPI: examples, coverage, fuzzing and walks along its links.
 
-Its requests are judged by what they are on the wire: valid ones by the statuses of the contract, invalid ones by 4xx.
+The suite judges its requests by what they are on the wire: valid ones by the contract's statuses, invalid ones by 4xx.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis.errors import Unsatisfiable
 
+from conformance.api.expectation import expect
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
@@ -63,7 +64,7 @@ def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
 @pytest.mark.phase("describe")
 @pytest.mark.requirement(*_IDS, "strict-input/query-parameter", "strict-input/query-missing")
 def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
-    """What moves nothing."""
+    """Send generated requests for operations that move nothing."""
     guard = MotionGuard(api)
     for target in _targets(api, moving=False):
         _run(api, judge, explore, guard, target)
@@ -72,7 +73,7 @@ def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer)
 @pytest.mark.phase("input")
 @pytest.mark.requirement(*_IDS, *_STRICT)
 def test_moving_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
-    """What may move the robot: invalid requests, and a few valid ones made fit for it."""
+    """Send generated requests for operations that may move the robot: invalid ones, and a few valid ones."""
     guard = MotionGuard(api)
     api.device.halt(api)
     for target in _targets(api, moving=True):
@@ -95,11 +96,11 @@ def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard
         try:
             explore(target.fuzzing(negative=negative), fuzz, cases=_FUZZED)
         except Unsatisfiable:
-            continue  # its schemas take everything, or nothing: there is no such case
+            continue  # its schemas allow everything, or nothing: there is no such case
 
 
 def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item: GeneratedRequest) -> None:
-    """Send one request where it is harmless, and judge its answer by what it is on the wire."""
+    """Send one request where it is harmless, and judge the response by what the request is on the wire."""
     fit = guard.admit(item)
     if fit is None:
         return
@@ -112,12 +113,9 @@ def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item:
     answer = exchange.response
     guard.count(fit, accepted=answer.ok)
     if said.verdict == VALID and said.operation is not None:
-        judge.check(
-            "http/declared-status",
+        expect(judge, "http/declared-status", exchange).that(
             answer.status not in _POSITIVE_REFUSALS,
-            exchange,
-            f"a valid request of {said.operation.id} not refused for its form",
-            found=f"status {answer.status}",
+            f"a status by which {said.operation.id} does not refuse the form of a valid request",
             cause=f"{said.operation.id} {answer.status}",
         )
 
@@ -125,9 +123,9 @@ def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item:
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/declared-status")
 def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
-    """A few short walks from operation to operation, as the contract's links lead."""
+    """Walk from operation to operation along the contract's links, a few times."""
     if api.run.effort.name == "quick":
-        return
+        return  # the observers judge http/declared-status on every other request
     from conformance.api.rest.generated import as_request, as_thesis, state_machine  # noqa: PLC0415 - as above
 
     machine: Any = state_machine(api.run.contract.openapi)
