@@ -5,6 +5,7 @@ from __future__ import annotations
 import traceback
 from typing import TYPE_CHECKING
 
+from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.evidence import RefutedError
 
@@ -22,6 +23,10 @@ def record_exception(
     ``alive`` asks the robot anew; ``judged`` is how many cases each requirement had before the check.
     """
     if isinstance(error, RefutedError):
+        return
+    if isinstance(error, NotPossibleError):
+        for id_ in ids:
+            run.judge.skip(id_, str(error))
         return
     known = [id_ for id_ in ids if id_ in run.judge.evidence]
     now = run.judge.counts(known)

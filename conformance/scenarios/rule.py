@@ -51,16 +51,16 @@ Outcome = Case | NotTested | Note
 
 @dataclass(frozen=True)
 class Rule:
-    """One requirement's judgement of one scenario's trace.
+    """One requirement's judgement of the traces of scenarios.
 
     Attributes:
         requirement: its id.
-        on: the scenario.
+        on: the scenarios, each of which shows whether it is kept.
         judge: takes the trace, and fixtures by their names; yields cases, or why there are none.
     """
 
     requirement: str
-    on: Scenario
+    on: tuple[Scenario, ...]
     judge: Callable[..., Iterable[Outcome]]
 
     @property
@@ -73,7 +73,7 @@ class Rule:
         return list(self.judge(trace, **{name: fixture(name) for name in self.fixtures}))
 
 
-def rule(requirement: str, *, on: Scenario) -> Callable[[Callable[..., Iterable[Outcome]]], Rule]:
+def rule(requirement: str, *, on: tuple[Scenario, ...]) -> Callable[[Callable[..., Iterable[Outcome]]], Rule]:
     """Return a decorator that makes a rule of a function."""
     return lambda judge: Rule(requirement, on, judge)
 

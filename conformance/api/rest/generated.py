@@ -130,9 +130,11 @@ def state_machine(document: dict[str, Any]) -> Any:
     from schemathesis.core.errors import NoLinksFound  # noqa: PLC0415 - an internal name, used here alone
 
     try:
-        return schemathesis.openapi.from_dict(document).as_state_machine()
+        machine = schemathesis.openapi.from_dict(document).as_state_machine()
+        machine()  # of some descriptions it is told only here that there are none
     except NoLinksFound:
         return None
+    return machine
 
 
 def _requests(cases: Any) -> Iterator[GeneratedRequest]:

@@ -7,6 +7,7 @@ from typing import Any, Final
 import pytest
 
 from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive_rules import judge_drive
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import (
     CANCELLED,
@@ -81,6 +82,7 @@ def _cancel(robot: Robot, judge: Judge, pose: Pose) -> bool:
         found="" if status not in CANCELLED else f"GET of the goal is answered {none.came}",
     )
     drive.reach(STILL, "safety/cancel", since=answered)
+    judge_drive(judge, drive.trace, robot.limits)
     return True
 
 
@@ -240,6 +242,7 @@ def _velocity_meanwhile(robot: Robot, judge: Judge) -> None:
     if exchange.response.ok and drive.look_s < _LOOK_S:
         drive.commanded(slow, sent, exchange)
         drive.reach(slow, "rest-resources/velocity-goal")
+        judge_drive(judge, drive.trace, robot.limits)
 
 
 def _slow_turn(robot: Robot) -> Velocity:

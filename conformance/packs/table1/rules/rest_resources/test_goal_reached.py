@@ -8,6 +8,7 @@ import pytest
 
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive_rules import judge_drive
 from conformance.packs.table1.robot.drive_trace import Command
 from conformance.packs.table1.robot.geometry import Pose, middle_of
 from conformance.packs.table1.robot.goal import NEW, await_none, goal_body, put_goal
@@ -140,7 +141,7 @@ def _drive_to(robot: Robot, judge: Judge, there: Pose, start: Pose, longest_s: f
             progress, nearest, yaw = now, min(nearest, here.distance(there)), here.yaw
         if goal is None or now > progress + _NO_PROGRESS_S or now > began + longest_s:
             break
-    drive.judge_motion()
+    judge_drive(judge, drive.whole, robot.limits, way=True)
     moved = 0.15 if start.distance(there) > 0.35 else 0.0
     if here.distance(there) >= _REACHED_M or start.distance(here) <= moved:
         # One sample may be out, or from before the end: those of a second say where the robot is.

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.driving import driving
 from conformance.packs.table1.robot.robot import POSE, Robot
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
@@ -84,10 +84,8 @@ def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
 )
 def test_velocity_and_odometry(robot: Robot, effort: Effort) -> None:
     """Velocity, its linear part and the odometry agree; observer and drive judge each reading."""
-    drive = Drive(robot)
     until = time.monotonic() + 0.4 * robot.watchfulness
-    readings = 0
     # Two readings agree where the odometry has been steady for a while: so look for that long at least.
-    while readings < effort.cases(60) or time.monotonic() < until:
-        drive.look()
-        readings += 1
+    with driving(robot) as drive:
+        while len(drive.trace.turns) < effort.cases(60) or time.monotonic() < until:
+            drive.look()

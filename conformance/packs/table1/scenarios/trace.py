@@ -1,0 +1,21 @@
+"""What the scenarios that drive a robot record."""
+
+from dataclasses import dataclass
+
+from conformance.packs.table1.robot.drive_trace import Trace
+from conformance.packs.table1.robot.letting_go import LetGo
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A drive, and the velocities in it that were not renewed.
+
+    Attributes:
+        drive: all commands and readings.
+        let_go: for each velocity that was left to itself, every try to see how long it holds.
+        not_tested: why a requirement could not be tested, by its id.
+    """
+
+    drive: Trace
+    let_go: tuple[tuple[LetGo, ...], ...] = ()
+    not_tested: tuple[tuple[str, str], ...] = ()
