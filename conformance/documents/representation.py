@@ -15,7 +15,7 @@ from conformance.documents.openapi import is_json, is_xml
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d{1,400}", re.ASCII)
 _NULLS = {"", "null", "~", "Null", "NULL"}
-# libyaml where PyYAML was built with it: an Odometry is 150 lines, and pure Python takes 20 ms for them.
+# libyaml where PyYAML was built with it: pure Python takes 20 ms for a document of 150 lines.
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _ByItself: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _COMBINING = frozenset({"allOf", "oneOf", "anyOf"})
@@ -182,7 +182,7 @@ def projected(value: Any, schema: Schema) -> Any:
     if isinstance(value, list):
         items = flat(schema.get("items", {}))
         if not items.get("properties") and "items" not in items:
-            return list(value)  # numbers, mostly: an odometry has 72 of them in two lists
+            return list(value)  # numbers, mostly: a covariance matrix has 36 of them
         return [projected(item, items) for item in value]
     properties: dict[str, Schema] = schema.get("properties", {})
     if not properties:

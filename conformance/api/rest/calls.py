@@ -75,7 +75,7 @@ class Call:
     def send(
         self, api: RestInterface, *headers: tuple[str, str], method: str | None = None, fresh: bool = False
     ) -> Exchange:
-        """Send it; a read that the robot puts off for a moment (no odometry just now), a few times in a run once more.
+        """Send the request; send a read again, a few times in a run, that the robot puts off for a moment.
 
         Raises:
             NoAnswerError: no HTTP response came.

@@ -14,7 +14,7 @@ from conformance.documents.xml_node import Node
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = pytest.mark.phase("delivery")
+pytestmark = pytest.mark.phase("acting")
 _STRANGE = "urn:example:strange"
 _OTHER_VERSION = "urn:example:soap-of-another-version"
 _SOAP_12 = "http://www.w3.org/2003/05/soap-envelope"

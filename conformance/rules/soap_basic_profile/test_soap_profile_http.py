@@ -20,7 +20,7 @@ from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = pytest.mark.phase("delivery")
+pytestmark = pytest.mark.phase("acting")
 _ANY = Node(clark("urn:example:strange", "no_such_operation"))
 _TRUNCATED_S = 5.0
 _TEXT_XML: Final = {

@@ -17,7 +17,7 @@ from conformance.documents.xml_node import Node
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = pytest.mark.phase("delivery")
+pytestmark = pytest.mark.phase("acting")
 _STRANGE = "urn:example:strange"
 _REPEATED = (
     "soap-basic-profile/R2712",

@@ -19,7 +19,7 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge, RefutedError
 from conformance.verdict.explorer import Explorer
 
-pytestmark = pytest.mark.phase("delivery")
+pytestmark = pytest.mark.phase("acting")
 _KINDS = ("missing", "unknown", "duplicate", "order", "namespace", "lexical", "range", "non-finite", "nil", "body")
 _FAULT = "strict-input/soap-fault"
 _IDS = (*(f"strict-input/soap-{kind}" for kind in _KINDS), _FAULT)

@@ -52,7 +52,7 @@ def test_missing_query_parameters(api: RestInterface) -> None:
         judge_refusal(api, partial(bare.send, api), _MISSING, "no parameter at all", json=False)
 
 
-@pytest.mark.phase("delivery")
+@pytest.mark.phase("acting")
 @pytest.mark.requirement(_PATH, "http/problem-detail", "http/problem-value")
 def test_path_parameters(api: RestInterface) -> None:
     """Send text, NaN, Infinity, 1e400 and values that are not allowed in a path."""
