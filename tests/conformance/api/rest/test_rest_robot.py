@@ -75,7 +75,7 @@ def test_formats_disagree_only_where_they_do(api, library):
     (found,) = disagreements(api, call, ["application/xml", "text/plain"])[0]
     assert (found.place, found.description) == (
         "price",
-        "price is 0.0 in application/xml and 0.30000000000000004 in JSON",
+        "0.0 as price in application/xml and 0.30000000000000004 in JSON",
     )
 
 
