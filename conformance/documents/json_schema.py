@@ -109,6 +109,33 @@ def kind_of(schema: Schema) -> str:
     return next((name for name in types_of(schema) if name != "null"), "string")
 
 
+def kinds_of(schema: Schema) -> frozenset[str]:
+    """Return the JSON types other than null that a value may have, in any alternative; empty where any will do."""
+    named = types_of(schema)
+    if not named and ("enum" in schema or "const" in schema):
+        named = tuple(_type_of(value) for value in schema.get("enum", [schema.get("const")]))
+    if named:
+        return frozenset(named) - {"null"}
+    for key in ("anyOf", "oneOf"):
+        alternatives = [kinds_of(part) for part in schema.get(key, ()) if types_of(part) != ("null",)]
+        if alternatives:
+            return frozenset().union(*alternatives) if all(alternatives) else frozenset()
+    return next(filter(None, map(kinds_of, schema.get("allOf", ()))), frozenset())
+
+
+def is_numeric(schema: Schema) -> bool:
+    """Return whether every value of a schema is a number, or null."""
+    return bool(kinds_of(schema)) and kinds_of(schema) <= {"number", "integer"}
+
+
+def _type_of(value: Any) -> str:
+    """Return the JSON type of a value."""
+    for kind, name in ((bool, "boolean"), (int, "integer"), (float, "number"), (str, "string"), (list, "array")):
+        if isinstance(value, kind):
+            return name
+    return "null" if value is None else "object"
+
+
 def is_number(value: Any) -> bool:
     """Whether a JSON value is a number that a double can hold; an integer counts as one."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(as_double(value))

@@ -146,8 +146,8 @@ def root_name(schema: Schema) -> str:
 
 
 def minimal(schema: Schema, depth: int = 0) -> Any:
-    """A small value that a schema allows (patterns aside)."""
-    schema = flat(schema)
+    """Return a small value that a schema allows (patterns aside)."""
+    schema = flat(_without_null(schema))
     given = [schema[key] for key in ("example", "const", "default") if key in schema]
     given += [schema[key][0] for key in ("examples", "enum") if schema.get(key)]
     if given:
@@ -162,6 +162,12 @@ def minimal(schema: Schema, depth: int = 0) -> Any:
         least = schema.get("minimum", schema.get("exclusiveMinimum", 0) + (1 if "exclusiveMinimum" in schema else 0))
         return max(least, min(1, schema.get("maximum", max(least, 1))))
     return True if kind == "boolean" else "a" * max(1, schema.get("minLength", 1))
+
+
+def _without_null(schema: Schema) -> Schema:
+    """Return a schema without the alternatives that allow only null."""
+    unions = {key: schema[key] for key in ("anyOf", "oneOf") if key in schema}
+    return {**schema, **{key: [part for part in parts if part != {"type": "null"}] for key, parts in unions.items()}}
 
 
 def _fitted(api: RestInterface, operation: Operation, value: Any) -> Any:

@@ -4,12 +4,12 @@ from functools import partial
 
 import pytest
 
-from conformance.api.rest.applicable import applicable_operations, reads
+from conformance.api.rest.applicable import reads, usable_operations
 from conformance.api.rest.calls import JSON, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.mutations import mutations
 from conformance.api.rest.refusals import judge_refusal
-from conformance.documents.json_schema import kind_of
+from conformance.documents.json_schema import is_numeric
 from conformance.documents.openapi import operations_of
 from conformance.verdict.evidence import Judge
 
@@ -29,11 +29,10 @@ _TEXT = "roaas-no-number"
 @pytest.mark.requirement(*_IDS, "rest-formats/problem-xml", "strict-input/query-parameter")
 def test_problem_of_a_query(api: RestInterface, judge: Judge) -> None:
     """Send text for a number in a query: the problem names the parameter and the text."""
-    numbers = {"number", "integer"}
     tried = 0
     for call in reads(api):
         for item in call.operation.parameter("query"):
-            if kind_of(item.schema) not in numbers:
+            if not is_numeric(item.schema):
                 continue
             tried += 1
             wrong = call.having(item.name, _TEXT)
@@ -57,7 +56,7 @@ def test_problem_of_a_query(api: RestInterface, judge: Judge) -> None:
 def test_problem_of_a_body(api: RestInterface) -> None:
     """Send bodies with a field that is missing or of another type: the problem names it."""
     api.device.halt(api)
-    for operation in applicable_operations(api, (), lambda item: JSON in item.bodies, "takes JSON"):
+    for operation in usable_operations(api, lambda item: JSON in item.bodies):
         call = example_call(api, operation)
         made = [
             item

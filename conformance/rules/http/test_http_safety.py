@@ -5,7 +5,7 @@ import time
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.rest.applicable import applicable_operations, reads
+from conformance.api.rest.applicable import applicable_operations, reads, usable_operations
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.effects import reader_of, settles_at
 from conformance.api.rest.interface import RestInterface
@@ -47,7 +47,7 @@ def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
     """
     calls = [Call(call.operation, call.values) for call in reads(api)]
     others = api.run.effort.subsample(calls, 1)
-    for operation in applicable_operations(api, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts"):
+    for operation in usable_operations(api, lambda item: item.method == "PUT" and bool(item.bodies)):
         api.device.halt(api)
         call = example_call(api, operation)
         reader = reader_of(api, call)

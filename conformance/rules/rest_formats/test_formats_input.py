@@ -8,7 +8,7 @@ import pytest
 from lxml import etree
 
 from conformance.api.expectation import expect
-from conformance.api.rest.applicable import applicable_operations
+from conformance.api.rest.applicable import applicable_operations, usable_operations
 from conformance.api.rest.calls import JSON, XML, Call, example_call, root_name
 from conformance.api.rest.effects import reader_of, settles_at
 from conformance.api.rest.formats import judge_same_values
@@ -29,9 +29,7 @@ _ECHO = 1e-9
 @pytest.mark.requirement("rest-formats/same-values", "rest-formats/xml-root")
 def test_formats_of_what_was_put(api: RestInterface, judge: Judge) -> None:
     """Put a resource that is there only then (a goal), and compare its values in all formats."""
-    for operation in applicable_operations(
-        api, (), lambda item: item.method == "PUT" and bool(item.bodies), "puts something"
-    ):
+    for operation in usable_operations(api, lambda item: item.method == "PUT" and bool(item.bodies)):
         api.device.halt(api)
         call = example_call(api, operation)
         reader = reader_of(api, call)
