@@ -66,8 +66,8 @@ def _to_be_refused(call: Call) -> Call | None:
 def _by_itself(call: Call, exchange: Exchange) -> bool | None:
     """Return whether an operation is there by the response to it; None where the resource may only be empty."""
     status = exchange.response.status
-    may_be_empty = (
-        call.operation.declared(status) is not None or (not call.operation.safe and "{" in call.operation.template)
+    may_be_empty = call.operation.declared(status) is not None or (
+        not call.operation.safe and "{" in call.operation.template
     )
     if status == HTTPStatus.NOT_FOUND and may_be_empty:
         return None
