@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from conformance.api.rest.mutations import places, replaced, with_options
+from conformance.api.rest.json_mutations import places, replaced, with_options
 from conformance.documents.json_schema import Schema
 from conformance.documents.writing import Token, json_text
 

@@ -7,7 +7,7 @@ import pytest
 from conformance.api.rest.applicable import reads, usable_operations
 from conformance.api.rest.calls import JSON, example_call
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.mutations import mutations
+from conformance.api.rest.json_mutations import mutations
 from conformance.api.rest.refusals import judge_refusal
 from conformance.documents.json_schema import is_numeric
 from conformance.documents.openapi import operations_of
@@ -61,19 +61,19 @@ def test_problem_of_a_body(api: RestInterface) -> None:
         made = [
             item
             for item in mutations(call.value, operation.bodies[JSON].schema)
-            if item.requirement in {"json-missing", "json-type"} and (item.shown or "missing" in item.name)
+            if item.kind in {"missing", "type"} and (item.shown or "missing" in item.what)
         ]
         for item in api.run.effort.subsample(made[:: max(1, len(made) // 6)], 2):
             judge_refusal(
                 api,
-                partial(call.carrying(item.body).send, api),
-                f"strict-input/{item.requirement}",
-                item.name,
+                partial(call.carrying(item.made).send, api),
+                f"strict-input/json-{item.kind}",
+                item.what,
                 field=item.field,
                 shown=item.shown,
                 malformed=item.malformed,
             )
         for item in made[:1]:
             # The observers judge the format of the refusal.
-            call.carrying(item.body).send(api, ("Accept", "application/xml"))
+            call.carrying(item.made).send(api, ("Accept", "application/xml"))
     api.device.halt(api)

@@ -134,6 +134,8 @@ def test_invalid_messages(soap: SoapServices, judge: Judge, effort: Effort) -> N
             # Spread over all kinds and elements, rather than the first of them.
             step = max(1, len(wrong) // effort.cases(40))
             for mutant in invalid_ones(wrong[::step], service.contract.types):
-                answer = call(service, *mutant.payload)
+                answer = call(service, *mutant.made)
                 cause = f"{mutant.kind} {answer.status} {answer.code}"
-                expect_answer(judge, "soap-basic-profile/R2724", answer).fault("Client", mutant.what, cause=cause)
+                expect_answer(judge, "soap-basic-profile/R2724", answer).fault(
+                    "Client", f"there is {mutant.what}", cause=cause
+                )

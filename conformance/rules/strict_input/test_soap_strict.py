@@ -6,10 +6,11 @@ from itertools import islice
 import pytest
 from hypothesis import strategies as st
 
+from conformance.api.mutations import Mutation
 from conformance.api.soap.callable_services import SoapServices, callable_services
 from conformance.api.soap.calls import SoapResponse, call, expect_answer
 from conformance.api.soap.messages import ordinary, variants
-from conformance.api.soap.mutations import Mutation, invalid_ones, mutations
+from conformance.api.soap.mutations import Payload, invalid_ones, mutations
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import example
 from conformance.documents.wsdl import Operation
@@ -36,19 +37,19 @@ def _targets(service: SoapService) -> list[tuple[Operation, Element, Node]]:
     return found
 
 
-def _judged(judge: Judge, mutant: Mutation, answer: SoapResponse) -> bool:
+def _judged(judge: Judge, mutant: Mutation[Payload], answer: SoapResponse) -> bool:
     """Judge whether a mutant was refused, and how; return whether that was right."""
     why = f" ({mutant.reason})" if mutant.reason else ""
     refused = expect_answer(judge, f"strict-input/soap-{mutant.kind}", answer).that(
         answer.refused,
-        f"a fault or status 4xx when {mutant.what}{why}",
+        f"a fault or status 4xx for {mutant.what}{why}",
         cause=f"{mutant.kind} {answer.status} {answer.accepted}",
     )
     if answer.accepted:
         return refused
     return expect_answer(judge, _FAULT, answer).that(
         answer.fault is not None and answer.status == 500,
-        f"a fault with status 500 when {mutant.what}",
+        f"a fault with status 500 for {mutant.what}",
         cause=f"{answer.status} {answer.fault is None}",
     )
 
@@ -69,7 +70,7 @@ def test_single_mutations(soap: SoapServices, judge: Judge, effort: Effort) -> N
             ours = [mutant for _, mutant in found if mutant.kind == kind]
             for mutant in invalid_ones(ours[: effort.cases(60)], service.contract.types):
                 sent[kind] += 1
-                _judged(judge, mutant, call(service, *mutant.payload))
+                _judged(judge, mutant, call(service, *mutant.made))
     for kind, count in sent.items():
         if not count:
             judge.skip(f"strict-input/soap-{kind}", _nothing(services, kind))
@@ -90,20 +91,20 @@ def test_mutations_of_any_message(soap: SoapServices, judge: Judge, explore: Exp
         if not targets:
             continue
 
-        def refused(case: tuple[Element, Mutation], service: SoapService = service) -> None:
+        def refused(case: tuple[Element, Mutation[Payload]], service: SoapService = service) -> None:
             for invalid in invalid_ones([case[1]], service.contract.types):
-                if not _judged(judge, invalid, call(service, *invalid.payload)):
+                if not _judged(judge, invalid, call(service, *invalid.made)):
                     raise RefutedError(invalid.what)
 
         explore(st.one_of([_broken(*target) for target in targets]), refused, cases=80)
 
 
-def _broken(declared: Element, base: Node) -> st.SearchStrategy[tuple[Element, Mutation]]:
+def _broken(declared: Element, base: Node) -> st.SearchStrategy[tuple[Element, Mutation[Payload]]]:
     """Return a strategy for any single mutation of any valid message of an operation."""
     # Values change nothing in what there is to mutate, so that only the mutation that was chosen has to be made.
     count = sum(1 for _ in mutations(declared, base))
 
-    def broken(drawn: Node, chosen: int) -> tuple[Element, Mutation]:
+    def broken(drawn: Node, chosen: int) -> tuple[Element, Mutation[Payload]]:
         return declared, next(islice(mutations(declared, drawn), chosen, None))
 
     return st.builds(broken, variants(declared, base), st.integers(0, count - 1))

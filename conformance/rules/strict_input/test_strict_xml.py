@@ -32,11 +32,10 @@ def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
         taken += 1
         schema = operation.bodies[XML].schema
         made = xml_mutations(call.value, schema, root_name(schema) or "value")
-        for name, body in api.run.effort.subsample(
-            api.run.effort.draw(made, _EACH, f"{api.run.seed}/{operation.id}"), 3
-        ):
-            wrong = call.carrying(body)
-            if not judge_refusal(api, partial(wrong.send, api), _ID, name, json=False):
+        drawn = api.run.effort.draw(made, _EACH, f"{api.run.seed}/{operation.id}")
+        for item in api.run.effort.subsample(drawn, 3):
+            wrong = call.carrying(item.made)
+            if not judge_refusal(api, partial(wrong.send, api), _ID, item.what, json=False):
                 api.device.halt(api)
     api.device.halt(api)
     if not taken and "rest-formats" not in api.run.claims:
