@@ -17,6 +17,8 @@ from conformance.engine.interruption import remembered
 from conformance.engine.planning import pytest_options
 from conformance.engine.progress import Progress
 from conformance.engine.result import result_document, write_result
+from conformance.scenarios.scenario import Recordings
+from conformance.scenarios.stored import write_traces
 from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
 from conformance.verdict.verdicts import Overall, class_verdicts, overall, score, verdict_of
 
@@ -65,6 +67,7 @@ def certify(
     """
     run, started = robot.run, dt.datetime.now(dt.UTC)
     remarks = list(notes)
+    recordings = Recordings()
     try:
         with remembered(run):
             robot.connect(progress)
@@ -73,7 +76,7 @@ def certify(
                 # Of a robot that is not there, they would only hide that.
                 if progress is not None:
                     progress.writelines(f"{note}\n" for note in notes)
-                run.interrupted |= _run_checks(robot, progress, remarks)
+                run.interrupted |= _run_checks(robot, progress, remarks, recordings)
                 if not (run.interrupted or run.aborted):
                     look_again(run, robot.connection, robot.rest)
             else:
@@ -106,6 +109,7 @@ def certify(
         interrupted=run.interrupted,
     )
     path = write_result(document, out)
+    write_traces(recordings, out)
     if run.interrupted:
         return Certification(ExitCode.INTERRUPTED, document, path)
     return Certification(OF_VERDICT[overall(accepted)] if reached else ExitCode.UNREACHABLE, document, path)
@@ -124,16 +128,16 @@ def draw_verdicts(run: Run) -> list[Verdict]:
     ]
 
 
-def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str]) -> bool:
+def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str], recordings: Recordings) -> bool:
     """Run pytest over the checks, and nothing of the folder that the user happens to be in; True when interrupted."""
     teller = Progress(robot, progress)
+    plugin = ChecksPlugin(lambda: robot, lambda: robot.run.contract, recordings)
     try:
         with pytest.MonkeyPatch.context() as environment:
             environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
             environment.delenv("PYTEST_ADDOPTS", raising=False)
             folders = map(str, robot.run.contract.rules)
-            plugins = [ChecksPlugin(lambda: robot, lambda: robot.run.contract), teller]
-            code = pytest.main([*folders, *pytest_options()], plugins=plugins)
+            code = pytest.main([*folders, *pytest_options()], plugins=[plugin, teller])
     except Exception as error:  # noqa: BLE001 - whatever breaks, what was judged until then is not lost
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
         robot.run.aborted = robot.run.aborted or "the suite itself failed"

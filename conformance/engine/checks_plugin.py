@@ -14,6 +14,7 @@ from conformance.contract.classes import Level
 from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import expanded
 from conformance.scenarios.plan import Step, ordered
+from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stage import STAGES, Stage
 
 if TYPE_CHECKING:
@@ -54,11 +55,18 @@ class ChecksPlugin:
     Args:
         connect: returns the robot, connected; called once, and only when there is a check to run.
         contract: returns the pack to judge by; called when the first file with checks is collected.
+        recordings: what is recorded; None: it is not kept.
     """
 
-    def __init__(self, connect: Callable[[], RobotUnderTest], contract: Callable[[], Contract]) -> None:
+    def __init__(
+        self,
+        connect: Callable[[], RobotUnderTest],
+        contract: Callable[[], Contract],
+        recordings: Recordings | None = None,
+    ) -> None:
         self._connect, self._contract = connect, contract
         self._has_fixtures = False
+        self._recordings = Recordings() if recordings is None else recordings
         self._connected: RobotUnderTest | None = None
 
     def _robot(self) -> RobotUnderTest:
@@ -87,6 +95,7 @@ class ChecksPlugin:
         config.addinivalue_line("markers", "requirement(*ids): the requirements that a check judges")
         config.addinivalue_line("markers", "phase(name): when in a run a check's turn comes")
         config.addinivalue_line("markers", "scenario(scenario): whose trace a rule judges")
+        config.addinivalue_line("markers", "rule(rule, scenario): what judges it")
         config.addinivalue_line("markers", "motion: the check moves the robot")
         config.addinivalue_line("markers", "needs(*interfaces): rest, publishers, subscribers")
 
@@ -99,7 +108,7 @@ class ChecksPlugin:
         from conformance.api.device import fixtures_of  # noqa: PLC0415
         from conformance.scenarios.collecting import RulesPlugin  # noqa: PLC0415
 
-        parent.config.pluginmanager.register(RulesPlugin(), "roaas-rules")
+        parent.config.pluginmanager.register(RulesPlugin(self._recordings), "roaas-rules")
         for name in ("conformance.rules.fixtures", *fixtures_of(self._contract())):
             parent.config.pluginmanager.register(import_module(name), name)
 

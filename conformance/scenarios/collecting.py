@@ -15,10 +15,14 @@ if TYPE_CHECKING:
 
 
 class RulesPlugin:
-    """A pytest plugin for one run."""
+    """A pytest plugin for one run.
 
-    def __init__(self) -> None:
-        self.recordings = Recordings()
+    Args:
+        recordings: of the run; each scenario is played when its first rule needs it.
+    """
+
+    def __init__(self, recordings: Recordings) -> None:
+        self.recordings = recordings
 
     def pytest_pycollect_makeitem(
         self, collector: pytest.Module | pytest.Class, name: str, obj: object
@@ -30,7 +34,8 @@ class RulesPlugin:
 
     def _item(self, collector: pytest.Module | pytest.Class, name: str, rule: Rule, scenario: Scenario) -> pytest.Item:
         marks = [pytest.mark.requirement(rule.requirement), pytest.mark.phase(scenario.stage)]
-        marks += [pytest.mark.scenario(scenario), pytest.mark.needs(*map(str, scenario.needs - {Need.MOTION}))]
+        marks += [pytest.mark.scenario(scenario), pytest.mark.rule(rule, scenario)]
+        marks += [pytest.mark.needs(*map(str, scenario.needs - {Need.MOTION}))]
         marks += [pytest.mark.motion] if Need.MOTION in scenario.needs else []
         item: pytest.Item = pytest.Function.from_parent(
             collector, name=f"{name}[{scenario.name}]", callobj=self._check_of(rule, scenario)

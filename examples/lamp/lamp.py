@@ -2,6 +2,7 @@
 
 import json
 import logging
+import socket
 import sys
 import time
 from pathlib import Path
@@ -70,5 +71,6 @@ if __name__ == "__main__":
     app = web.Application()
     app.add_routes([web.get("/lamp", get_lamp), web.put("/lamp", put_lamp), web.get("/openapi.json", get_openapi)])
     logging.getLogger("aiohttp.server").disabled = True
-    ready = f"ready rest=http://127.0.0.1:{port}"
-    web.run_app(app, host="127.0.0.1", port=port, print=lambda _: print(ready, flush=True))
+    listening = socket.create_server(("127.0.0.1", port))
+    ready = f"ready rest=http://127.0.0.1:{listening.getsockname()[1]}"
+    web.run_app(app, sock=listening, print=lambda _: print(ready, flush=True))

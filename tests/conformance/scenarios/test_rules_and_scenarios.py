@@ -55,10 +55,7 @@ def test_what_a_scenario_raises_is_kept(error, trace, reason, kind):
 
 def test_of_a_scenario_that_broke_off_the_trace_is_judged():
     def play():
-        try:
-            raise OSError("gone")
-        except OSError as error:
-            raise PartialTraceError(7) from error
+        raise PartialTraceError(7) from OSError("gone")
 
     recording = Recordings().of(scenario(needs=set())(play), {}.__getitem__)
     assert recording.trace == 7

@@ -13,9 +13,11 @@ class Driven:
     Attributes:
         drive: all commands and readings.
         let_go: for each velocity that was left to itself, every try to see how long it holds.
+        ends_s: within so long a velocity that is not renewed has to end, s.
         not_tested: why a requirement could not be tested, by its id.
     """
 
     drive: Trace
     let_go: tuple[tuple[LetGo, ...], ...] = ()
     not_tested: tuple[tuple[str, str], ...] = ()
+    ends_s: float = 0.0

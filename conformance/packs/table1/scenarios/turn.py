@@ -74,9 +74,13 @@ class _Turning:
     not_tested: list[tuple[str, str]] = field(default_factory=list)
 
     @property
+    def _ends_s(self) -> float:
+        return ends_by(self.robot.limits, self.robot.settle_s)
+
+    @property
     def recorded(self) -> Driven:
         """What was recorded so far."""
-        return Driven(self.drive.whole, tuple(self.tries), tuple(self.not_tested))
+        return Driven(self.drive.whole, tuple(self.tries), tuple(self.not_tested), self._ends_s)
 
     def play(self) -> None:
         """Turn left by whole numbers, as fast as the robot can, renewed, along an arc, and straight on."""
@@ -159,7 +163,7 @@ class _Turning:
             drive.command_linear(turning)
         answered = drive.trace.answered
         first, resumed = len(drive.trace.turns), None
-        ends = answered + ends_by(limits, robot.settle_s)
+        ends = answered + self._ends_s
         silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
         while True:
             drive.look()

@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
-from conformance.packs.table1.robot.letting_go import ends_by
-from conformance.packs.table1.robot.robot import Robot
+from conformance.packs.table1.robot.goal_trace import GoalLife, GoalReached
+from conformance.packs.table1.scenarios.goal_life import goal_life
+from conformance.packs.table1.scenarios.goal_reached import goal_reached
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.scenarios.turn import turn
@@ -90,14 +91,28 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 
 @rule("safety/watchdog", on=(turn,))
-def watchdog(trace: Driven, robot: Robot) -> Iterator[Outcome]:
+def watchdog(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the robot comes to rest when a velocity is not renewed."""
     for tries in trace.let_go:
         last = tries[-1]
         yield Case(
-            last.rests(robot.limits),
+            last.rests(said_of(run).limits),
             last.turns[-1].velocity_exchange,
-            f"rest within {ends_by(robot.limits, robot.settle_s):.1f} s of a command that is not renewed",
+            f"rest within {trace.ends_s:.1f} s of a command that is not renewed",
             str(last.turns[-1].velocity or ""),
             "goes on",
         )
+
+
+@rule("safety/cancel", on=(goal_life,))
+def cancel(trace: GoalLife, run: Run) -> Iterator[Outcome]:
+    """Judge that the robot stands still when its goal was cancelled."""
+    for one in trace.cancelled:
+        yield from outcomes("safety/cancel", one.drive, said_of(run).limits)
+
+
+@rule("safety/watchdog", on=(goal_reached,))
+def not_taken_up(trace: GoalReached, run: Run) -> Iterator[Outcome]:
+    """Judge that a velocity from before a goal is not taken up again when the goal is reached."""
+    if trace.turned is not None:
+        yield from outcomes("safety/watchdog", trace.turned, said_of(run).limits)
