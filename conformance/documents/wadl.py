@@ -1,17 +1,13 @@
 """A WADL (W3C member submission of 2009) as the operations that it describes."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
+
+from lxml import etree
 
 from conformance.documents.openapi import Operation, Parameter
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
 from conformance.documents.xml import elements
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 WADL = "http://wadl.dev.java.net/2009/02"
 # A parameter may come with a regular expression: {code: [0-9]{1,3}}.

@@ -4,16 +4,15 @@ Its own checks take 5xx for a refusal, and call data negative that is valid once
 is read back from the wire (validity.py) and judged by that.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlsplit
 
 import requests
 import schemathesis
+from hypothesis.strategies import SearchStrategy
 from schemathesis import GenerationMode
 from schemathesis.core.result import Ok
 from schemathesis.core.transport import Response as ThesisResponse
@@ -21,45 +20,11 @@ from schemathesis.generation.drivers import CoverageGenerator, ExamplesGenerator
 from schemathesis.generation.feedback import NO_FEEDBACK
 from schemathesis.generation.overrides import Override
 
-from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange
 
-if TYPE_CHECKING:
-    from hypothesis.strategies import SearchStrategy
-
 _BASE = "http://robot.invalid"
-
-
-@dataclass(frozen=True)
-class GeneratedRequest:
-    """One request that Schemathesis made.
-
-    Attributes:
-        method: as to be sent.
-        target: path and query below the base URL.
-        content_type: whole field; empty where there is none.
-        body: octets.
-    """
-
-    method: str
-    target: str
-    content_type: str
-    body: bytes
-
-    @property
-    def media_type(self) -> str:
-        """Content-Type without parameters."""
-        return self.content_type.split(";", 1)[0].strip().lower()
-
-    def send(self, api: RestInterface) -> Exchange:
-        """Send it through the run's client.
-
-        Raises:
-            NoAnswerError: no HTTP response came.
-        """
-        fields = [("Content-Type", self.content_type)] if self.content_type else []
-        return api.client.send(self.method, self.target, headers=fields, body=self.body)
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,17 @@
 """Random requests made harmless: what a robot accepts of them stays slow, near and seldom."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.calls import JSON, example_call
+from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import INVALID, VALID, Validity, validity
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.writing import json_text
-
-if TYPE_CHECKING:
-    # Schemathesis takes a quarter of a second to import, and quick effort does without it.
-    from conformance.api.rest.generated import GeneratedRequest
 
 # How many valid requests of one moving operation are sent: each may start a mission.
 _ACCEPTED = 3

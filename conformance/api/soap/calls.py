@@ -1,9 +1,9 @@
 """Calling a service, and what its response comes to: accepted, refused, or neither."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from lxml import etree
 
 from conformance.api.expectation import Expectation
 from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, envelope, read
@@ -11,9 +11,6 @@ from conformance.api.soap.service import SoapService
 from conformance.documents.xml_node import Node
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 _SHOWN = 200
 

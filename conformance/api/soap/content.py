@@ -3,20 +3,17 @@
 The wrapper's child has a name in the contract (``return``), but what it holds is the content, whatever it is called.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from lxml import etree
 
 from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import local
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS
 from conformance.documents.xsd_shapes import Element, Simple
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 # XML Schema 1.0 Part 2, 3.2.5.1 without INF and NaN: those never leave a robot (contract, REST).
 _FLOAT: Final = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")

@@ -1,17 +1,14 @@
 """SOAP 1.1 envelopes: made from body and header elements, and read from a robot's answers as frozen values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from lxml import etree
 
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
 from conformance.documents.xml_names import ENVELOPE, clark, local
 from conformance.documents.xml_node import Node
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 # A message that asks for nothing: whatever answers it handles SOAP, and does nothing.
 EMPTY: Final = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'

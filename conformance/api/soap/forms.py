@@ -1,18 +1,14 @@
 """Strategies for the valid forms of simple types, over the whole range of each."""
 
-from __future__ import annotations
-
 import string
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
 
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS, STRINGS, bounds, plain
 from conformance.documents.xsd_shapes import Simple
-
-if TYPE_CHECKING:
-    from hypothesis.strategies import SearchStrategy
 
 # XML Schema 1.0 Part 2, 4.3.6: white space around a value is collapsed before it is read.
 _SPACES: Final = ("", " ", "\n\t ", "  ")

@@ -1,21 +1,16 @@
 """Messages made from a schema: an ordinary one, and strategies for all valid ones."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
 
 from conformance.api.soap import forms
 from conformance.documents import xsd_lexical as lexical
 from conformance.documents.xml_names import local
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
-
-if TYPE_CHECKING:
-    from hypothesis.strategies import SearchStrategy
 
 
 def padded(document: bytes, octets: int) -> bytes:

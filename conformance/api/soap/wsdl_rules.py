@@ -1,18 +1,15 @@
 """Rules of the Basic Profile 1.1 for descriptions, each a function that tells what breaks it, under its id."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from lxml import etree
 
 from conformance.documents.wsdl import Description, name, qname
 from conformance.documents.xml import elements
 from conformance.documents.xml_names import WSDL, WSDL_SOAP, XSD, clark, local, namespace
 from conformance.documents.xsd import SchemaError
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 _HTTP: Final = "http://schemas.xmlsoap.org/soap/http"
 _ENCODINGS: Final = frozenset({"UTF-8", "UTF-16", "UTF-16LE", "UTF-16BE", "US-ASCII", "ASCII"})

@@ -1,18 +1,14 @@
 """One message in many styles: what XML and its namespaces let a writer choose, and a reader must not care about."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 from xml.sax.saxutils import escape
 
 from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
 
 from conformance.documents.xml_names import ENVELOPE, XSI, clark, local, namespace
 from conformance.documents.xml_node import Node
-
-if TYPE_CHECKING:
-    from hypothesis.strategies import SearchStrategy
 
 DECLARATIONS: Final = (
     "",

@@ -12,6 +12,7 @@ from hypothesis.errors import Unsatisfiable
 
 from conformance.api.expectation import expect
 from conformance.api.rest.applicable import allowed
+from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
 from conformance.api.rest.refusals import judge_refusal
@@ -22,7 +23,7 @@ from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
 if TYPE_CHECKING:
-    from conformance.api.rest.generated import GeneratedRequest, Target
+    from conformance.api.rest.generated import Target
 
 pytestmark = pytest.mark.needs("rest")
 _IDS = ("http/declared-status", "http/declared-body", "http/no-server-error")
@@ -55,7 +56,7 @@ _POSITIVE_REFUSALS = frozenset({405, 406, 408, 411, 413, 414, 415, 431})
 def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
     if api.run.effort.name == "quick":
         return []  # importing Schemathesis and reading the contract takes a tenth of the time that a quick run has
-    from conformance.api.rest.generated import targets  # noqa: PLC0415 - half a second that an unclaimed class need not pay
+    from conformance.api.rest.generated import targets  # noqa: PLC0415 - takes half a second
 
     labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allowed(api, item)}
     return [target for target in targets(api.run.contract) if target.label in labels]

@@ -9,7 +9,8 @@ from conformance.api.rest.applicable import answered, applicable_operations, rea
 from conformance.api.rest.calls import example_call
 from conformance.api.rest.effects import reader_of, settles_at
 from conformance.api.rest.formats import disagreements
-from conformance.api.rest.generated import GeneratedRequest, targets
+from conformance.api.rest.generated import targets
+from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
 from conformance.api.rest.snapshot import changed, changes_by_itself, flatten, steady, take_snapshots
