@@ -45,7 +45,7 @@ def collect(wsdl: bytes, location: str, fetch: Fetch) -> Collected:
     except NotXmlError as error:
         raise ValueError(str(error)) from error
     if root.tag != clark(WSDL, "definitions"):
-        raise ValueError(f"its document element is {root.tag}, not wsdl:definitions")
+        raise ValueError(f"the root element {root.tag} instead of wsdl:definitions")
     found = Collected()
     waiting: list[tuple[str, etree._Element]] = [(location, root)]
     seen = {location}

@@ -1,6 +1,6 @@
-"""Requests that are written by hand and are valid all the same: read back from their octets before they are sent.
+"""Valid requests over a plain socket: each is read back from its octets before it is sent.
 
-h11 stands for the robot's server: what it does not take as one request or several, no robot is sent as valid.
+h11 stands for the robot's server: octets that it does not read as valid requests are never sent as such.
 """
 
 from collections.abc import Iterator
@@ -40,13 +40,13 @@ def ask_octets(api: RestInterface, octets: bytes, method: str = "GET", **how: An
 
 
 def talk(api: RestInterface, octets: bytes, *, answers: int = 0, refused: bool = False, **how: Any) -> raw.RawAnswer:
-    """Send octets that hold valid requests, and read what comes; see raw.talk().
+    """Send octets that hold valid requests, and return what comes; as raw.talk().
 
     Args:
         api: the robot's REST interface.
         octets: what to send.
-        answers: stop when so many whole answers to GET have come.
-        refused: whether what they ask for may break the contract; the octets hold whole requests all the same.
+        answers: stop after so many complete responses to GET.
+        refused: whether the requests may break the contract; they are complete all the same.
         how: deadline and pauses, as raw.talk() has them.
 
     Raises:
@@ -67,7 +67,7 @@ def talk(api: RestInterface, octets: bytes, *, answers: int = 0, refused: bool =
 
 
 def _requests(octets: bytes) -> Iterator[tuple[h11.Request, bytes]]:
-    """Each request in some octets, with its content.
+    """Yield each request in some octets, with its content.
 
     Raises:
         HarnessError: they are no requests, or not whole.
@@ -84,7 +84,7 @@ def _requests(octets: bytes) -> Iterator[tuple[h11.Request, bytes]]:
                 elif isinstance(event, h11.Data):
                     body += event.data
                 else:
-                    raise HarnessError(f"{octets[:80]!r} was made as a whole request, and is none")
+                    raise HarnessError(f"{octets[:80]!r} was made as a complete request, and is none")
         except h11.RemoteProtocolError as error:
             raise HarnessError(f"{octets[:80]!r} was made as a valid request, and is none: {error}") from error
         if request is None:

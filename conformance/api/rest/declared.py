@@ -89,7 +89,8 @@ def _judge_shape(
     else:
         return
     try:
-        fault = shape_of(schema).problem(read(media_type, answer.body, schema))
+        problem = shape_of(schema).problem(read(media_type, answer.body, schema))
+        fault = f"a body in which {problem}" if problem else ""
     except UnreadableError as error:
         fault = str(error)
     expect(api.run.judge, id_, exchange).that(

@@ -31,7 +31,7 @@ class MotionGuard:
         self._valid: Counter[str] = Counter()
 
     def admit(self, item: GeneratedRequest) -> GeneratedRequest | None:
-        """The request as it may be sent; None where it may not."""
+        """Return the request as it may be sent; None where it may not."""
         said = self._validity(item)
         operation = said.operation
         if operation is None:
@@ -57,11 +57,11 @@ class MotionGuard:
         return validity(self._api.run.contract, item.method, item.target, item.media_type, item.body)
 
     def _may_reach(self, item: GeneratedRequest) -> bool:
-        """Whether a request for no operation of the contract may be sent: a method that a resource has not."""
+        """Return whether a request for no operation of the contract may be sent: a method that a resource lacks."""
         return self._api.run.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
 
     def _fitted(self, item: GeneratedRequest, operation: Operation) -> GeneratedRequest | None:
-        """A valid request of a moving operation with the contract's values, fit for this robot; a few of them."""
+        """Return a valid request of a moving operation with values that fit this robot; None after a few."""
         if self._valid[operation.id] >= _ACCEPTED:
             return None
         if not self._api.device.is_known:

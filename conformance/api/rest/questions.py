@@ -113,10 +113,11 @@ def _shape_of(call: Call, media_type: str, names: frozenset[str]) -> Callable[[R
             problem = shape_of(schema).problem(read(media_type, answer.body, schema))
         except UnreadableError as error:
             return str(error)
+        if problem:
+            return f"a body in which {problem}"
         found = _names_in(answer)
-        return problem or (
-            "" if not (names and found) or names & found == names else f"an object without {min(names - found)}"
-        )
+        is_other = bool(names and found and names - found)
+        return f"an object without {min(names - found)}" if is_other else ""
 
     return mismatch
 

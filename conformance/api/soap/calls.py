@@ -70,7 +70,7 @@ class SoapResponse:
         return None if self.first is None else str(self.first.tag)
 
     def describe(self) -> str:
-        """What came, in words for a finding."""
+        """Return the response in words for a finding."""
         came = f"status {self.status}"
         if self.fault is not None:
             return f"{came}, fault {self.fault.code or '(no code)'}: {self.fault.string[:_SHOWN]!r}"
@@ -80,7 +80,7 @@ class SoapResponse:
 
 
 def read_exchange(exchange: Exchange) -> SoapResponse:
-    """What an exchange comes to."""
+    """Return the SOAP message in an exchange, or why there is none."""
     if not exchange.response.body:
         return SoapResponse(exchange, None, "an empty body")
     try:

@@ -87,13 +87,13 @@ def read_root(root: etree._Element) -> Envelope:
         NotSoapError: it is no SOAP 1.1 envelope with a Body.
     """
     if root.tag != clark(ENVELOPE, "Envelope"):
-        raise NotSoapError(f"the document element is {root.tag}, not SOAP 1.1's Envelope")
+        raise NotSoapError(f"the root element {root.tag} instead of SOAP 1.1's Envelope")
     parts = elements(root)
     headers: list[etree._Element] = []
     if parts and parts[0].tag == clark(ENVELOPE, "Header"):
         headers = elements(parts.pop(0))
     if not parts or parts[0].tag != clark(ENVELOPE, "Body"):
-        raise NotSoapError(f"the Envelope has {parts[0].tag if parts else 'nothing'} where its Body should be")
+        raise NotSoapError(f"an Envelope with {parts[0].tag if parts else 'nothing'} in place of its Body")
     payload = tuple(elements(parts[0]))
     fault = _fault(payload[0]) if payload and payload[0].tag == clark(ENVELOPE, "Fault") else None
     return Envelope(root, tuple(headers), parts[0], payload, fault)

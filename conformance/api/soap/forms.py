@@ -38,7 +38,7 @@ _CHARACTERS: Final = string.ascii_letters + string.digits + " _-./<>&'\"\u00e4\u
 
 
 def values(simple: Simple) -> SearchStrategy[str]:
-    """Valid forms of valid, finite values.
+    """Return a strategy for valid forms of valid, finite values.
 
     Where a facet's regular expression limits them there is one value only: what an expression means to two validators
     and a robot is no good ground for blame.
@@ -87,14 +87,14 @@ def _padded(numbers: SearchStrategy[Any], write: Callable[[Any, int], str]) -> S
 
 
 def written_integer(value: int, form: int) -> str:
-    """An integer in one of four forms: plain, signed, with leading zeros, with both (3.3.13.1)."""
+    """Return an integer in one of four forms: plain, signed, with leading zeros, with both (3.3.13.1)."""
     sign, digits = ("-" if value < 0 else ""), str(abs(value))
     plus = sign or "+"
     return (f"{sign}{digits}", f"{plus}{digits}", f"{sign}000{digits}", f"{plus}0{digits}")[form % 4]
 
 
 def written_float(value: float, form: int) -> str:
-    """A float in one of eight forms, each of exactly its value (3.2.5.1)."""
+    """Return a float in one of eight forms, each of exactly its value (3.2.5.1)."""
     written = repr(value)
     sign, size = ("-", written[1:]) if written.startswith("-") else ("", written)
     power = "e" in size

@@ -60,7 +60,7 @@ def test_openapi_has_the_operations(api: RestInterface, rest: HttpClient, judge:
 
 @pytest.mark.requirement(_BEHAVIOUR)
 def test_what_is_described_is_there(api: RestInterface, rest: HttpClient) -> None:
-    """Send a request for each operation of the description and of the contract: it is not answered 404 or 405."""
+    """Send a request for each operation of the description and of the contract: it does not get 404 or 405."""
     for operation in operations_of(api.run.contract):
         if not operation.optional:
             judge_there(api, _BEHAVIOUR, example_call(api, operation))

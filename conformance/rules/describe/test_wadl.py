@@ -67,7 +67,7 @@ def test_wadl_has_the_resources(api: RestInterface, rest: HttpClient, judge: Jud
 
 @pytest.mark.requirement(_BEHAVIOUR)
 def test_what_is_described_is_there(api: RestInterface, rest: HttpClient) -> None:
-    """Send a request for each operation of the WADL: it is not answered 404 or 405."""
+    """Send a request for each operation of the WADL: it does not get 404 or 405."""
     if _without(api):
         return
     known = {Described(item, item.template).address: item for item in operations_of(api.run.contract)}

@@ -66,14 +66,14 @@ def _served(service: SoapService) -> _Served:
     if answer.status != 200:
         return _Served(exchange, None, exchange.came)
     if "xml" not in answer.media_type:
-        return _Served(exchange, None, f"{exchange.came}, which is not XML")
+        return _Served(exchange, None, f"{exchange.came} instead of XML")
     try:
         description = describe(answer.body, source, service.fetch)
     except DescriptionError as error:
         return _Served(exchange, None, str(error))
     missing = [(place, why) for place, why in description.missing if urlsplit(place).netloc == urlsplit(source).netloc]
     # A document of another host (a public schema) matters only where something that is used comes from it.
-    problem = next((f"it refers to {place}: {why}" for place, why in missing), "") or next(faults(description), "")
+    problem = next((f"a reference to {place}: {why}" for place, why in missing), "") or next(faults(description), "")
     return _Served(exchange, description, problem)
 
 

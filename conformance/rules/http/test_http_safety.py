@@ -41,7 +41,7 @@ def test_reading_changes_nothing_after_input(api: RestInterface, judge: Judge) -
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/safe")
 def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
-    """PUT something (a goal), and look whether it is still there after HEAD and OPTIONS of everything.
+    """Send PUT for something (a goal), and look whether it is still there after HEAD and OPTIONS of everything.
 
     What does not last twice as long by itself is not judged: a goal ends when it is reached.
     """
@@ -67,7 +67,7 @@ def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
 def _put_and_watch(
     api: RestInterface, call: Call, reader: Call, asked: list[Call], seconds: float
 ) -> tuple[bool, Exchange, float]:
-    """PUT, send HEAD and OPTIONS to some resources, and watch whether what was put stays there for so long.
+    """Send PUT, then HEAD and OPTIONS to some resources, and watch whether what was put stays there for so long.
 
     Returns:
         Whether it does, the last reading, and how long all of it took, s.

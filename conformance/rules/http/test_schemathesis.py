@@ -147,7 +147,7 @@ def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge
             return as_thesis(exchange)
 
         def validate_response(self, *_: Any, **__: Any) -> None:
-            """The observers have judged it."""
+            """Do nothing: the observers have judged the response."""
 
     api.device.halt(api)
     explore.machine(Walk, cases=4, steps=5)

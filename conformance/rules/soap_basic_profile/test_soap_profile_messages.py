@@ -52,7 +52,7 @@ def test_answers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 
 
 def _untyped(judge: Judge, service: SoapService) -> None:
-    """Where an operation takes no message, try one with xsi:type: an operation that takes only that fails."""
+    """Judge operations that take no message by one with xsi:type: an operation that takes only that fails."""
     for operation in service.contract.operations:
         declared = service.contract.shape(operation.request) if operation.request else None
         if declared is None or example(service, operation) is not None:

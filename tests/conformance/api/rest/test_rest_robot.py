@@ -61,7 +61,7 @@ def test_reads_and_what_is_answered(api, library):
 def test_what_was_put_is_got(api, library):
     call = example_call(api, _operation(api, "putBook"))
     assert reader_of(api, call).path == call.path
-    assert settles_at(api, call).startswith("title is 'Emma'")
+    assert settles_at(api, call).startswith("'Emma' as title instead of ")
     call.send(api)
     assert settles_at(api, call) == ""
     library.books.clear()
