@@ -19,7 +19,7 @@ class Expectation:
         judge: takes the evidence.
         requirement: id of the requirement.
         attempt: the request with its response, or why there is none; None where no request was sent.
-        got: describes the response; empty: its status and media type.
+        got: describes the response; empty: its status and media type, which a finding says anyway.
     """
 
     judge: Judge
@@ -40,7 +40,7 @@ class Expectation:
         Args:
             holds: whether the response meets the requirement.
             expected: what the requirement asks for, as a noun phrase.
-            got: what came instead, as a noun phrase; empty: the response as it is described anyway.
+            got: what a look at the response showed, as a noun phrase; empty: status and media type show it.
             cause: failures of the same cause are one finding; empty: the texts without their numbers.
         """
         return self.judge.check(self.requirement, holds, self.attempt, expected, found=got or self.got, cause=cause)
@@ -78,7 +78,7 @@ class Expectation:
     def header(self, name: str) -> bool:
         """Judge that the response has a header field."""
         there = isinstance(self.attempt, Exchange) and self.attempt.response.header(name) is not None
-        return self.that(there, f"a {name} header field", f"{self.attempt.came if self.attempt else ''} without it")
+        return self.that(there, f"a {name} header field", f"no {name} header field")
 
 
 def expect(judge: Judge, requirement: str, attempt: Attempt | None) -> Expectation:

@@ -13,6 +13,8 @@ from conformance.api.rest.observers import Observer
 from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
 from conformance.transport.client import Connection
+from conformance.transport.exchange import Listener
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 # What is imported late because few commands need it, and is needed later in a run.
@@ -24,12 +26,14 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
     """Have every exchange judged from the first check on. Here, and nowhere else, observers are registered."""
     services = interfaces.soap.there.values()
     api = interfaces.rest
+    observers: list[Listener] = []
     if api is not None:
-        connection.listeners.append(Observer(api, [service.endpoint for service in services]))
+        observers.append(Observer(api, [service.endpoint for service in services]))
         connection.listeners.extend(api.device.observers(api))
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(service) for service in services}
-        connection.listeners.append(SoapObserver(run.judge, answers))
+        observers.append(SoapObserver(run.judge, answers))
+    connection.listeners.append(Observers(run.judge, observers))
 
 
 @pytest.fixture

@@ -253,7 +253,7 @@ def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) ->
     request = shown(client, octets)
     if not came.octets:
         if came.closed:
-            return Unanswered(request, "connection closed without a response", NoAnswer.CLOSED), b""
+            return Unanswered(request, "the server closed the connection without a response", NoAnswer.CLOSED), b""
         return Unanswered(request, "no response within the deadline", NoAnswer.TIMEOUT), b""
     try:
         response, rest = parse(came.octets, method, closed=came.closed, elapsed_ms=came.elapsed_ms)

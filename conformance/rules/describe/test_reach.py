@@ -51,4 +51,4 @@ def _look(interfaces: Interfaces, name: Interface) -> tuple[str, Attempt | None]
         return f"{name}: {none}", none.unanswered
     # Any response from something that handles POST will do: a fault, a 4xx for the empty Body, even a server error.
     status = exchange.response.status
-    return (f"{name}: status {status} for POST" if status in {404, 405, 501} else ""), exchange
+    return (f"status {status} for POST at the {name} interface" if status in {404, 405, 501} else ""), exchange

@@ -185,7 +185,9 @@ def test_delete_twice(api: RestInterface, judge: Judge) -> None:
             # A robot with a mission waiting may have begun it in between: that is no effect of the DELETE.
             if before == after or attempt == 2:
                 expected = f"status {before} for GET after the second DELETE, as after the first"
-                expect(judge, "http/delete-idempotent", exchange).that(before == after, expected, f"status {after}")
+                expect(judge, "http/delete-idempotent", exchange).that(
+                    before == after, expected, f"status {after} for GET"
+                )
                 break
 
 

@@ -54,7 +54,7 @@ def test_a_robot_that_hangs_costs_its_deadline(listening):
     started = time.monotonic()
     service = opened(f"{base}/robot_ws?wsdl", timeout_s=0.3)
     assert time.monotonic() - started < 2
-    assert "no answer within" in service.own_problem
+    assert "no response within" in service.own_problem
     assert service.endpoint == f"{base}/robot_ws"
 
 
