@@ -38,10 +38,10 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
 
 @pytest.fixture
 def _prepared(interfaces: Interfaces) -> Iterator[None]:
-    """For a check that mostly waits for the robot: meanwhile is imported and compiled what later ones need."""
+    """Import and compile what later checks need, while this one mostly waits for the robot."""
     services = tuple(interfaces.soap.there.values())
     for service in services:
-        _ = service.own  # for which the robot may have to be asked: here, and not at any moment of the drive
+        _ = service.own  # may send requests: here, and not at any moment of a drive
     thread = threading.Thread(target=_prepare, args=(services,), name="preparing")
     thread.start()
     yield
@@ -49,7 +49,7 @@ def _prepared(interfaces: Interfaces) -> Iterator[None]:
 
 
 def _prepare(services: Iterable[SoapService]) -> None:
-    # What does not work here does not where it is needed, and is told there.
+    # What fails here fails again in the check that needs it, and is judged there.
     with suppress(Exception):
         for service in services:
             _ = service.described.types, service.contract.types
