@@ -31,10 +31,7 @@ def test_the_contract_describes_itself():
             lambda paths: paths["/robot/navigation/service/plan"]["get"]["parameters"][0].pop("required"),
             "with the parameter x as optional",
         ),
-        (
-            lambda paths: paths.update({"/robot/sensors": paths.pop("/robot/sensors/")}),
-            "no GET /robot/sensors/",
-        ),
+        (lambda paths: paths.update({"/robot/sensors": paths.pop("/robot/sensors/")}), "no GET /robot/sensors/"),
     ],
 )
 def test_what_is_missing_is_named(change, expected):
