@@ -25,7 +25,7 @@ _STANDARD = 10
 @pytest.mark.requirement(_PRECONDITIONS)
 def test_what_a_cache_asks(api: RestInterface, judge: Judge) -> None:
     """Send conditions of a client that has nothing current: it must get the whole resource, and not 304."""
-    for call in api.run.effort.draw(answered(api), _STANDARD, f"{api.run.seed}/preconditions"):
+    for call in api.run.effort.draw(answered(api, _PRECONDITIONS), _STANDARD, f"{api.run.seed}/preconditions"):
         exchange = call.send(api, ("If-None-Match", _NO_TAG))
         expected = "another status than 304 when the robot never sent the entity tag"
         expect(judge, _PRECONDITIONS, exchange).that(exchange.response.status != _NOT_MODIFIED, expected)
@@ -39,7 +39,7 @@ def test_what_a_cache_asks(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement(_RANGE)
 def test_a_part(api: RestInterface, judge: Judge) -> None:
     """Request a part of each resource: the response is the whole, or says which part it is."""
-    for call in api.run.effort.draw(answered(api), _STANDARD, f"{api.run.seed}/range")[:_STANDARD]:
+    for call in api.run.effort.draw(answered(api, _RANGE), _STANDARD, f"{api.run.seed}/range")[:_STANDARD]:
         exchange = call.send(api, ("Range", "bytes=0-3"))
         answer = exchange.response
         # A server may send less than was asked for, or more, and then says so (RFC 9110 15.3.7).

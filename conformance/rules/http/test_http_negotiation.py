@@ -16,7 +16,7 @@ _NOTHING = ("image/png", "application/vnd.roaas-nobody-has-this", "audio/*;q=0.5
 @pytest.mark.requirement("http/not-acceptable")
 def test_no_acceptable_format(api: RestInterface, judge: Judge) -> None:
     """Accept only formats that the robot does not have."""
-    cases = [(call, accept) for call in answered(api) for accept in _NOTHING]
+    cases = [(call, accept) for call in answered(api, "http/not-acceptable") for accept in _NOTHING]
     for call, accept in api.run.effort.draw(cases, 120, f"{api.run.seed}/not acceptable"):
         exchange = call.send(api, ("Accept", accept))
         expect(judge, "http/not-acceptable", exchange).status(406, when=f"Accept is {accept}")
@@ -25,7 +25,7 @@ def test_no_acceptable_format(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement("http/q-zero")
 def test_quality_zero(api: RestInterface, judge: Judge) -> None:
     """Rule formats out with q=0: the robot sends another format, or 406."""
-    for call in api.run.effort.subsample(answered(api), 2):
+    for call in api.run.effort.subsample(answered(api, "http/q-zero"), 2):
         first = call.operation.formats[0] if call.operation.formats else "application/json"
         others = [name for name in call.operation.formats if name != first]
         refused = [f"{first};q=0", f"{first};q=0.000, */*", f"{first} ; q=0"]

@@ -78,7 +78,7 @@ def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement("http/octet-stream")
 def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send requests in several TCP segments."""
-    for call in answered(api)[:2]:
+    for call in answered(api, "http/octet-stream")[:2]:
         fields = ("Accept: application/json", "User-Agent: " + "roaas " * 4)
         wanted = _kind(_asked(api, call.path, *fields))
         length = len(raw.head(rest, "GET", call.path, *fields))
@@ -95,7 +95,7 @@ def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) 
 def test_the_end_of_a_connection(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Ask for the end of the connection, and ask as a client of HTTP/1.0, which knows no chunks."""
     judge.at_risk = ("http/close",)
-    for call in answered(api)[:1]:
+    for call in answered(api, "http/close", "http/old-client")[:1]:
         octets = raw.head(rest, "GET", call.path, "Connection: close")
         came = by_hand.talk(api, octets, timeout_s=_ENDS_S + 4 * api.run.effort.usual_ms / 1000)
         attempt, _ = raw.read_one(rest, octets, came, "GET")

@@ -48,7 +48,7 @@ _MATRIX = (
 @pytest.mark.requirement(_DEFAULT)
 def test_default_format(api: RestInterface, judge: Judge) -> None:
     """Send no Accept, and */*: JSON comes."""
-    for call in api.run.effort.subsample(answered(api), 3):
+    for call in api.run.effort.subsample(answered(api, _DEFAULT), 3):
         if "application/json" not in call.operation.formats:
             continue
         for accept in ("", "*/*", "*/*;q=0.5"):

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from conformance.api.soap.callable_services import SoapServices, callable_services, repetitions
+from conformance.api.soap.callable_services import SoapServices, accepted_messages, callable_services, repetitions
 from conformance.api.soap.calls import call, expect_answer, send
 from conformance.api.soap.envelope import envelope
-from conformance.api.soap.service import SoapService
-from conformance.api.soap.valid_messages import example, quiet_example
+from conformance.api.soap.valid_messages import quiet_example
 from conformance.documents.xml_names import ENVELOPE, NEXT_ACTOR, clark
 from conformance.documents.xml_node import Node
 from conformance.verdict.effort import Effort
@@ -28,17 +27,11 @@ def _block(flag: str | None = None, actor: str | None = None, space: str = ENVEL
     return Node(clark(_STRANGE, "Transaction"), "5", (), attributes)
 
 
-def _messages(service: SoapService) -> list[Node]:
-    """Return a message that the robot takes for each operation."""
-    found = [example(service, operation) for operation in service.contract.operations]
-    return [message for message in found if message is not None]
-
-
 @pytest.mark.requirement("soap-basic-profile/R1015", "soap-basic-profile/version-mismatch")
 def test_other_versions(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Send an Envelope of another namespace."""
     for service in callable_services(soap, "soap-basic-profile/R1015", "soap-basic-profile/version-mismatch"):
-        messages = _messages(service)[: effort.cases(10)] or [_UNKNOWN]
+        messages = [message for _, message in accepted_messages(soap, service)][: effort.cases(10)] or [_UNKNOWN]
         for message in messages:
             answer = send(service, envelope([message], space=_OTHER_VERSION))
             when = "the Envelope has another namespace"
@@ -58,7 +51,8 @@ def test_must_understand(soap: SoapServices, judge: Judge, effort: Effort) -> No
     """Send mandatory header blocks that no robot understands."""
     ids = ("soap-basic-profile/R1025", "soap-basic-profile/R1027", "soap-basic-profile/R1028")
     for service in callable_services(soap, *ids):
-        for message in _messages(service)[: effort.cases(10)] or [_UNKNOWN]:
+        messages = [message for _, message in accepted_messages(soap, service)]
+        for message in messages[: effort.cases(10)] or [_UNKNOWN]:
             for what, headers in (
                 ("a mandatory block", (_block("1"),)),
                 ("a mandatory block for the next actor", (_block("1", NEXT_ACTOR),)),
@@ -75,8 +69,9 @@ def test_must_understand(soap: SoapServices, judge: Judge, effort: Effort) -> No
 @pytest.mark.requirement("soap-basic-profile/mustunderstand-actor", "soap-basic-profile/R2739")
 def test_other_headers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Send mandatory blocks for another actor, and optional ones that the description does not have."""
-    for service in callable_services(soap, "soap-basic-profile/mustunderstand-actor", "soap-basic-profile/R2739"):
-        for message in _messages(service)[: effort.cases(10)]:
+    ids = ("soap-basic-profile/mustunderstand-actor", "soap-basic-profile/R2739")
+    for service in callable_services(soap, *ids):
+        for _, message in accepted_messages(soap, service, *ids)[: effort.cases(10)]:
             for id_, what, headers in (
                 ("mustunderstand-actor", "a mandatory block for another actor", (_block("1", "http://example.com/a"),)),
                 ("R2739", "a block that the description does not have", (_block(),)),

@@ -4,14 +4,13 @@ import codecs
 
 import pytest
 
-from conformance.api.soap.callable_services import SoapServices, callable_services
+from conformance.api.soap.callable_services import SoapServices, accepted_messages, callable_services
 from conformance.api.soap.calls import call, expect_answer, send
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.mutations import invalid_ones, mutations
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import candidates, example, require_valid_document, typed
 from conformance.api.soap.xml_style import XmlStyle, serialize
-from conformance.documents.wsdl import Operation
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.verdict.effort import Effort
@@ -27,20 +26,13 @@ _REPEATED = (
 )
 
 
-def _examples(service: SoapService) -> list[tuple[Operation, Node]]:
-    """Return each operation with a message that the robot takes."""
-    found = [(operation, example(service, operation)) for operation in service.contract.operations]
-    return [(operation, message) for operation, message in found if message is not None]
-
-
 @pytest.mark.requirement(*_REPEATED)
 def test_answers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Send valid messages without xsi:type: the response is 200 with the element that the description declares."""
     for service in callable_services(soap, *_REPEATED):
-        good = _examples(service)
-        if not good:
-            for id_ in _REPEATED:
-                judge.skip(id_, f"the robot took none of the messages tried at its {service.name} service")
+        good = accepted_messages(soap, service)
+        for id_ in _REPEATED if not good else ():
+            judge.skip(id_, f"the {service.name} service accepted none of the messages tried")
         _untyped(judge, service)
         for operation, message in good:
             for _ in range(effort.cases(15)):
@@ -69,8 +61,7 @@ def test_dispatch(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Send messages with the SOAPAction of other operations: the Body's element chooses the operation."""
     ids = ("soap-basic-profile/R1127", "xml-security/soapaction-spoofing")
     for service in callable_services(soap, *ids):
-        good = _examples(service)
-        for operation, message in good:
+        for operation, message in accepted_messages(soap, service, *ids):
             others = [other for other in service.contract.operations if other.name != operation.name]
             spoofed = [f'"{other.input_action}"' for other in others if other.input_action]
             spoofed += [f'"{other.name}"' for other in others] + ['"urn:example:strange"']
@@ -103,8 +94,9 @@ def test_unknown_operation(soap: SoapServices, judge: Judge, effort: Effort) -> 
 @pytest.mark.requirement("soap-basic-profile/R4001", "soap-basic-profile/utf-16")
 def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Send a byte order mark, and UTF-16."""
-    for service in callable_services(soap, "soap-basic-profile/R4001", "soap-basic-profile/utf-16"):
-        for operation, message in _examples(service)[: effort.cases(6)]:
+    ids = ("soap-basic-profile/R4001", "soap-basic-profile/utf-16")
+    for service in callable_services(soap, *ids):
+        for operation, message in accepted_messages(soap, service, *ids)[: effort.cases(6)]:
             plain = serialize(envelope([message]), XmlStyle())
             declared = '<?xml version="1.0" encoding="UTF-16"?>' + plain
             utf8 = serialize(envelope([message]), XmlStyle(declaration='<?xml version="1.0" encoding="UTF-8"?>'))
@@ -126,7 +118,7 @@ def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 def test_invalid_messages(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Send messages that break the description's schema."""
     for service in callable_services(soap, "soap-basic-profile/R2724"):
-        for operation, message in _examples(service):
+        for operation, message in accepted_messages(soap, service, "soap-basic-profile/R2724"):
             declared = service.contract.shape(operation.request) if operation.request else None
             if declared is None:
                 continue

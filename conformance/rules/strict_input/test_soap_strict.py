@@ -7,13 +7,11 @@ import pytest
 from hypothesis import strategies as st
 
 from conformance.api.mutations import Mutation
-from conformance.api.soap.callable_services import SoapServices, callable_services
+from conformance.api.soap.callable_services import SoapServices, accepted_messages, callable_services
 from conformance.api.soap.calls import SoapResponse, call, expect_answer
 from conformance.api.soap.messages import ordinary, variants
 from conformance.api.soap.mutations import Payload, invalid_ones, mutations
 from conformance.api.soap.service import SoapService
-from conformance.api.soap.valid_messages import example
-from conformance.documents.wsdl import Operation
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.verdict.effort import Effort
@@ -26,15 +24,11 @@ _FAULT = "strict-input/soap-fault"
 _IDS = (*(f"strict-input/soap-{kind}" for kind in _KINDS), _FAULT)
 
 
-def _targets(service: SoapService) -> list[tuple[Operation, Element, Node]]:
-    """Return the operations for which the robot took a message, with their declarations and messages."""
-    found = []
-    for operation in service.contract.operations:
-        declared = service.contract.shape(operation.request) if operation.request else None
-        message = example(service, operation)
-        if declared is not None and message is not None:
-            found.append((operation, declared, message))
-    return found
+def _targets(soap: SoapServices, service: SoapService) -> list[tuple[Element, Node]]:
+    """Return the declaration of each message that the robot accepts, with the message."""
+    accepted = accepted_messages(soap, service, *_IDS)
+    found = [(service.contract.shape(operation.request or ""), message) for operation, message in accepted]
+    return [(declared, message) for declared, message in found if declared is not None]
 
 
 def _judged(judge: Judge, mutant: Mutation[Payload], answer: SoapResponse) -> bool:
@@ -61,13 +55,11 @@ def test_single_mutations(soap: SoapServices, judge: Judge, effort: Effort) -> N
     sent: dict[str, int] = dict.fromkeys(_KINDS, 0)
     services = callable_services(soap, *_IDS)
     for service in services:
-        found = [
-            (declared, mutant) for _, declared, message in _targets(service) for mutant in mutations(declared, message)
-        ]
+        found = [mutant for declared, message in _targets(soap, service) for mutant in mutations(declared, message)]
         chance.shuffle(found)
         # Of each kind alike, so that the many ways to miswrite a number do not crowd out the rest.
         for kind in _KINDS:
-            ours = [mutant for _, mutant in found if mutant.kind == kind]
+            ours = [mutant for mutant in found if mutant.kind == kind]
             for mutant in invalid_ones(ours[: effort.cases(60)], service.contract.types):
                 sent[kind] += 1
                 _judged(judge, mutant, call(service, *mutant.made))
@@ -86,7 +78,7 @@ def test_mutations_of_any_message(soap: SoapServices, judge: Judge, explore: Exp
     """Send mutations of messages with any other values."""
     for service in callable_services(soap, *_IDS):
         targets = [
-            (declared, _fullest(declared, message)) for _, declared, message in _targets(service) if message.children
+            (declared, _fullest(declared, message)) for declared, message in _targets(soap, service) if message.children
         ]
         if not targets:
             continue
