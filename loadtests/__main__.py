@@ -6,8 +6,6 @@ It is a process of its own because importing Locust makes gevent replace the soc
 everything in the process: front door, reports and tests keep the real ones.
 """
 
-from __future__ import annotations
-
 import signal
 import sys
 import traceback

@@ -1,7 +1,5 @@
 """`roaas load`: options, and the process that does the measuring."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import signal
@@ -10,7 +8,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from types import FrameType
+from typing import Any, Self
 
 import click
 
@@ -26,9 +25,6 @@ from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
 from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
 from loadtests.settings.settings import STEP_S, Settings
 from loadtests.settings.settle import DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, SettingsError, settle
-
-if TYPE_CHECKING:
-    from types import FrameType
 
 DEFAULT_OUT = "out"  # as `roaas certify` does
 #: NumPy's linear algebra: its threads wait for one another by spinning, ten times as long on a busy machine.
@@ -212,7 +208,7 @@ class _Baselines:
     old: Path | None
 
     @classmethod
-    def of(cls, baselines: Path, save: str | None, baseline: str | None) -> _Baselines:
+    def of(cls, baselines: Path, save: str | None, baseline: str | None) -> Self:
         """Look before the run whether all is there.
 
         Raises:

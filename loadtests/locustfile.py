@@ -5,9 +5,7 @@ whole milliseconds are replaced by microseconds, so that its percentiles say som
 figures to rely on (open model, alternating blocks, intervals) there is `roaas load`.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import locust.stats
 from locust import User, constant_throughput, events, tag, task
@@ -22,10 +20,8 @@ from loadtests.clients.payloads import CATALOGUE, VARIANTS
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.settings.cli_options import CliOptions
+from loadtests.settings.settings import Settings
 from loadtests.settings.settle import SettingsError, settle
-
-if TYPE_CHECKING:
-    from loadtests.settings.settings import Settings
 
 OPERATIONS = tuple(CATALOGUE)
 _TEXTS = ("rest", "publishers-wsdl", "subscribers-wsdl", "publishers-endpoint", "subscribers-endpoint")

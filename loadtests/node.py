@@ -5,8 +5,6 @@ with the same ARGS. Here ARGS are those of `roaas load`; the worker passes over 
 master is done it lingers, for its pod and the result in it vanish with it.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import time

@@ -1,9 +1,7 @@
 """What one simulated user holds: its connections and clients; it performs arrivals and records them."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 
@@ -11,11 +9,9 @@ from conformance.packs.table1.thresholds import ApiStyle
 from loadtests.clients.failures import CallError, answer_error, is_success
 from loadtests.clients.library import LibraryRest, LibrarySoap
 from loadtests.clients.payloads import Values, variants
+from loadtests.clients.robot import Robot
+from loadtests.clients.rosbridge import Bridge
 from loadtests.clients.wire import Connection, Request, now_ns
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.clients.rosbridge import Bridge
 
 _DURATION = re.compile(rb"([\w-]+)\s*;[^,]*?dur\s*=\s*\"?([0-9.]+)")
 

@@ -3,17 +3,13 @@
 A URL may carry a base-path prefix (a robot behind a gateway), an IPv6 literal and either scheme.
 """
 
-from __future__ import annotations
-
 import re
 import ssl
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import Self
 from urllib.parse import urlsplit
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
 
 DEFAULT_PORTS = {"http": 80, "https": 443}
 _FORBIDDEN = re.compile(r"[\x00-\x20\x7f]")  # RFC 3986 section 2: neither space nor control characters
@@ -40,7 +36,7 @@ class Endpoint:
     path: str
 
     @classmethod
-    def parse(cls, url: str, schemes: Mapping[str, int] = DEFAULT_PORTS) -> Endpoint:
+    def parse(cls, url: str, schemes: Mapping[str, int] = DEFAULT_PORTS) -> Self:
         """Read a URL of one of several schemes, which have their default ports.
 
         Raises:

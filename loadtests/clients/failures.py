@@ -1,7 +1,5 @@
 """Why a call failed, in the few kinds that the result groups errors by."""
 
-from __future__ import annotations
-
 import re
 import socket
 import ssl

@@ -5,11 +5,9 @@ transport for each user. REST through `requests`. Both pass through one urllib3 
 on the wire: a request that was sent twice for one call is a silent resend, and the run says so.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import requests
 import zeep
@@ -21,9 +19,7 @@ from zeep.wsdl import Document
 from conformance.packs.table1.thresholds import Client
 from loadtests.clients.failures import CallError, answer_error, connect_error
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
+from loadtests.clients.robot import Robot
 
 now_ns = time.monotonic_ns
 #: What options and results call it, after the library that speaks SOAP; over REST it is requests.

@@ -4,20 +4,14 @@ Delivery is the paper's example (section on the delivery application) with its c
 variants, so that no cache on the way answers for the robot.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from conformance.packs.table1.delivery import COFFEE, COORDINATES, COURIER, EXAMPLE, PATH_NAMES, XSD_FIELDS
+from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.wire import Request
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from loadtests.clients.endpoint import Endpoint
 
 VARIANTS = 64
 NAMESPACE = "http://soap.turtlebot.mybot.org/"

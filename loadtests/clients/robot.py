@@ -1,20 +1,15 @@
 """The robot under load, as far as the generator knows it: addresses, credentials, deadline."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.packs.table1.statement import Ros
 from loadtests.clients.endpoint import Endpoint, tls_context
 from loadtests.clients.payloads import BUILDERS, CATALOGUE, variants
 from loadtests.clients.rosbridge import Bridge, bridge_requests
-from loadtests.clients.wire import Connection
-
-if TYPE_CHECKING:
-    from loadtests.clients.wire import Request
+from loadtests.clients.wire import Connection, Request
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,12 @@ to subscribe for itself, rosbridge would send every echo to all of them. The Web
 protocol without its sockets, which are gevent's here; of the kept libraries it is the one that masks and parses in C.
 """
 
-from __future__ import annotations
-
 import ssl
 from collections import defaultdict, deque
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 import gevent.socket
@@ -32,9 +31,6 @@ from conformance.packs.table1.delivery import MESSAGE_FIELDS
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, connect_error, shown
 from loadtests.clients.wire import Answer, Request, now_ns
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 ODOMETRY_TOPIC = "/odom"
 _DELIVERY_TYPE = "mybot_delivery_app/msg/DeliveryRequestMsg"

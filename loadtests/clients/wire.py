@@ -8,23 +8,19 @@ probe and no epoll_ctl for each request, and a close by the robot is seen while 
 the next request opens a new one instead of failing. A request is never sent twice.
 """
 
-from __future__ import annotations
-
 import ssl
 import time
 from dataclasses import dataclass
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 import gevent.socket
 import httptools
 from gevent.hub import Waiter, get_hub
 
+from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, connect_error
-
-if TYPE_CHECKING:
-    from loadtests.clients.endpoint import Endpoint
 
 _READ = 1  # libev's EV_READ
 _CHUNK = 65_536

@@ -1,11 +1,9 @@
 """Reading a service's address from its WSDL (WSDL 1.1 section 3.8, soap:address)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
 import requests
@@ -13,10 +11,8 @@ import requests
 from loadtests.clients.endpoint import Endpoint, EndpointError
 from loadtests.clients.library import new_session, request_error
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE
+from loadtests.clients.robot import Robot
 from loadtests.clients.xml_reader import XmlError, parse_xml
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
 
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _SOAP = "http://schemas.xmlsoap.org/wsdl/soap/"

@@ -1,7 +1,5 @@
 """When a robot counts as dead: nothing has succeeded for seconds, though much was tried."""
 
-from __future__ import annotations
-
 _DEAD_S = 3.0
 _DEAD_REQUESTS = 10
 _LOOK_S = 0.5

@@ -1,18 +1,13 @@
 """From settings and robot to the plan that is carried out first."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from conformance.packs.table1.thresholds import ApiStyle
 from loadtests.clients.library import LIBRARY
+from loadtests.clients.robot import Robot
 from loadtests.schedule.plan import LIBRARY_RATE, Plan
+from loadtests.settings.settings import Settings
 
 ROSBRIDGE = ApiStyle.ROSBRIDGE
 
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.settings.settings import Settings
 
 _BRIDGE_NOTE = (
     "rosbridge has no answer to a publish: a delivery is timed until its echo is back, which has been through ROS, "

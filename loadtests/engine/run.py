@@ -1,7 +1,5 @@
 """Carries a run out, from looking at the robot to the written result."""
 
-from __future__ import annotations
-
 import logging
 import os
 import signal
@@ -11,7 +9,6 @@ from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import gevent
 import locust  # patches the standard library, which has to come before our modules that use it
@@ -19,6 +16,7 @@ import locust  # patches the standard library, which has to come before our modu
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
 from loadtests.clients.failures import CallError
+from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.engine.liveness import Liveness
 from loadtests.engine.planning import duel_plan
@@ -37,13 +35,9 @@ from loadtests.result.document import compose
 from loadtests.result.files import write
 from loadtests.result.outcome import Carried, Outcome, RunAborted
 from loadtests.result.terminal import summary
-from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import Plan
-    from loadtests.settings.settings import Settings
-    from loadtests.statistics.recorder import Recorder
+from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
+from loadtests.settings.settings import Settings
+from loadtests.statistics.recorder import Recorder
 
 
 def tell(message: str) -> None:

@@ -6,17 +6,13 @@ one with the shortest round trip counts, for it waited least in queues; it is wr
 where the whole of it was spent on one way. Clocks are CLOCK_MONOTONIC, in ns, which no administrator sets.
 """
 
-from __future__ import annotations
-
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import gevent
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 #: How many exchanges a reading chooses from, and how long they may take in all.
 EXCHANGES = 8
@@ -43,7 +39,7 @@ class Reading(NamedTuple):
     round_trip_ns: int
 
     @classmethod
-    def of(cls, sent_ns: int, worker_ns: int, received_ns: int) -> Reading:
+    def of(cls, sent_ns: int, worker_ns: int, received_ns: int) -> Self:
         """Read the moments at which the master sent, the worker answered, and the master had the answer."""
         return cls(worker_ns - (sent_ns + received_ns) // 2, received_ns - sent_ns)
 

@@ -1,7 +1,5 @@
 """Command lines as a result may show them."""
 
-from __future__ import annotations
-
 import re
 
 #: The folders of an absolute path, wherever in a word it begins; addresses such as http://host/path are none.

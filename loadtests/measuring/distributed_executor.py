@@ -1,31 +1,26 @@
 """A Locust master and its workers as an executor: processes of this machine, or of others."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 from locust.exception import RPCError
 from locust.runners import STATE_MISSING, STATE_RUNNING, MasterRunner
 
 from loadtests.clients.library import LIBRARY
+from loadtests.clients.robot import Robot
 from loadtests.measuring.clocks import Clocks, WorkerClock, clock_id
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, new_environment, now_ns
 from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.plan import Plan
+from loadtests.settings.settings import Generator
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import Plan
-    from loadtests.settings.settings import Generator
 
 _NS = 1_000_000_000
 _READY_S = 60.0

@@ -5,11 +5,9 @@ the application's place says when each arrived. Its clock is the generator's: bo
 robot is. Publishing with rclpy, without any web service, is the floor.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import gevent
 import numpy as np
@@ -17,19 +15,12 @@ import numpy as np
 from conformance.packs.table1.delivery import COURIER, EXAMPLE, MESSAGE_FIELDS
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, answer_error
-from loadtests.clients.payloads import BUILDERS
-from loadtests.clients.rosbridge import bridge_requests
-from loadtests.clients.wire import now_ns
+from loadtests.clients.payloads import BUILDERS, Values
+from loadtests.clients.robot import Robot
+from loadtests.clients.rosbridge import Bridge, bridge_requests
+from loadtests.clients.wire import Connection, Request, now_ns
 from loadtests.probe.client import Probe
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from loadtests.clients.payloads import Values
-    from loadtests.clients.robot import Robot
-    from loadtests.clients.rosbridge import Bridge
-    from loadtests.clients.wire import Connection, Request
-    from loadtests.settings.settings import EndToEnd
+from loadtests.settings.settings import EndToEnd
 
 #: What has not arrived by then is lost.
 LOST_S = 2.0

@@ -1,22 +1,17 @@
 """What the figures depend on besides the robot: machine, kernel, versions, command lines."""
 
-from __future__ import annotations
-
 import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import psutil
 
-from loadtests.measuring.robot_process import same_machine
+from loadtests.clients.robot import Robot
+from loadtests.measuring.robot_process import RobotProcess, same_machine
+from loadtests.settings.settings import Output
 from loadtests.statistics.figures import rounded
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.measuring.robot_process import RobotProcess
-    from loadtests.settings.settings import Output
 
 _PACKAGES = ("roaas", "locust", "gevent", "httptools", "zeep", "requests", "urllib3", "lxml", "numpy", "hdrhistogram")
 

@@ -1,22 +1,17 @@
 """Do both interfaces carry the same? Judgements on octets sent and answers received; nothing here talks to a robot."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from lxml import etree
 
 from conformance.packs.table1.delivery import COORDINATES, XSD_FIELDS
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values
+from loadtests.clients.wire import Request
 from loadtests.clients.xml_reader import XmlError, parse_xml
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from loadtests.clients.wire import Request
 
 #: Leaves of nav_msgs/Odometry that have to be in both interfaces' answers, in the same number.
 _ODOMETRY = ("frame_id", "child_frame_id", "x", "y", "z", "w", "covariance", "sec")

@@ -5,11 +5,10 @@ take their share of its schedule, and report what they recorded once a second; a
 it what it had not yet reported, and the result says so.
 """
 
-from __future__ import annotations
-
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 from locust import User, task
@@ -17,16 +16,12 @@ from locust.env import Environment
 from locust.event import Events
 
 from loadtests.clients.library import LIBRARY
+from loadtests.clients.robot import Robot
 from loadtests.measuring.clocks import WorkerClock
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.user_session import Session
+from loadtests.schedule.plan import Plan
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import Plan
 
 _NS = 1_000_000_000
 LEAD_S = 0.3  # from the message to the plan's beginning

@@ -4,19 +4,15 @@ Nothing reads the file, and no verdict is in it: the other workers' shares are m
 not been for nothing.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.commandline.atomic_write import write_atomically
+from loadtests.schedule.plan import Plan
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from loadtests.schedule.plan import Plan
 
 FORMAT = "roaas-worker/1"
 

@@ -5,17 +5,13 @@ buffers of successful requests go in at once, with the histogram's microseconds 
 make timing moot, go through the event, where other listeners expect them.
 """
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import CATALOGUE
 from loadtests.schedule.plan import SERIES
 from loadtests.statistics.histogram import Histogram, edges_us
-
-if TYPE_CHECKING:
-    from loadtests.clients.failures import CallError
 
 
 class LocustFeed:

@@ -1,11 +1,9 @@
 """What else went on on the generator's machine: time stolen by its host, quota, governor, load."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import psutil
 
@@ -27,7 +25,7 @@ class Moment:
     load: tuple[float, float, float] | None
 
     @classmethod
-    def now(cls) -> Moment:
+    def now(cls) -> Self:
         """Look."""
         times = psutil.cpu_times()
         return cls(sum(times), getattr(times, "steal", 0.0), _throttled_s(), psutil.getloadavg())

@@ -6,24 +6,18 @@ tenth of a second, asked once, and then asked at once again and again. Our own p
 costs is in the cold figure, for both interfaces alike.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import gevent
 import numpy as np
 
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, is_success
+from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Connection, now_ns
+from loadtests.schedule.plan import SeriesName
 from loadtests.statistics.histogram import Histogram
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import SeriesName
 
 PAUSE_S = 0.1
 _BEHIND = 10  # requests right behind one another, after the one that follows the pause

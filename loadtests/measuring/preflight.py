@@ -1,21 +1,17 @@
 """One call of every kind before the run: does the robot answer, and do both interfaces carry the same?"""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import requests
 
 from loadtests.clients.failures import UNREACHABLE, CallError, answer_error
 from loadtests.clients.library import LibraryRest, LibrarySoap, new_session, read_document
 from loadtests.clients.payloads import CATALOGUE, variants
+from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Answer, now_ns
 from loadtests.measuring.equivalence import deliveries_missing, pose_difference, requests_difference
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import SeriesName
+from loadtests.schedule.plan import SeriesName
 
 
 @dataclass

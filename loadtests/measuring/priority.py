@@ -6,16 +6,12 @@ takes CAP_SYS_NICE, and is done only where the generator needs a small part of o
 take the robot's.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from loadtests.schedule.plan import Plan
+from loadtests.schedule.plan import Plan
 
 #: Requests a second, of one process, up to which it is idle most of the time.
 MOST_RATE = 1000.0

@@ -1,20 +1,14 @@
 """Starting the robot anew between repeats, by a command of its owner's."""
 
-from __future__ import annotations
-
 import shlex
 import subprocess
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import gevent
 
 from loadtests.measuring.errors import GeneratorError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from loadtests.measuring.preflight import Findings
+from loadtests.measuring.preflight import Findings
 
 _COMMAND_S = 60.0
 _READY_S = 60.0

@@ -1,23 +1,17 @@
 """Offers rates until it is known where a robot gives way, and connections to see how latency grows with them."""
 
-from __future__ import annotations
-
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.executor import busiest
 from loadtests.schedule.arrivals import arrivals_due
-from loadtests.schedule.plan import BOTH, step_operation
+from loadtests.schedule.plan import BOTH, Plan, step_operation
+from loadtests.settings.settings import Settings
 from loadtests.statistics import steps
 from loadtests.statistics.knee import knee_search, search_again
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.measuring.distributed_executor import Executor
-    from loadtests.schedule.plan import Plan
-    from loadtests.settings.settings import Settings
 
 _LOWEST_RATE, _HIGHEST_RATE = 50.0, 50_000.0
 _MOST_S = 600.0  # for all searches together

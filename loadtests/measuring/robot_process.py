@@ -3,23 +3,19 @@
 A robot's other processes, such as a simulation behind its web services, are not in it.
 """
 
-from __future__ import annotations
-
 import ipaddress
 import re
 import shlex
 import socket
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import psutil
 
 from loadtests.clients.endpoint import Endpoint
+from loadtests.clients.robot import Robot
 from loadtests.measuring.command_line import without_folders
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
 
 _SECRET = re.compile(r"^-.*(token|password|secret|key)\b(?!-file)", re.IGNORECASE)
 

@@ -1,31 +1,25 @@
 """One process's part in a run: its users, its pacer, its recorder. The same locally and in a worker."""
 
-from __future__ import annotations
-
 import gc
 import os
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import gevent
 
 from loadtests.clients.callers import Caller, Workload
+from loadtests.clients.failures import CallError
 from loadtests.clients.library import LIBRARY, Sent, read_document
 from loadtests.clients.payloads import VARIANTS
+from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.locust_feed import LocustFeed
 from loadtests.measuring.priority import first_in_line, leaves_the_robot_room
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Arrival, Pacer
-from loadtests.schedule.plan import BOTH
+from loadtests.schedule.plan import BOTH, Plan, Segment
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.clients.failures import CallError
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import Plan, Segment
 
 _NS = 1_000_000_000
 _SIDES = ("rest", "soap")
@@ -35,7 +29,7 @@ _AFTER_ERROR_S = 0.02  # closed model: users of a dead robot would spin on refus
 class _Sink:
     """What callers record into: the recorder, with the run's clock for failures and Locust told of them."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: "Session") -> None:
         self._session = session
         self.record = session.recorder.record
         self.count = session.recorder.count

@@ -4,8 +4,6 @@ The object holds the robots' bearer tokens, which do not travel over the network
 the worker leaves when its master dies: `{"tokens": […], "folder": "…"}`.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -6,8 +6,6 @@ Times are of CLOCK_MONOTONIC, which all processes of a machine share; values are
 hexadecimal, which loses no bit. It ends when its input ends.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

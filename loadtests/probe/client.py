@@ -3,8 +3,6 @@
 For a process that gevent has patched: waiting for a probe holds nobody else up.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

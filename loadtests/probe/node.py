@@ -1,10 +1,9 @@
 """The probe's ROS node: hears deliveries as the application does, or publishes them without any web service."""
 
-from __future__ import annotations
-
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import rclpy
 from mybot_delivery_app.msg import DeliveryRequestMsg
@@ -15,9 +14,6 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 from conformance.packs.table1.delivery import MESSAGE_FIELDS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _DISCOVERY_S = 6.0
 _STEP_S = 0.02

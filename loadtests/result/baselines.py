@@ -3,8 +3,6 @@
 A baseline is a folder of latency.json files that are named by when they were measured; the last one is compared with.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

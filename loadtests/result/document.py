@@ -1,10 +1,8 @@
 """latency.json: everything that a run found out, whatever became of it."""
 
-from __future__ import annotations
-
 import os
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from conformance.commandline.exit_codes import ExitCode
 from loadtests.clients.library import LIBRARY
@@ -14,10 +12,13 @@ from loadtests.measuring.end_to_end import LOST_S
 from loadtests.measuring.environment import describe
 from loadtests.measuring.machine import Moment, conditions
 from loadtests.measuring.pauses import PAUSE_S
+from loadtests.measuring.preflight import Findings
 from loadtests.result.files import FORMAT
+from loadtests.result.outcome import Outcome, RunAborted
 from loadtests.result.processes import process_figures
 from loadtests.schedule.arrivals import arrivals_due
-from loadtests.schedule.plan import GAP_S, step_operation
+from loadtests.schedule.plan import GAP_S, Plan, step_operation
+from loadtests.settings.settings import Settings
 from loadtests.statistics import against, end_to_end, figures, modes, over_time, steps, threshold, verdict
 from loadtests.statistics.between_runs import between_runs
 from loadtests.statistics.further_interfaces import further_interfaces
@@ -25,12 +26,6 @@ from loadtests.statistics.headline import headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from loadtests.measuring.preflight import Findings
-    from loadtests.result.outcome import Outcome, RunAborted
-    from loadtests.schedule.plan import Plan
-    from loadtests.settings.settings import Settings
 
 CLIENT_WORDS = {
     "wire": "our own HTTP/1.1 client on gevent and llhttp, the same for both interfaces; requests built beforehand, "

@@ -1,7 +1,5 @@
 """Writing a result: latency.json and one .hgrm file for each series, each in one piece or not at all."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path

@@ -1,23 +1,18 @@
 """What became of a run, as it goes along: the document is made of it in the end."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from datetime import datetime
+from typing import Any
 
+from loadtests.clients.robot import Robot
+from loadtests.measuring.distributed_executor import Executor
+from loadtests.measuring.end_to_end import Journeys
 from loadtests.measuring.machine import Moment
+from loadtests.measuring.pauses import Paused
 from loadtests.measuring.preflight import Findings
-
-if TYPE_CHECKING:
-    from datetime import datetime
-
-    from loadtests.clients.robot import Robot
-    from loadtests.measuring.distributed_executor import Executor
-    from loadtests.measuring.end_to_end import Journeys
-    from loadtests.measuring.pauses import Paused
-    from loadtests.measuring.robot_process import RobotProcess
-    from loadtests.schedule.plan import Plan, SeriesName
-    from loadtests.settings.settings import Settings
+from loadtests.measuring.robot_process import RobotProcess
+from loadtests.schedule.plan import Plan, SeriesName
+from loadtests.settings.settings import Settings
 
 
 class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code

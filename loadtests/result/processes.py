@@ -1,14 +1,10 @@
 """The `workers` of latency.json, and what is to be said of those that did not do all of their part."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from loadtests.measuring.executor import Member
 from loadtests.schedule.plan import GAP_S
 from loadtests.statistics import figures
-
-if TYPE_CHECKING:
-    from loadtests.measuring.executor import Member
 
 
 def process_figures(members: list[Member]) -> tuple[list[dict[str, Any]], list[str]]:

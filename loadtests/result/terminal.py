@@ -1,7 +1,5 @@
 """What a run has to say in the end, for the terminal."""
 
-from __future__ import annotations
-
 from typing import Any
 
 _JUDGED = {

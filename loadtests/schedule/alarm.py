@@ -8,18 +8,14 @@ gevent.sleep wakes on libev's millisecond grid, which would drown a service time
 timerfd the loop's own timer serves, and the result says so.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys
 import time
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable
+from typing import Any, Protocol
 
 from gevent.hub import get_hub
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _SECOND_NS = 1_000_000_000
 _READ = 1  # libev's EV_READ

@@ -4,8 +4,6 @@ Every worker computes the whole schedule and takes its own share of each segment
 the schedule without any message between them.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

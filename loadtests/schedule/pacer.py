@@ -6,10 +6,9 @@ and is dropped (and counted) once its deadline has passed. In the closed model i
 gate of each segment: every user takes its next request as soon as it has finished the last.
 """
 
-from __future__ import annotations
-
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import gevent
 from gevent.event import Event
@@ -17,11 +16,7 @@ from gevent.hub import Waiter
 
 from loadtests.clients.wire import now_ns
 from loadtests.schedule.alarm import make_alarm
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.arrivals import Schedule
 
 
 class Arrival(NamedTuple):

@@ -10,13 +10,11 @@ own, for their CPU time would delay the wire client's starts.
 Three interfaces take turns likewise, in sextets; two robots over one interface in each quartet.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count, product
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 import numpy as np
@@ -136,7 +134,7 @@ class Plan:
         return message
 
     @classmethod
-    def from_message(cls, message: dict[str, Any]) -> Plan:
+    def from_message(cls, message: dict[str, Any]) -> Self:
         """Read what `as_message` wrote."""
         return msgspec.convert(message, cls)
 
@@ -197,7 +195,7 @@ class Plan:
             if segment.phase in phases and segment.end_ns <= elapsed_s * _NS + 1
         )
 
-    def again(self) -> Plan:
+    def again(self) -> Self:
         """The same once more, after this one, with the lots drawn anew."""
         return replace(
             self,

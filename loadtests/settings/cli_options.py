@@ -1,19 +1,15 @@
 """The command line's options, as they were given."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 from conformance.packs.table1.statement import Statement
+from conformance.packs.table1.thresholds import Threshold
 from conformance.statement.statement import Endpoints
 from loadtests.settings.settings import STEP_S, Generator, Repeats, Selection
 
 TOLERANCE = 0.05
 KNEE_SEARCHES = 5
-
-if TYPE_CHECKING:
-    from conformance.packs.table1.thresholds import Threshold
 
 
 @dataclass(frozen=True)
@@ -55,7 +51,7 @@ class CliOptions:
     command: str = ""
 
     @classmethod
-    def of(cls, **given: Any) -> CliOptions:
+    def of(cls, **given: Any) -> Self:
         """Sort options by their names into the groups that they belong to."""
         endpoints = _take(given, Endpoints.__struct_fields__)
         endpoints = {name: value for name, value in endpoints.items() if value not in {None, ""}}

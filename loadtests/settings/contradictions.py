@@ -1,12 +1,9 @@
 """What options contradict one another, or lie out of range, before anything else is looked at."""
 
-from __future__ import annotations
-
 import shlex
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from loadtests.settings.cli_options import CliOptions
+from loadtests.settings.cli_options import CliOptions
 
 _MOST_RATE = 1_000_000.0
 _MOST_USERS = 10_000

@@ -1,24 +1,19 @@
 """From options and statement to settings: options over statement over defaults."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
+from conformance.packs.table1.statement import Statement
+from conformance.statement.statement import Endpoints
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS, Load
+from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.contradictions import contradiction
 from loadtests.settings.settings import Against, EndToEnd, Limits, Output, Selection, Settings, Steps
-
-if TYPE_CHECKING:
-    from conformance.packs.table1.statement import Statement
-    from conformance.statement.statement import Endpoints
-    from loadtests.settings.cli_options import CliOptions
 
 DEFAULT_RATE = 200.0
 DEFAULT_DURATION_S = 20.0

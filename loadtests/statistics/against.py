@@ -7,21 +7,16 @@ bounds are widened until all of them hold together (Bonferroni, on the logarithm
 to lie within the tolerance, which needs no such care (Berger, Technometrics 24, 1982: an intersection-union test).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.commandline.exit_codes import ExitCode
+from loadtests.schedule.plan import SeriesName
 from loadtests.statistics.figures import compared, named, pair_s, plain_quantiles, rounded_interval
 from loadtests.statistics.intervals import figure_interval_ms
-from loadtests.statistics.measured import Side
-
-if TYPE_CHECKING:
-    from loadtests.schedule.plan import SeriesName
-    from loadtests.statistics.measured import Measured
+from loadtests.statistics.measured import Measured, Side
 
 #: The median decides; a 99th percentile that is surely slower counts as well, one that nothing can be told of does not.
 DECIDING = "p50"

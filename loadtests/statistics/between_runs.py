@@ -7,8 +7,6 @@ one robot again and again (`benchmarks/repeatability.py`; the figures stand in d
 often enough, its own repeats say it, and nothing is added.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ A delivery that failed or never arrived counts in every figure, as at least the 
 that loses what it is slow at is not quick.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

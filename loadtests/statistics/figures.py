@@ -1,9 +1,8 @@
 """From cells to figures: series, comparisons and noise floor of latency.json."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from loadtests.schedule.plan import SeriesName
 from loadtests.statistics.between_runs import Interval
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.intervals import (
@@ -17,11 +16,8 @@ from loadtests.statistics.intervals import (
 )
 from loadtests.statistics.judgement import Judgement, judge
 from loadtests.statistics.measured import Measured, Side
+from loadtests.statistics.recorder import Cell
 from loadtests.statistics.rounds import SHARES, Unit
-
-if TYPE_CHECKING:
-    from loadtests.schedule.plan import SeriesName
-    from loadtests.statistics.recorder import Cell
 
 _COMPARED_INTERFACES = ("rest", "soap")
 COMPARED = ("mean", "p50", "p90", "p99")

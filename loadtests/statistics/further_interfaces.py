@@ -1,14 +1,9 @@
 """Interfaces beside SOAP and REST, such as rosbridge, each over REST: the `further_interfaces` of latency.json."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from loadtests.statistics.figures import COMPARED, compared, named, pair_s
-from loadtests.statistics.measured import Side
-
-if TYPE_CHECKING:
-    from loadtests.statistics.measured import Measured
+from loadtests.statistics.measured import Measured, Side
 
 _BASE = "rest"
 _WEB_SERVICES = (_BASE, "soap")

@@ -3,14 +3,10 @@
 Terminal, page and Markdown say these words and no others.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 from loadtests.statistics.against import DECIDING, NOT_SLOWER, SLOWER, UNCLEAR
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Entry = dict[str, Any]
 

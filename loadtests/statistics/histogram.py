@@ -6,9 +6,7 @@ once. Counts are kept sparsely: adding two histograms is adding counts, hence a 
 histogram of the whole, whatever the order.
 """
 
-from __future__ import annotations
-
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +68,7 @@ class Histogram:
         self._add(found, counts)
         self._note(len(values_ns), int(values_ns.sum()), int(values_ns.min()), int(values_ns.max()))
 
-    def merge(self, other: Histogram) -> None:
+    def merge(self, other: Self) -> None:
         """Add another histogram's counts."""
         if other.total:
             self._add(*other.arrays())
@@ -103,7 +101,7 @@ class Histogram:
             self._settle()
         return self._bins, self._counts
 
-    def at_least(self, floor_ns: int) -> Histogram:
+    def at_least(self, floor_ns: int) -> "Histogram":
         """The same values, each below `floor_ns` raised to it; sum to within a bin's width."""
         made = Histogram()
         if not self.total:
@@ -160,7 +158,7 @@ class Histogram:
         ]
 
     @classmethod
-    def unpack(cls, packed: list[Any]) -> Histogram:
+    def unpack(cls, packed: list[Any]) -> Self:
         """Read what `pack` wrote."""
         made = cls()
         total, sum_ns, lowest, highest, bins, counts = packed

@@ -7,11 +7,9 @@ rounds and by what the repeats differ beyond what each run's own scatter explain
 right is measured by `benchmarks/calibration.py`.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
@@ -19,9 +17,6 @@ from scipy import stats
 from loadtests.statistics.between_runs import LEAST_REPEATS, Interval, widened_difference, widened_ratio
 from loadtests.statistics.histogram import Floats, Histogram, Ints
 from loadtests.statistics.rounds import SHARES, Rounds, Sample, Unit, in_rounds
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 RESAMPLES = 2000
 LEAST_ROUNDS = 6

@@ -5,14 +5,11 @@ is biased in this run, by up to that much; where the effect lies inside of it, a
 itself. Neither is called a difference.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-if TYPE_CHECKING:
-    from loadtests.statistics.between_runs import Interval
+from loadtests.statistics.between_runs import Interval
 
 Verdict = Literal["differs", "bounded", "noise", "none"]
 #: An interval that leaves open whether a side takes twice as long, or half, carries no statement.

@@ -5,16 +5,12 @@ ends where chance lets one step fail. Of n searches' estimates the lowest and th
 probability 1 - 2^(1 - n) (the sign test's interval); the brackets' own ends make it no narrower.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from loadtests.statistics.figures import rounded, rounded_interval
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 RESOLUTION = 1.08  # a bracket whose ends differ by no more is narrow enough
 _GROWTH = 2.0

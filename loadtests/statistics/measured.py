@@ -5,18 +5,14 @@ until it was given up, and as no less than the slowest answer of its series. Els
 slow at would look quick.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from loadtests.schedule.plan import SERIES, Plan, Segment, SeriesName
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.recorder import Cell, Recorder, Spans
 from loadtests.statistics.rounds import Unit
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
 
 def counted(cell: Cell, time: str, floor_ns: int) -> Histogram:

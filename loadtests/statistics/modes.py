@@ -5,20 +5,15 @@ of the service times, which are read off the histogram at evenly spaced quantile
 thousands of samples: two modes are told where there is a valley between them as well, with enough on both sides of it.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import diptest
 import numpy as np
 
+from loadtests.schedule.plan import SeriesName
 from loadtests.statistics.figures import named, rounded
-from loadtests.statistics.histogram import Histogram, edges_us, quantiles_us
-
-if TYPE_CHECKING:
-    from loadtests.schedule.plan import SeriesName
-    from loadtests.statistics.histogram import Floats
-    from loadtests.statistics.measured import Measured
+from loadtests.statistics.histogram import Floats, Histogram, edges_us, quantiles_us
+from loadtests.statistics.measured import Measured
 
 _FEWEST, _POINTS = 100, 2000
 _SIGNIFICANCE = 0.01

@@ -1,20 +1,13 @@
 """The run as it went: second by second, block by block, and what failed when."""
 
-from __future__ import annotations
-
 from collections import defaultdict
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
-from loadtests.schedule.plan import SERIES
+from loadtests.schedule.plan import SERIES, Plan, Segment
 from loadtests.statistics.figures import named, rounded
-from loadtests.statistics.measured import counted
+from loadtests.statistics.measured import Measured, counted
 from loadtests.statistics.recorder import Cell, Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from loadtests.schedule.plan import Plan, Segment
-    from loadtests.statistics.measured import Measured
 
 _NS = 1_000_000_000
 WIDTH_S = 1.0

@@ -6,19 +6,15 @@ statistics resample, and their sums are the series. The number of segments is bo
 by the histogram. Cells add, so that those of processes and machines merge into exactly their union.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections import Counter, defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 import numpy as np
 
 from loadtests.statistics.histogram import Histogram, Ints
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 #: A start later than this after its time counts as late.
 LATE_NS = 1_000_000
@@ -48,7 +44,7 @@ class Cell:
     late: int = 0
     dropped: int = 0
 
-    def merge(self, other: Cell) -> None:
+    def merge(self, other: Self) -> None:
         """Add another cell."""
         for name, part in self.histograms().items():
             part.merge(getattr(other, name))
@@ -78,7 +74,7 @@ class Spans:
         """The histograms by name."""
         return {name: getattr(self, name) for name in ("build", "wire", "server", "parse", "lag")}
 
-    def merge(self, other: Spans) -> None:
+    def merge(self, other: Self) -> None:
         """Add another series' spans."""
         for name, part in self.parts().items():
             part.merge(getattr(other, name))
@@ -93,7 +89,7 @@ class Failure:
     first_ns: int
     last_ns: int
 
-    def merge(self, other: Failure) -> None:
+    def merge(self, other: Self) -> None:
         """Add another one of the kind."""
         if other.first_ns < self.first_ns:
             self.message = other.message
@@ -223,7 +219,7 @@ class Recorder:
         spans.parse.record(done - received)
         spans.lag.record(np.maximum((start - due)[~queued.astype(bool)], 0))
 
-    def merge(self, other: Recorder) -> None:
+    def merge(self, other: Self) -> None:
         """Add what another recorder holds."""
         for key, cell in other.cells.items():
             self.cells[key].merge(cell)
@@ -263,7 +259,7 @@ class Recorder:
         return packed
 
     @classmethod
-    def unpack(cls, packed: dict[str, Any]) -> Recorder:
+    def unpack(cls, packed: dict[str, Any]) -> Self:
         """Read what `take` handed over."""
         made = cls()
         for segment, operation, parts, errors, late, dropped in packed["cells"]:

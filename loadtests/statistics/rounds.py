@@ -11,18 +11,14 @@ that lie beyond, for a mean their sum. This is what the figure's error is made o
 few samples it exists for every unit.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from loadtests.statistics.histogram import Floats, Histogram, Ints, edges_us, quantiles_us
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 SHARES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
 #: Putting units together ends before there are fewer rounds than this: of seven independent rounds the correlation is
@@ -58,7 +54,7 @@ class Sample:
     repeats: Ints
 
     @classmethod
-    def of(cls, units: Sequence[Unit]) -> Sample:
+    def of(cls, units: Sequence[Unit]) -> Self:
         """From units, of which there has to be one, in order of time."""
         arrays = [[side.arrays() for side in unit.sides] for unit in units]
         occupied = np.unique(np.concatenate([bins for sides in arrays for bins, _ in sides]))

@@ -1,21 +1,16 @@
 """Where it breaks: a load stepped up until the robot no longer keeps to the criterion."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
+from conformance.packs.table1.thresholds import Threshold
+from loadtests.schedule.plan import Plan
 from loadtests.statistics.figures import rounded
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.measured import counted
 from loadtests.statistics.recorder import Cell, Recorder
 from loadtests.statistics.rounds import SHARES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from conformance.packs.table1.thresholds import Threshold
-    from loadtests.schedule.plan import Plan
 
 _MOST_P99_MS = 50.0
 _MOST_ERRORS = 0.01
@@ -34,7 +29,7 @@ class Criterion:
     limits: dict[str, list[tuple[str, str, float]]]
 
     @classmethod
-    def of(cls, thresholds: Iterable[Threshold], operation: str) -> Criterion:
+    def of(cls, thresholds: Iterable[Threshold], operation: str) -> Self:
         """The thresholds on an operation's wire series, or a default where there are none."""
         limits: dict[str, list[tuple[str, str, float]]] = {}
         for threshold in thresholds:

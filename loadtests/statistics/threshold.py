@@ -1,21 +1,16 @@
 """Whether the robot kept its thresholds."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 from scipy import stats
 
+from conformance.packs.table1.thresholds import Threshold
 from loadtests.statistics.figures import quantiles
 from loadtests.statistics.histogram import Histogram, edges_us
 from loadtests.statistics.intervals import figure_interval_ms
+from loadtests.statistics.measured import Measured
 from loadtests.statistics.rounds import SHARES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from conformance.packs.table1.thresholds import Threshold
-    from loadtests.statistics.measured import Measured
 
 _SMALL_CHANCE = 0.025
 

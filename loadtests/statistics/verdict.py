@@ -1,18 +1,13 @@
 """Whether a run is worth anything: gates on the generator, and on what the duel can say."""
 
-from __future__ import annotations
+from collections.abc import Sequence
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from loadtests.schedule.plan import Plan
 from loadtests.statistics.figures import plain_quantiles, rounded
 from loadtests.statistics.histogram import Histogram
+from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Cell
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from loadtests.schedule.plan import Plan
-    from loadtests.statistics.measured import Measured
 
 MOST_CPU = 0.95
 #: Arrivals that wait for a free connection wait for the generator where it is as busy as this in their block.
