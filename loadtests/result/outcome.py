@@ -13,6 +13,7 @@ from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import RobotProcess
 from loadtests.schedule.plan import Plan, SeriesName
 from loadtests.settings.settings import Settings
+from loadtests.statistics.steps import Step
 
 
 class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
@@ -64,7 +65,7 @@ class Outcome:
     before: Moment = field(default_factory=Moment.now)
     robot_process: RobotProcess | None = None
     cpu_share: float | None = None
-    steps: list[dict[str, Any]] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
     knee_searches: list[dict[str, Any]] = field(default_factory=list)
     over_connections: list[dict[str, Any]] = field(default_factory=list)
     journeys: dict[str, Journeys] = field(default_factory=dict)

@@ -12,9 +12,8 @@ import numpy as np
 from scipy import stats
 
 from loadtests.statistics.figures import plain_quantiles, rounded, rounded_interval
-from loadtests.statistics.histogram import Histogram
+from loadtests.statistics.histogram import SHARES, Histogram
 from loadtests.statistics.intervals import order_interval_ms
-from loadtests.statistics.rounds import SHARES
 
 _BASE = "rest"
 
@@ -43,7 +42,7 @@ def ways(
 def _way(way: str, times: Journey, answers: Journey, errors: int, waited_ns: int) -> dict[str, Any]:
     arrived = [time for time in times if time is not None]
     missing = len(times) - len(arrived)
-    whole = _histogram([*arrived, *[max([waited_ns, *arrived])] * missing])
+    whole = Histogram.of([*arrived, *[max([waited_ns, *arrived])] * missing])
     figures = plain_quantiles(whole)
     return {
         "interface": way,
@@ -57,14 +56,8 @@ def _way(way: str, times: Journey, answers: Journey, errors: int, waited_ns: int
             if missing and figure is not None and (name not in SHARES or SHARES[name] > len(arrived) / len(times))
         ],
         "ci95_ms": {name: rounded_interval(order_interval_ms(whole, SHARES[name])) for name in ("p50", "p99")},
-        "answer_ms": plain_quantiles(_histogram(answers)) if any(answers) else None,
+        "answer_ms": plain_quantiles(Histogram.of(filter(None, answers))) if any(answers) else None,
     }
-
-
-def _histogram(times: Journey) -> Histogram:
-    made = Histogram()
-    made.record(np.array([time for time in times if time is not None], dtype=np.int64))
-    return made
 
 
 def _over(times: Journey, base: Journey) -> dict[str, Any]:

@@ -6,6 +6,7 @@ once. Counts are kept sparsely: adding two histograms is adding counts, hence a 
 histogram of the whole, whatever the order.
 """
 
+from collections.abc import Iterable
 from typing import Any, Self
 
 import numpy as np
@@ -21,6 +22,8 @@ Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 _NOTHING: Ints = np.zeros(0, dtype=np.int64)
 _LEAST_SUMMED = 256
+#: The quantiles that results give, by name.
+SHARES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
 
 
 def bins_of(values_us: Ints) -> Ints:
@@ -60,6 +63,21 @@ class Histogram:
         self.highest_ns = 0
         self.lowest_ns = 0
 
+    @classmethod
+    def sum_of(cls, parts: "Iterable[Histogram]") -> Self:
+        """Return a histogram of all values of others."""
+        whole = cls()
+        for part in parts:
+            whole.merge(part)
+        return whole
+
+    @classmethod
+    def of(cls, values_ns: Iterable[int]) -> Self:
+        """Return a histogram of values in nanoseconds."""
+        made = cls()
+        made.record(np.array(list(values_ns), dtype=np.int64))
+        return made
+
     def record(self, values_ns: Ints) -> None:
         """Add values, in nanoseconds."""
         if not len(values_ns):
@@ -68,7 +86,7 @@ class Histogram:
         self._add(found, counts)
         self._note(len(values_ns), int(values_ns.sum()), int(values_ns.min()), int(values_ns.max()))
 
-    def merge(self, other: Self) -> None:
+    def merge(self, other: "Histogram") -> None:
         """Add another histogram's counts."""
         if other.total:
             self._add(*other.arrays())
@@ -117,6 +135,12 @@ class Histogram:
             self.total, beyond + raised * floor_ns, max(self.lowest_ns, floor_ns), max(self.highest_ns, floor_ns)
         )
         return made
+
+    def figure_ms(self, name: str) -> float | None:
+        """Return the mean, the maximum or a quantile by its name; None without values."""
+        if name in SHARES:
+            return self.quantile_ms(SHARES[name])
+        return self.mean_ms() if name == "mean" or not self.total else self.highest_ns / 1e6
 
     def mean_ms(self) -> float | None:
         """The mean, exact; None without values."""

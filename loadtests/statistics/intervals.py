@@ -15,8 +15,8 @@ import numpy as np
 from scipy import stats
 
 from loadtests.statistics.between_runs import LEAST_REPEATS, Interval, widened_difference, widened_ratio
-from loadtests.statistics.histogram import Floats, Histogram, Ints
-from loadtests.statistics.rounds import SHARES, Rounds, Sample, Unit, in_rounds
+from loadtests.statistics.histogram import SHARES, Floats, Histogram, Ints
+from loadtests.statistics.rounds import Rounds, Sample, Unit, in_rounds
 
 RESAMPLES = 2000
 LEAST_ROUNDS = 6
@@ -180,9 +180,7 @@ def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
         return Estimate(interval, None if interval else "too few resamples hold samples", replicates)
     if name not in SHARES:
         return Estimate(None, f"fewer than {LEAST_ROUNDS} rounds of blocks", None)
-    whole = Histogram()
-    for unit in units:
-        whole.merge(unit.sides[0])
+    whole = Histogram.sum_of(unit.sides[0] for unit in units)
     return Estimate(order_interval_ms(whole, SHARES[name]), None, None)
 
 

@@ -11,13 +11,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from loadtests.statistics.figures import rounded, rounded_interval
+from loadtests.statistics.steps import Step
 
 RESOLUTION = 1.08  # a bracket whose ends differ by no more is narrow enough
 _GROWTH = 2.0
 _NEAR = 1.5  # how far from an earlier search's bracket the next one begins
-_BUSY = 0.9
-
-Trial = dict[str, Any]
 
 
 @dataclass
@@ -36,7 +34,7 @@ class Search:
     near: tuple[float, float] | None = None
     kept: float | None = None
     missed: float | None = None
-    trials: dict[float, Trial] = field(default_factory=dict)
+    trials: dict[float, Step] = field(default_factory=dict)
 
     def next_rate(self) -> float | None:
         """The rate to try next; None when the bracket is narrow enough, or an end of what is allowed is reached."""
@@ -49,10 +47,10 @@ class Search:
             return None if self.missed <= self.lowest else self._within(self.missed / _GROWTH)
         return None if self.missed / self.kept <= RESOLUTION else math.sqrt(self.kept * self.missed)
 
-    def learn(self, rate: float, trial: Trial, *, kept: bool) -> None:
+    def learn(self, rate: float, trial: Step) -> None:
         """Take a trial in."""
         self.trials[rate] = trial
-        if kept:
+        if trial.meets:
             self.kept = max(rate, self.kept or rate)
         else:
             self.missed = min(rate, self.missed or rate)
@@ -66,39 +64,33 @@ class Search:
 
 
 def knee_search(interface: str, criterion: str, searches: list[Search]) -> dict[str, Any]:
-    """One interface's searches, put together."""
+    """Return what one interface's searches found together."""
     found = [(search, estimate) for search in searches if (estimate := search.estimate()) is not None]
     estimates = [estimate for _, estimate in found]
     trials = [trial for search in searches for trial in search.trials.values()]
     missed = [search.trials[search.missed] for search, _ in found if search.missed in search.trials]
-    busy = sum((trial["cpu_share"] or 0.0) > _BUSY for trial in missed)
+    busy = sum(trial.limited_by_generator for trial in missed)
     kept = [search.kept for search in searches if search.kept is not None]
+    failing = [trial.offered_rate for trial in trials if trial.errors or trial.dropped]
+    lowest = min((search.kept or 0.0 for search, _ in found), default=0.0)
+    highest = max((search.missed or 0.0 for search, _ in found), default=0.0)
     return {
         "interface": interface,
         "criterion": criterion,
         "searches": len(searches),
         "rate": rounded(math.exp(sum(map(math.log, estimates)) / len(estimates))) if estimates else None,
-        "interval": rounded_interval(_enclosing([search for search, _ in found])) if estimates else None,
+        "interval": rounded_interval((lowest, highest)) if estimates else None,
         "confidence": rounded(1 - 2.0 ** (1 - len(estimates))) if estimates else None,
         "brackets": [[rounded(search.kept), rounded(search.missed)] for search in searches],
         "held_up_to": rounded(max(kept, default=None)) if not estimates and kept else None,
-        "errors_from": rounded(min(_failing(trials), default=None)),
-        "reason": missed[0]["reason"] if missed else None,
+        "errors_from": rounded(min(failing, default=None)),
+        "reason": missed[0].reason if missed else None,
         "limited_by": None if not missed else ("generator" if 2 * busy > len(missed) else "robot"),
         "trials": len(trials),
     }
 
 
-def _enclosing(searches: list[Search]) -> tuple[float, float]:
-    return min(search.kept or 0.0 for search in searches), max(search.missed or 0.0 for search in searches)
-
-
-def _failing(trials: list[Trial]) -> list[float]:
-    """The rates at which requests failed, or were never started."""
-    return [trial["offered_rate"] for trial in trials if trial["errors"] or trial["dropped"]]
-
-
-def search_again(searches: int, limits: tuple[float, float], attempt: Callable[[float], Trial | None]) -> list[Search]:
+def search_again(searches: int, limits: tuple[float, float], attempt: Callable[[float], Step | None]) -> list[Search]:
     """Search so often within the limits; `attempt` offers a rate, and returns None when there is no more time."""
     found: list[Search] = []
     near: tuple[float, float] | None = None
@@ -108,7 +100,7 @@ def search_again(searches: int, limits: tuple[float, float], attempt: Callable[[
             trial = attempt(rate)
             if trial is None:
                 return found
-            search.learn(rate, trial, kept=trial["meets"])
+            search.learn(rate, trial)
         found.append(search)
         if search.kept is not None and search.missed is not None:
             near = (search.kept, search.missed)

@@ -10,7 +10,6 @@ from typing import Any
 import diptest
 import numpy as np
 
-from loadtests.schedule.plan import SeriesName
 from loadtests.statistics.figures import named, rounded
 from loadtests.statistics.histogram import Floats, Histogram, edges_us, quantiles_us
 from loadtests.statistics.measured import Measured
@@ -44,11 +43,6 @@ def modes(histogram: Histogram) -> dict[str, Any] | None:
         if split is None
         else [rounded(float(np.median(side))) for side in (times[times <= split], times[times > split])],
     }
-
-
-def of_series(measured: Measured, entry: dict[str, Any]) -> dict[str, Any] | None:
-    """The `modes` of an entry of `series`."""
-    return modes(measured.total("duel", (entry["operation"], entry["interface"], entry["client"])).service)
 
 
 def _quantiles_ms(histogram: Histogram, points: int) -> Floats:
@@ -101,8 +95,9 @@ def heat_map(measured: Measured) -> dict[str, Any]:
     lowest, highest = float("inf"), 0.0
     for name in plan.series_names():
         columns: dict[int, Histogram] = {}
-        for start_s, histogram in _block_times(measured, name):
-            columns.setdefault(int(start_s / width_s + 1e-9), Histogram()).merge(histogram)
+        for block in measured.blocks(name, "duel"):
+            if block.cell.service.total:
+                columns.setdefault(int(block.start_s / width_s + 1e-9), Histogram()).merge(block.cell.service)
         held = [histogram for histogram in columns.values() if histogram.total]
         lowest = min([lowest, *(histogram.lowest_ns / 1e6 for histogram in held)])
         highest = max([highest, *(histogram.highest_ns / 1e6 for histogram in held)])
@@ -131,13 +126,3 @@ def _binned(histogram: Histogram, edges: Floats) -> list[int]:
     lower, width = edges_us(bins)
     found, _ = np.histogram((lower + width / 2) / 1e3, edges, weights=counts)
     return [int(count) for count in found]
-
-
-def _block_times(measured: Measured, name: SeriesName) -> list[tuple[float, Histogram]]:
-    """Each block of a series in the duel: its start in seconds, and its service times."""
-    offsets = {plan.repeat: plan.offset_s for plan in measured.plans}
-    return [
-        (offsets[place[0]] + segment.start_ns / 1e9, cell.service)
-        for place, segment, cell in measured.blocks("duel", name)
-        if cell.service.total
-    ]

@@ -18,9 +18,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from loadtests.statistics.histogram import Floats, Histogram, Ints, edges_us, quantiles_us
+from loadtests.statistics.histogram import SHARES, Floats, Histogram, Ints, edges_us, quantiles_us
 
-SHARES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
 #: Putting units together ends before there are fewer rounds than this: of seven independent rounds the correlation is
 #: as often as not estimated beyond 0.3 or below -0.3, and intervals came out three times as wide as they had to be.
 _FEWEST_ROUNDS = 12
