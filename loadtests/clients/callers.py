@@ -6,8 +6,8 @@ from typing import Any
 import gevent
 
 from conformance.packs.table1.thresholds import ApiStyle
-from loadtests.clients.failures import CallError, answer_error, is_success
-from loadtests.clients.library import LibraryRest, LibrarySoap
+from loadtests.clients.failures import CallError
+from loadtests.clients.library import LibraryRest, LibrarySoap, Sent
 from loadtests.clients.payloads import Values, variants
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import Bridge
@@ -35,9 +35,13 @@ class Workload:
     Args:
         operations: names, in the order in which arrivals number them.
         documents: parsed WSDLs by operation, for zeep.
+        sent: counts what the library clients put on the wire.
     """
 
-    def __init__(self, robot: Robot, operations: tuple[str, ...], seed: int, documents: dict[str, Any]) -> None:
+    def __init__(
+        self, robot: Robot, operations: tuple[str, ...], seed: int, documents: dict[str, Any], sent: Sent | None = None
+    ) -> None:
+        self.sent = sent or Sent()
         self.robot = robot
         self.operations = operations
         self.documents = documents
@@ -90,8 +94,7 @@ class Caller:
                 connects = connection.connects
                 built = now_ns()
                 answer = connection.call(request)
-                if not (is_success(answer.status) and request.expects in answer.body):
-                    raise _judged(answer.status, answer.headers.get(b"location"), answer.body, request.expects)
+                answer.require_good(request.expects)
                 done = now_ns()
                 received, timing = answer.received_ns, answer.headers.get(b"server-timing")
                 if connection.connects != connects:
@@ -113,10 +116,10 @@ class Caller:
             with gevent.Timeout(workload.robot.timeout_s):  # requests has no deadline for a body that drips
                 if interface == "rest":
                     if self._rest is None:
-                        self._rest = LibraryRest(workload.robot)
+                        self._rest = LibraryRest(workload.robot, workload.sent)
                     return self._rest.call(name, values)
                 if self._soap is None:
-                    self._soap = LibrarySoap(workload.robot, workload.documents)
+                    self._soap = LibrarySoap(workload.robot, workload.documents, workload.sent)
                 return self._soap.call(name, values)
         except gevent.Timeout:
             raise CallError("timeout", f"no complete answer within {workload.robot.timeout_s:g} s") from None
@@ -128,8 +131,3 @@ class Caller:
         for library in (self._rest, self._soap):
             if library is not None:
                 library.close()
-
-
-def _judged(status: int, location: bytes | None, body: bytes, expects: bytes) -> CallError:
-    where = location.decode("latin-1") if location else None
-    return answer_error(status, where, body, expects) or CallError("content", f"status {status}")

@@ -49,17 +49,19 @@ def connect_error(error: OSError, where: str) -> CallError:
     return CallError("network", f"{where}: {error.strerror or error}")
 
 
-def is_success(status: int) -> bool:
-    """Whether a status is a success (RFC 9110 section 15.3)."""
-    return _OK <= status < _MULTIPLE_CHOICES
+def require_good(status: int, location: str | None, body: bytes, expects: bytes = b"") -> None:
+    """Accept a 2xx response whose body contains `expects`.
+
+    Raises:
+        CallError: any other response; the message says what is wrong with it.
+    """
+    if not (_OK <= status < _MULTIPLE_CHOICES and expects in body):
+        raise _error(status, location, body, expects)
 
 
-def answer_error(status: int, location: str | None, body: bytes, expects: bytes) -> CallError | None:
-    """Judge an answer: None when it is a 2xx that holds the octets that it `expects`, if any."""
-    if is_success(status):
-        if expects not in body:
-            return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {shown(body)}")
-        return None
+def _error(status: int, location: str | None, body: bytes, expects: bytes) -> CallError:
+    if _OK <= status < _MULTIPLE_CHOICES:
+        return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {shown(body)}")
     if HTTPStatus.MULTIPLE_CHOICES <= status < HTTPStatus.BAD_REQUEST:  # RFC 9110 section 15.4: redirection
         return CallError("redirect", f"status {status} to {location!r}: give that address as the endpoint")
     if _FAULT.search(body):

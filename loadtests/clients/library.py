@@ -5,23 +5,21 @@ transport for each user. REST through `requests`. Both pass through one urllib3 
 on the wire: a request that was sent twice for one call is a silent resend, and the run says so.
 """
 
-import time
 from dataclasses import dataclass
 from typing import Any
 
 import requests
 import zeep
 from requests.adapters import HTTPAdapter
-from urllib3.connection import HTTPConnection, HTTPSConnection
 from zeep.transports import Transport
 from zeep.wsdl import Document
 
 from conformance.packs.table1.thresholds import Client
-from loadtests.clients.failures import CallError, answer_error, connect_error
+from loadtests.clients.failures import CallError, connect_error, require_good
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
 from loadtests.clients.robot import Robot
+from loadtests.clients.wire import now_ns
 
-now_ns = time.monotonic_ns
 #: What options and results call it, after the library that speaks SOAP; over REST it is requests.
 LIBRARY = Client.ZEEP
 
@@ -35,36 +33,44 @@ class Timed:
     timing: bytes | None
 
 
+@dataclass(slots=True)
 class Sent:
-    """Requests put on the wire by all library clients of this process, and calls that asked for them."""
+    """Counts the calls of library clients, and the requests that these put on the wire."""
 
-    requests = 0
-    calls = 0
+    requests: int = 0
+    calls: int = 0
 
-
-class _CountingHTTP(HTTPConnection):
-    def request(self, *args: Any, **kwargs: Any) -> None:
-        Sent.requests += 1
-        super().request(*args, **kwargs)
-
-
-class _CountingHTTPS(HTTPSConnection):
-    def request(self, *args: Any, **kwargs: Any) -> None:
-        Sent.requests += 1
-        super().request(*args, **kwargs)
+    @property
+    def resends(self) -> int:
+        """Return how many requests were sent beyond one for each call."""
+        return max(0, self.requests - self.calls)
 
 
 class _CountingAdapter(HTTPAdapter):
-    """Counts sends below urllib3's retrying."""
+    """Counts sends below urllib3's retries."""
+
+    def __init__(self, sent: Sent) -> None:
+        self._sent = sent
+        super().__init__()
 
     def init_poolmanager(self, *args: Any, **kwargs: Any) -> None:
         super().init_poolmanager(*args, **kwargs)
-        classes = self.poolmanager.pool_classes_by_scheme
-        http, https = classes["http"], classes["https"]
+        classes: dict[str, Any] = self.poolmanager.pool_classes_by_scheme
         self.poolmanager.pool_classes_by_scheme = {
-            "http": type("CountingHTTPPool", (http,), {"ConnectionCls": _CountingHTTP}),
-            "https": type("CountingHTTPSPool", (https,), {"ConnectionCls": _CountingHTTPS}),
+            scheme: type("CountingPool", (pool,), {"ConnectionCls": _counting(pool.ConnectionCls, self._sent)})
+            for scheme, pool in classes.items()
         }
+
+
+def _counting(base: Any, sent: Sent) -> Any:
+    """Return a class of connections that counts its requests."""
+
+    class Counting(base):  # type: ignore[misc]  # HTTPConnection or HTTPSConnection
+        def request(self, *args: Any, **kwargs: Any) -> None:
+            sent.requests += 1
+            super().request(*args, **kwargs)
+
+    return Counting
 
 
 class _Staying(requests.Session):
@@ -76,12 +82,18 @@ class _Staying(requests.Session):
         return None
 
 
-def new_session(robot: Robot, *, staying: bool = False) -> requests.Session:
-    """A `requests` session as a user would set it up for this robot; `staying` where it answers itself."""
+def new_session(robot: Robot, sent: Sent | None = None, *, staying: bool = False) -> requests.Session:
+    """Return a `requests` session as a user would set it up for this robot.
+
+    Args:
+        robot: its credentials.
+        sent: counts the requests.
+        staying: follow no redirect.
+    """
     session = _Staying() if staying else requests.Session()
     session.trust_env = False  # a proxy from the environment would be measured in the robot's place
-    session.mount("http://", _CountingAdapter())
-    session.mount("https://", _CountingAdapter())
+    for scheme in ("http://", "https://"):
+        session.mount(scheme, _CountingAdapter(sent or Sent()))
     if robot.ca_file:
         session.verify = robot.ca_file
     if robot.token:
@@ -115,9 +127,9 @@ def request_error(error: requests.RequestException, where: str, timeout_s: float
 class _TimedTransport(Transport):
     """zeep's transport, noting when a message leaves it and when the answer is back."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, sent: Sent) -> None:
         super().__init__(  # type: ignore[no-untyped-call]  # zeep annotates the class, not its constructor
-            session=new_session(robot, staying=True), timeout=robot.timeout_s, operation_timeout=robot.timeout_s
+            session=new_session(robot, sent, staying=True), timeout=robot.timeout_s, operation_timeout=robot.timeout_s
         )
         self.timed = Timed(0, 0, None)
 
@@ -126,9 +138,7 @@ class _TimedTransport(Transport):
         response = super().post(address, message, headers)  # type: ignore[no-untyped-call]  # as above
         self.timed.received_ns = now_ns()
         if response.is_redirect:
-            raise answer_error(
-                response.status_code, response.headers.get("Location"), response.content, b""
-            ) or CallError("redirect", f"status {response.status_code}")
+            require_good(response.status_code, response.headers.get("Location"), response.content)
         timing = response.headers.get("Server-Timing")
         self.timed.timing = timing.encode("latin-1") if timing else None
         return response
@@ -147,9 +157,10 @@ def read_document(location: str, robot: Robot) -> Document:
 class LibrarySoap:
     """A user's zeep client, with parsed WSDLs by operation that the process shares."""
 
-    def __init__(self, robot: Robot, documents: dict[str, Document]) -> None:
+    def __init__(self, robot: Robot, documents: dict[str, Document], sent: Sent) -> None:
         self._robot = robot
-        self._transport = _TimedTransport(robot)
+        self._sent = sent
+        self._transport = _TimedTransport(robot, sent)
         self._methods = {}
         for operation, document in documents.items():
             client = zeep.Client(document, transport=self._transport)
@@ -163,7 +174,7 @@ class LibrarySoap:
         Raises:
             CallError: the robot answered with a fault, or not at all.
         """
-        Sent.calls += 1
+        self._sent.calls += 1
         where = self._robot.address("soap", operation) or ""
         try:
             answer = self._methods[operation](**({"arg0": values} if values else {}))
@@ -195,9 +206,10 @@ def _binding(document: Document) -> str:
 class LibraryRest:
     """A user's REST client: requests, and the answer's JSON."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, sent: Sent) -> None:
         self._robot = robot
-        self._session = new_session(robot, staying=True)
+        self._sent = sent
+        self._session = new_session(robot, sent, staying=True)
         self._base = (robot.rest or "").rstrip("/")
 
     def call(self, operation: str, values: Values) -> Timed:
@@ -206,7 +218,7 @@ class LibraryRest:
         Raises:
             CallError: the answer is an error, or there is none.
         """
-        Sent.calls += 1
+        self._sent.calls += 1
         kind = CATALOGUE[operation]
         timed = Timed(0, 0, None)
         request = self._session.prepare_request(
@@ -218,11 +230,7 @@ class LibraryRest:
         except requests.RequestException as error:
             raise request_error(error, self._base, self._robot.timeout_s) from None
         timed.received_ns = now_ns()
-        failure = answer_error(
-            response.status_code, response.headers.get("Location"), response.content, kind.rest_expects
-        )
-        if failure is not None:
-            raise failure
+        require_good(response.status_code, response.headers.get("Location"), response.content, kind.rest_expects)
         if response.content:
             try:
                 response.json()

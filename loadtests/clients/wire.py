@@ -20,7 +20,7 @@ import httptools
 from gevent.hub import Waiter, get_hub
 
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, connect_error
+from loadtests.clients.failures import CallError, connect_error, require_good
 
 _READ = 1  # libev's EV_READ
 _CHUNK = 65_536
@@ -53,6 +53,15 @@ class Answer:
     body: bytes
     received_ns: int
     octets: int
+
+    def require_good(self, expects: bytes) -> None:
+        """Accept a 2xx response whose body contains `expects`.
+
+        Raises:
+            CallError: any other response.
+        """
+        location = self.headers.get(b"location")
+        require_good(self.status, location.decode("latin-1") if location else None, self.body, expects)
 
 
 class Connection:

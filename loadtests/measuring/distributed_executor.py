@@ -14,9 +14,10 @@ from locust.runners import STATE_MISSING, STATE_RUNNING, MasterRunner
 
 from loadtests.clients.library import LIBRARY
 from loadtests.clients.robot import Robot
+from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import Clocks, WorkerClock, clock_id
 from loadtests.measuring.errors import GeneratorError
-from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, new_environment, now_ns
+from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, new_environment
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Plan
 from loadtests.settings.settings import Generator

@@ -14,7 +14,7 @@ import numpy as np
 
 from conformance.packs.table1.delivery import COURIER, EXAMPLE, MESSAGE_FIELDS
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, answer_error
+from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import BUILDERS, Values
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import Bridge, bridge_requests
@@ -70,9 +70,7 @@ class Courier:
         request = self._request(way, values)
         began = now_ns()
         answer = self._connections[way].call(request)
-        failure = answer_error(answer.status, None, answer.body, request.expects)
-        if failure is not None:
-            raise failure
+        answer.require_good(request.expects)
         return began, answer.received_ns
 
     def _request(self, way: str, values: Values) -> Request:

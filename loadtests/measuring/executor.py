@@ -5,7 +5,6 @@ take their share of its schedule, and report what they recorded once a second; a
 it what it had not yet reported, and the result says so.
 """
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +16,7 @@ from locust.event import Events
 
 from loadtests.clients.library import LIBRARY
 from loadtests.clients.robot import Robot
+from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import WorkerClock
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.user_session import Session
@@ -26,7 +26,6 @@ from loadtests.statistics.recorder import Recorder
 _NS = 1_000_000_000
 LEAD_S = 0.3  # from the message to the plan's beginning
 REPORT_S = 1.0  # how often workers report
-now_ns = time.monotonic_ns
 
 
 class RobotUser(User):

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 import gevent
 import numpy as np
 
-from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, is_success
+from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Connection, now_ns
 from loadtests.schedule.plan import SeriesName
@@ -59,10 +58,7 @@ def after_pauses(
         return {}
     spacing = 1 / ceiling if ceiling else 0.0
     found = {name: Paused(spacing) for name in names}
-    connections = {
-        name: Connection(Endpoint.parse(robot.address(name[1], name[0]) or ""), robot.timeout_s, robot.tls)
-        for name in names
-    }
+    connections = {name: robot.http(name[1], name[0]) for name in names}
     rng = np.random.default_rng([seed, 8])
     try:
         for turn in range(turns):
@@ -88,11 +84,9 @@ def _one_turn(
         start = now_ns()
         try:
             answer = connection.call(request)
+            took = np.array([now_ns() - start])
+            answer.require_good(request.expects)
         except CallError:
-            paused.failed += 1
-            return
-        took = np.array([now_ns() - start])
-        if not (is_success(answer.status) and request.expects in answer.body):
             paused.failed += 1
             return
         if not first:

@@ -5,8 +5,8 @@ from typing import Any
 
 import requests
 
-from loadtests.clients.failures import UNREACHABLE, CallError, answer_error
-from loadtests.clients.library import LibraryRest, LibrarySoap, new_session, read_document
+from loadtests.clients.failures import UNREACHABLE, CallError
+from loadtests.clients.library import LibraryRest, LibrarySoap, Sent, new_session, read_document
 from loadtests.clients.payloads import CATALOGUE, variants
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Answer, now_ns
@@ -98,12 +98,7 @@ def _wire_call(robot: Robot, name: SeriesName, seed: int, findings: Findings) ->
     findings.slowest_s = max(findings.slowest_s, (answer.received_ns - began) / 1e9)
     server = answer.headers.get(b"server")
     findings.servers[interface] = server.decode("latin-1") if server else None
-    location = answer.headers.get(b"location")
-    failure = answer_error(
-        answer.status, location.decode("latin-1") if location else None, answer.body, request.expects
-    )
-    if failure is not None:
-        raise failure
+    answer.require_good(request.expects)
     findings.sizes[name] = (len(request.octets), answer.octets)
     return answer
 
@@ -111,12 +106,12 @@ def _wire_call(robot: Robot, name: SeriesName, seed: int, findings: Findings) ->
 def _library_call(robot: Robot, operation: str, interface: str, seed: int) -> None:
     values = variants(operation, seed)[0]
     if interface == "rest":
-        LibraryRest(robot).call(operation, values)
+        LibraryRest(robot, Sent()).call(operation, values)
         return
     location = robot.wsdl(operation) or ""
     try:
         document = read_document(location, robot)
-        client = LibrarySoap(robot, {operation: document})
+        client = LibrarySoap(robot, {operation: document}, Sent())
     except requests.RequestException as error:
         raise CallError("network", f"WSDL {location!r}: {error}") from None
     except CallError:

@@ -69,8 +69,10 @@ class Session:
         self._cpu: list[tuple[float, float]] = []
         self._block: tuple[int, float, float] | None = None
         self._callers: list[Caller] = []
+        self._sent = Sent()
         self._workloads = [
-            Workload(robot, operations, seed, _documents(robot, operations) if library else {}) for robot in robots
+            Workload(robot, operations, seed, _documents(robot, operations) if library else {}, self._sent)
+            for robot in robots
         ]
         self.pacer = Pacer(int(self._timeout_s * _NS), self._between, self._dropped)
         self.after_segment: Callable[[], None] | None = None
@@ -119,7 +121,7 @@ class Session:
             for caller in self._callers:
                 caller.close()
         self._cpu, self._block = [], None
-        Sent.requests = Sent.calls = 0  # what was sent to look around is no call of the run
+        self._sent.requests = self._sent.calls = 0
         gc.collect()
         gc.freeze()  # what exists now lives on: a collection in mid-run would look like a stall of the robot
         schedule = Schedule(plan, worker, plan.workers)
@@ -134,8 +136,7 @@ class Session:
         self.pacer.give_up()  # what is late by a whole deadline will not be started any more
         self._wait_for_answers()
         self.recorder.flush()
-        if Sent.requests > Sent.calls:
-            self.recorder.count("resends", Sent.requests - Sent.calls)
+        self.recorder.count("resends", self._sent.resends)
 
     def _wait_for_answers(self) -> None:
         """Until no request is under way; each has its own deadline."""

@@ -22,8 +22,9 @@ from gevent.event import Event
 
 from conformance.commandline.exit_codes import ExitCode
 from loadtests.clients.robot import Robot
+from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import answer_clock, clock_id
-from loadtests.measuring.executor import REPORT_S, new_environment, now_ns
+from loadtests.measuring.executor import REPORT_S, new_environment
 from loadtests.measuring.left_behind import LeftBehind
 from loadtests.measuring.user_session import Session
 from loadtests.schedule.plan import Plan

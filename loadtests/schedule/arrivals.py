@@ -68,14 +68,6 @@ class Schedule:
         """How many segments there are."""
         return len(self.plan.segments)
 
-    def starts_ns(self, segment: int) -> int:
-        """Offset at which a segment's requests may start: after the quiet gap."""
-        return self.plan.segments[segment].opens_ns
-
-    def ends_ns(self, segment: int) -> int:
-        """Offset of a segment's end."""
-        return self.plan.segments[segment].end_ns
-
     def operations(self, segment: int) -> tuple[int, ...]:
         """The operations that a segment's interface and client offer, by number."""
         found = self.plan.segments[segment]
@@ -100,7 +92,7 @@ class Schedule:
     def due_ns(self, segment: int) -> list[int]:
         """The offsets of all arrivals in a segment, over all workers, in order."""
         count = self._counts[segment]
-        start, end = self.starts_ns(segment), self.ends_ns(segment)
+        start, end = self.plan.segments[segment].opens_ns, self.plan.segments[segment].end_ns
         rng = self._rng(segment, 3)
         if self.plan.load.arrivals == "poisson":
             places = np.sort(rng.random(count))

@@ -148,9 +148,9 @@ class Pacer:
         if self._position < len(self._due):
             at = self._due[self._position][0]
         elif not self.open_model and self._closes == 0:
-            at = schedule.starts_ns(self._segment)
+            at = schedule.plan.segments[self._segment].opens_ns
         else:
-            at = schedule.ends_ns(self._segment)
+            at = schedule.plan.segments[self._segment].end_ns
         self._alarm.set(self._origin + at)
 
     def _ring(self) -> None:
@@ -186,7 +186,7 @@ class Pacer:
             self._closes = 0
             self._next_segment()
             return
-        self._closes = self._origin + schedule.ends_ns(self._segment)
+        self._closes = self._origin + schedule.plan.segments[self._segment].end_ns
         wanted = schedule.users()
         waiting, self._idle = self._idle[:wanted], self._idle[wanted:]
         for waiter in waiting:
