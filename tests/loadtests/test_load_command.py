@@ -266,7 +266,7 @@ def test_the_closed_model_and_the_histograms_while_they_grow(toy, load, wait_for
         ("--operation delivery", "--allow-motion"),
         ("--thresholds none.toml", "No such file"),
         ("none.toml", "No such file"),
-        ("--step-rates 1,x", "no list of rates"),
+        ("--step-rates 1,x", "not a list of rates"),
     ],
 )
 def test_usage_errors_touch_no_robot(load, options, message):
