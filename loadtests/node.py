@@ -17,7 +17,7 @@ LINGER_S = 600.0
 
 
 def main(words: list[str]) -> None:
-    """Take the role that the words say; ends with the exit code of `roaas load`."""
+    """Run as the master or as a worker; ends with the exit code of `roaas load`."""
     if "--worker" in words:
         _work(words)
         return
@@ -45,7 +45,7 @@ def _work(words: list[str]) -> None:
 
 
 def _value(words: list[str], option: str) -> str | None:
-    """An option's value, in either way of writing it."""
+    """Return an option's value, given as `--option value` or `--option=value`."""
     for word, following in zip(words, [*words[1:], ""], strict=True):
         if word == option:
             return following

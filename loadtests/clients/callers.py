@@ -17,7 +17,7 @@ _DURATION = re.compile(rb"([\w-]+)\s*;[^,]*?dur\s*=\s*\"?([0-9.]+)")
 
 
 def server_ns(timing: bytes | None) -> int:
-    """The time that a robot says it spent (Server-Timing, W3C), in ns; -1 where it says nothing.
+    """Return the time that a robot says it spent (Server-Timing, W3C), in ns; -1 where it does not say.
 
     The metric called `total` if there is one, else the longest: metrics may overlap, so no sum is taken.
     """
@@ -63,7 +63,7 @@ class Caller:
         self._soap: LibrarySoap | None = None
 
     def _wire(self, interface: str, operation: int) -> Connection | Bridge:
-        """The connection for an operation; those of one origin share it, as any HTTP client does."""
+        """Return the connection for an operation; operations of one origin share it, as in any HTTP client."""
         known = self._wires.get((interface, operation))
         if known is None:
             known = self.workload.bridge if interface == "rosbridge" else self._http(interface, operation)
@@ -84,7 +84,7 @@ class Caller:
     def perform(
         self, segment: int, interface: str, client: str, operation: int, payload: int, due: int, *, queued: bool
     ) -> bool:
-        """Make a request and record it, whatever comes of it; returns whether it succeeded."""
+        """Send a request and record its outcome; returns whether it succeeded."""
         recorder = self.recorder
         start = now_ns()
         try:

@@ -16,7 +16,7 @@ _FORBIDDEN = re.compile(r"[\x00-\x20\x7f]")  # RFC 3986 section 2: neither space
 
 
 class EndpointError(ValueError):
-    """A URL that no request can be sent to; the message shows it."""
+    """A URL that no request can be sent to; the message contains it."""
 
 
 @dataclass(frozen=True)
@@ -62,23 +62,23 @@ class Endpoint:
 
     @property
     def origin(self) -> tuple[str, str, int]:
-        """Scheme, host and port (RFC 9110 section 4.3.1): connections serve an origin."""
+        """Return scheme, host and port (RFC 9110 section 4.3.1); a connection serves one origin."""
         return self.scheme, self.host, self.port
 
     @property
     def authority(self) -> str:
-        """The Host header's value (RFC 9110 section 7.2): the port only where it is not the scheme's own."""
+        """Return the Host header's value (RFC 9110 section 7.2), with the port unless it is the scheme's default."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return host if self.port == DEFAULT_PORTS.get(self.scheme) else f"{host}:{self.port}"
 
     @property
     def url(self) -> str:
-        """The endpoint as a URL, without a trailing slash."""
+        """Return the endpoint as a URL, without a trailing slash."""
         return f"{self.scheme}://{self.authority}{self.path}"
 
 
 def tls_context(ca_file: Path | None) -> ssl.SSLContext:
-    """TLS as a careful client sets it up: certificate and host name are checked; `ca_file` adds trust.
+    """Return a TLS context that checks certificate and host name; `ca_file` adds trusted authorities.
 
     Raises:
         EndpointError: `ca_file` cannot be read or holds no certificate.

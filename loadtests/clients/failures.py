@@ -7,7 +7,7 @@ from http import HTTPStatus
 
 
 class CallError(Exception):
-    """A call that brought no good answer.
+    """A call without a good response.
 
     Attributes:
         kind: `refused`, `resolve`, `network`, `tls`, `closed`, `timeout`, `malformed`, `status`, `redirect`,
@@ -31,7 +31,7 @@ _MULTIPLE_CHOICES = int(HTTPStatus.MULTIPLE_CHOICES)
 
 
 def connect_error(error: OSError, where: str) -> CallError:
-    """What kept a connection from being made."""
+    """Return the error for a connection that could not be opened."""
     if isinstance(error, ssl.SSLCertVerificationError):
         return CallError(
             "tls",
@@ -73,6 +73,6 @@ def _error(status: int, location: str | None, body: bytes, expects: bytes) -> Ca
 
 
 def shown(body: bytes) -> str:
-    """The beginning of a body, for a message."""
+    """Return the beginning of a body, for a message."""
     text = body[:_SHOWN].decode("utf-8", "replace")
     return (text + " …" if len(body) > _SHOWN else text) or "(no body)"

@@ -26,7 +26,7 @@ LIBRARY = Client.ZEEP
 
 @dataclass(slots=True)
 class Timed:
-    """A call's moments: request built, answer received; and the robot's Server-Timing header, if any."""
+    """When a call's request was built and its response received; and the Server-Timing header, if any."""
 
     built_ns: int
     received_ns: int
@@ -74,10 +74,10 @@ def _counting(base: Any, sent: Sent) -> Any:
 
 
 class _Staying(requests.Session):
-    """A session that follows no redirect, for a request that goes elsewhere measures somebody else."""
+    """A session that follows no redirect: a redirected request would measure another server."""
 
     def get_redirect_target(self, resp: requests.Response) -> str | None:
-        """Nowhere."""
+        """Return None: there is no redirect to follow."""
         del resp
         return None
 
@@ -102,7 +102,7 @@ def new_session(robot: Robot, sent: Sent | None = None, *, staying: bool = False
 
 
 def request_error(error: requests.RequestException, where: str, timeout_s: float) -> CallError:
-    """What `requests` could not do, in our kinds."""
+    """Return the error of `requests` as one of our kinds."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and not isinstance(cause, requests.RequestException):
@@ -125,7 +125,7 @@ def request_error(error: requests.RequestException, where: str, timeout_s: float
 
 
 class _TimedTransport(Transport):
-    """zeep's transport, noting when a message leaves it and when the answer is back."""
+    """zeep's transport; notes when a message leaves it and when the response is back."""
 
     def __init__(self, robot: Robot, sent: Sent) -> None:
         super().__init__(  # type: ignore[no-untyped-call]  # zeep annotates the class, not its constructor
@@ -196,7 +196,7 @@ class LibrarySoap:
 
 
 def _binding(document: Document) -> str:
-    """The name of the contract's binding, whatever port names the robot chose."""
+    """Return the name of the contract's binding, whatever the robot calls its ports."""
     for name in document.bindings:
         if name.startswith(f"{{{NAMESPACE}}}"):
             return str(name)
@@ -204,7 +204,7 @@ def _binding(document: Document) -> str:
 
 
 class LibraryRest:
-    """A user's REST client: requests, and the answer's JSON."""
+    """A user's REST client: the requests library, and the response parsed as JSON."""
 
     def __init__(self, robot: Robot, sent: Sent) -> None:
         self._robot = robot

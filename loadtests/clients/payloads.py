@@ -22,7 +22,7 @@ Values = dict[str, float]
 
 @dataclass(frozen=True)
 class Operation:
-    """An operation's name on each side.
+    """One operation, as each interface knows it.
 
     Attributes:
         element: the SOAP request's wrapper element.
@@ -50,7 +50,7 @@ CATALOGUE = {
 
 
 def variants(operation: str, seed: int) -> list[Values]:
-    """The values of each variant; a read has none."""
+    """Return the values of each variant; a read has none."""
     code = CATALOGUE[operation].code
     if code is None:
         return [{} for _ in range(VARIANTS)]
@@ -62,7 +62,7 @@ def variants(operation: str, seed: int) -> list[Values]:
 
 
 def rest_path(values: Values) -> str:
-    """The resource's path below the base URL (Table 1 and the delivery application)."""
+    """Return the path of a resource below the base URL (Table 1 and the delivery application)."""
     if not values:
         return "/robot/pose/"
     places = "".join(f"/{name}/{values[field]!r}" for name, field in zip(PATH_NAMES, COORDINATES, strict=True))
@@ -70,7 +70,7 @@ def rest_path(values: Values) -> str:
 
 
 def soap_envelope(operation: str, values: Values) -> bytes:
-    """The SOAP 1.1 request, document/literal wrapped; the wrapper's child is the unqualified `arg0`."""
+    """Return a SOAP 1.1 request, document/literal wrapped, whose wrapper contains the unqualified `arg0`."""
     texts = {field: repr(int(value) if field == "message_code" else value) for field, value in values.items()}
     inner = "".join(f"<{field}>{texts[field]}</{field}>" for field in XSD_FIELDS if field in texts)
     argument = f"<arg0>{inner}</arg0>" if values else ""
@@ -86,7 +86,7 @@ def _authorization(token: str | None) -> str:
 
 
 def rest_request(endpoint: Endpoint, operation: str, values: Values, token: str | None) -> Request:
-    """A REST request as octets."""
+    """Return a REST request as bytes."""
     kind = CATALOGUE[operation]
     length = "Content-Length: 0\r\n" if kind.method == "PUT" else ""
     head = (
@@ -97,7 +97,7 @@ def rest_request(endpoint: Endpoint, operation: str, values: Values, token: str 
 
 
 def soap_request(endpoint: Endpoint, operation: str, values: Values, token: str | None) -> Request:
-    """A SOAP request as octets."""
+    """Return a SOAP request as bytes."""
     body = soap_envelope(operation, values)
     head = (
         f"POST {endpoint.path} HTTP/1.1\r\nHost: {endpoint.authority}\r\nAccept: text/xml\r\n"

@@ -14,7 +14,7 @@ from loadtests.clients.wire import Connection, Request
 
 @dataclass(frozen=True)
 class Robot:
-    """Addresses are URLs; None where the robot offers no such service.
+    """The robot's addresses, as URLs; None for services that it does not offer.
 
     Attributes:
         publishers, subscribers: the SOAP services' addresses.
@@ -37,14 +37,14 @@ class Robot:
 
     @cached_property
     def tls(self) -> Any:
-        """The TLS context, where an address needs one."""
+        """Return the TLS context, where an address needs one."""
         addresses = (self.rest, self.publishers, self.subscribers, self.rosbridge)
         if not any(address and address.startswith(("https:", "wss:")) for address in addresses):
             return None
         return tls_context(Path(self.ca_file) if self.ca_file else None)
 
     def address(self, interface: str, operation: str) -> str | None:
-        """Where an operation is called over an interface; None where it cannot be."""
+        """Return where an operation is called over an interface; None where the interface does not have it."""
         if interface == "rest":
             return self.rest
         if interface == "rosbridge":
@@ -52,11 +52,11 @@ class Robot:
         return self.publishers if CATALOGUE[operation].service == "publishers" else self.subscribers
 
     def wsdl(self, operation: str) -> str | None:
-        """The description of the SOAP service that has an operation."""
+        """Return the WSDL of the SOAP service that has an operation."""
         return self.publishers_wsdl if CATALOGUE[operation].service == "publishers" else self.subscribers_wsdl
 
     def offers(self, interface: str, client: str, operation: str) -> bool:
-        """Whether a client can call an operation over an interface: zeep needs the WSDL beside the address."""
+        """Return whether a client can call an operation over an interface; zeep needs the WSDL as well."""
         if self.address(interface, operation) is None:
             return False
         if interface == "rosbridge":
@@ -64,15 +64,15 @@ class Robot:
         return interface == "rest" or client == "wire" or self.wsdl(operation) is not None
 
     def http(self, interface: str, operation: str) -> Connection:
-        """A new connection to where REST or SOAP offer an operation; it opens at the first call."""
+        """Return a new connection for an operation over REST or SOAP; it opens at the first call."""
         return Connection(Endpoint.parse(self.address(interface, operation) or ""), self.timeout_s, self.tls)
 
     def bridge(self) -> Bridge:
-        """Likewise to rosbridge; only where there is one is it to be called."""
+        """Return a new connection to the rosbridge; it opens at the first call."""
         return Bridge(self.rosbridge or "", self.timeout_s, self.tls, self.token, self.delivery_topic)
 
     def requests(self, interface: str, operation: str, seed: int) -> list[Request]:
-        """The operation's variants as octets; empty where it is not offered."""
+        """Return the variants of an operation as bytes; empty where the robot does not offer it."""
         address = self.address(interface, operation)
         if address is None:
             return []

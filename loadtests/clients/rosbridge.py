@@ -46,7 +46,7 @@ Key = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class BridgeRequest(Request):
-    """A request over rosbridge: the message to send as JSON, and what of ROS answers it.
+    """A request over rosbridge: the JSON message to send, and which ROS message answers it.
 
     Attributes:
         topic: on which the answer comes.
@@ -58,7 +58,7 @@ class BridgeRequest(Request):
 
 
 def bridge_requests(values: list[dict[str, float]], topic: str) -> list[BridgeRequest]:
-    """The variants of an operation, deliveries to a topic; a variant without values asks for the pose."""
+    """Return the requests for deliveries to a topic; one without values reads the pose."""
     return [_publish(each, topic) if each else _READ for each in values]
 
 
@@ -72,7 +72,7 @@ _READ = BridgeRequest(b"", b'"pose"', ODOMETRY_TOPIC)
 
 
 class Bridge:
-    """A connection to rosbridge, for all users of a process; it is opened at the first call.
+    """A connection to rosbridge, shared by all users of a process; it opens at the first call.
 
     Args:
         url: ws or wss.
@@ -143,7 +143,7 @@ class Bridge:
         return answer
 
     def _match(self) -> None:
-        """Before the first delivery: become a publisher and a subscriber, and wait until they are likely to match."""
+        """Before the first delivery, become publisher and subscriber, and wait until they are likely to match."""
         if self._matched_ns is None:
             about = {"topic": self._delivery_topic, "type": _DELIVERY_TYPE}
             self._say({"op": "advertise", "id": "delivery", **about})
@@ -188,7 +188,7 @@ class Bridge:
             self._flush()
 
     def _flush(self) -> None:
-        """Put on the wire what the protocol has to send."""
+        """Send what the protocol has to send."""
         try:
             for data in self._protocol.data_to_send():
                 if data:
@@ -242,7 +242,7 @@ class Bridge:
             self._fail(CallError("fault", f"rosbridge: {shown(str(message.get('msg')).encode())}"))
 
     def _echoed(self, values: Any, answer: Answer) -> None:
-        """A delivery came back: whose it is, its values say. Those of other publishers are nobody's."""
+        """Hand a delivery that came back to the request with these values; ignore other publishers' deliveries."""
         try:
             key = tuple(float(values[name]) for name in MESSAGE_FIELDS)
         except (KeyError, TypeError, ValueError):
@@ -258,7 +258,7 @@ class Bridge:
             yield from waiting
 
     def _fail(self, failure: CallError) -> None:
-        """All that wait have failed: a status or a message without their id could mean any of them."""
+        """Fail all waiting requests: a status or message without an id could concern any of them."""
         for waiter in list(self._waiters()):
             waiter.set_exception(failure)
 
@@ -277,7 +277,7 @@ class Bridge:
 
 
 def bridge_endpoint(url: str) -> Endpoint:
-    """Where rosbridge listens.
+    """Return the endpoint of a rosbridge.
 
     Raises:
         EndpointError: no ws(s) URL, no host, a port out of range, or user information in it.

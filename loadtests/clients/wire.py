@@ -33,7 +33,7 @@ now_ns = time.monotonic_ns  # CLOCK_MONOTONIC, the clock of timerfd
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request as octets, and what a good answer's body holds."""
+    """A request as bytes, and what the body of a good response contains."""
 
     octets: bytes
     expects: bytes = b""
@@ -41,7 +41,7 @@ class Request:
 
 @dataclass(slots=True)
 class Answer:
-    """An answer and its moments.
+    """A response, and when it arrived.
 
     Attributes:
         received_ns: the last octet was read.
@@ -65,7 +65,7 @@ class Answer:
 
 
 class Connection:
-    """A persistent connection to one endpoint; one request at a time.
+    """A persistent connection to one endpoint, for one request at a time.
 
     Args:
         endpoint: where to.
@@ -94,7 +94,7 @@ class Connection:
         self._framed = False
 
     def call(self, request: Request) -> Answer:
-        """Send a request and wait for the whole answer.
+        """Send a request and wait for the complete response.
 
         Raises:
             CallError: whatever went wrong; the request was sent at most once.
@@ -137,7 +137,7 @@ class Connection:
         return answer
 
     def _is_closed(self) -> bool:
-        """Whether the robot has closed an idle connection, unseen yet because the loop was busy."""
+        """Return whether the robot has closed an idle connection, which the busy loop has not noticed yet."""
         try:
             return not self._socket.recv(1, gevent.socket.MSG_PEEK) if self.endpoint.scheme == "http" else False
         except BlockingIOError:
@@ -200,7 +200,7 @@ class Connection:
             waiter.switch(failure)
 
     def _take_in(self) -> CallError | None:
-        """Feed the parser; returns what is wrong, if anything."""
+        """Feed the parser; returns what is wrong with the response, if anything."""
         while True:
             data = self._socket.recv(_CHUNK)
             self._received = now_ns()
@@ -216,7 +216,7 @@ class Connection:
                 return None
 
     def _ended(self) -> CallError | None:
-        """The robot closed its side: an answer without length ends here (RFC 9112 section 6.3), else it is cut."""
+        """Handle the robot's close: a response without a length ends here (RFC 9112 section 6.3), any other is cut."""
         if self._octets and self._headers and not self._framed and not self._complete:
             self._complete = True
             self._drop_after = True

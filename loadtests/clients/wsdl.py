@@ -24,7 +24,7 @@ class WsdlError(ValueError):
 
 
 def fetch(location: str, robot: Robot) -> bytes:
-    """A WSDL's octets, from a file or a URL.
+    """Return the content of a WSDL, from a file or a URL.
 
     Raises:
         WsdlError: no such file, or the answer is no document.
@@ -46,7 +46,7 @@ def fetch(location: str, robot: Robot) -> bytes:
 
 
 def address_in(content: bytes, location: str, element: str) -> str:
-    """The address of the service whose port type offers an operation; `location` gives messages, and the host.
+    """Return the address of the service whose port type offers an operation.
 
     Raises:
         WsdlError: no XML, no WSDL, another service's WSDL, or no address in it.
@@ -80,7 +80,7 @@ def address_in(content: bytes, location: str, element: str) -> str:
 
 
 def with_addresses(robot: Robot) -> Robot:
-    """The robot with the addresses that only its WSDLs know.
+    """Return the robot with the addresses that only its WSDLs contain.
 
     Raises:
         WsdlError: a WSDL cannot be used.
@@ -96,7 +96,7 @@ def with_addresses(robot: Robot) -> Robot:
 
 
 def _reachable(url: str, location: str) -> str:
-    """An address that names the robot's own loopback, in a WSDL fetched from elsewhere, means that elsewhere."""
+    """Replace the loopback host in a WSDL that was fetched from another machine by that machine."""
     there, here = urlsplit(url), urlsplit(location)
     if here.scheme in {"http", "https"} and _is_own(there.hostname) and not _is_own(here.hostname):
         host = f"[{here.hostname}]" if ":" in (here.hostname or "") else here.hostname
@@ -105,7 +105,7 @@ def _reachable(url: str, location: str) -> str:
 
 
 def _is_own(host: str | None) -> bool:
-    """Whether a host can only mean the machine that names it: its loopback, or any of its addresses."""
+    """Return whether a host can only mean the machine that uses it: loopback, or any address."""
     if host is None or host == "localhost":
         return host is not None
     try:

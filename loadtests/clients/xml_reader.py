@@ -5,11 +5,11 @@ from lxml.etree import _Element
 
 
 class XmlError(ValueError):
-    """Octets that are no XML, or XML with a document type declaration; the message says which."""
+    """Content that is not XML, or XML with a document type declaration; the message says which."""
 
 
 def parse_xml(content: bytes) -> _Element:
-    """The root element.
+    """Return the root element.
 
     Raises:
         XmlError: not well-formed, or with a DOCTYPE (WS-I Basic Profile 1.1, R1008).

@@ -18,7 +18,7 @@ _STALL_S = 3.0  # the stall that the users of an open model outlast before arriv
 
 
 def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
-    """The plan of the duel, between interfaces or two robots, and notes on what cannot be measured."""
+    """Return the plan of the duel, between interfaces or two robots, and notes on what cannot be measured."""
     wanted = settings.selection
     workers = max(1, settings.generator.expect)
     interfaces, offers, missing = [], {}, set()
@@ -70,7 +70,7 @@ def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
 
 
 def users(settings: Settings, workers: int) -> int:
-    """How many users come up in all."""
+    """Return how many users to start in total."""
     load, steps = settings.load, settings.steps
     if load.users is not None and not steps.rates:
         return max(load.users, *steps.connections, 0)

@@ -41,7 +41,7 @@ from loadtests.statistics.recorder import Recorder
 
 
 def tell(message: str) -> None:
-    """A line for the person who waits."""
+    """Write a line of progress to standard error."""
     sys.stderr.write(message + "\n")
     sys.stderr.flush()
 
@@ -61,7 +61,7 @@ class Run:
         self._parent = os.getppid()
 
     def interrupt(self) -> None:
-        """Ctrl-C: end, keeping what there is."""
+        """End the run on Ctrl-C and keep what was measured; a second Ctrl-C ends at once."""
         if self.outcome.interrupted:
             os._exit(ExitCode.INTERRUPTED)  # asked for twice: not even for the result
         self.outcome.interrupted = True
@@ -69,7 +69,7 @@ class Run:
     # Before the measurement.
 
     def resolve(self) -> None:
-        """Read the addresses that only a WSDL knows, and make the plan.
+        """Read the addresses that only a WSDL contains, and make the plan.
 
         Raises:
             RunAborted: a WSDL is wrong, or nobody answers.
@@ -115,7 +115,7 @@ class Run:
     # The measurement.
 
     def measure(self) -> None:
-        """Come up, warm up, duel, step.
+        """Start the users, warm up, and carry out the duel and whatever else was asked for.
 
         Raises:
             RunAborted: the generator cannot work.
@@ -154,7 +154,7 @@ class Run:
                 self._load_more(plan, executor)
 
     def _load_more(self, plan: Plan, executor: Executor) -> None:
-        """What comes after the duel: the stepped load, the searches for the knee, more and more connections."""
+        """Carry out what follows the duel: steps, searches for the knee, more and more connections."""
         outcome = self.outcome
         load = RisingLoad(plan, executor, self.settings, lambda: outcome.interrupted, self._number, tell)
         outcome.steps += load.steps()
@@ -163,11 +163,11 @@ class Run:
 
     @property
     def _over(self) -> bool:
-        """Whether nothing more is to be measured."""
+        """Return whether the measurement has to end."""
         return self.outcome.interrupted or self.outcome.dead_at is not None
 
     def _repeat(self, plan: Plan, executor: Executor) -> Plan:
-        """Carry the duel out as often as asked for; returns the last one's plan."""
+        """Carry the duel out as often as asked for; returns the last plan."""
         repeats = self.settings.repeats
         for number in range(repeats.number):
             if number:
@@ -181,7 +181,7 @@ class Run:
         return plan
 
     def _start_anew(self, command: str | None, plan: Plan) -> None:
-        """Start the robot anew, where there is a command for it, and wait until it answers."""
+        """Restart the robot, where there is a command for it, and wait until it responds."""
         if command is None:
             return
         names, seed = plan.series_names(), self.settings.load.seed
@@ -191,7 +191,7 @@ class Run:
             raise RunAborted(ExitCode.UNREACHABLE, str(error)) from None
 
     def _follow_deliveries(self) -> None:
-        """Time deliveries until the application has them, where that was asked for."""
+        """Measure the time from request to application, where that was asked for."""
         wanted, outcome = self.settings.end_to_end, self.outcome
         if wanted is None or self._over:
             return
@@ -214,7 +214,7 @@ class Run:
 
     @staticmethod
     def _web(executor: Executor, host: str, port: int) -> None:
-        """Locust's web UI, watching; it starts and stops nothing here."""
+        """Show Locust's web UI, which only watches the run."""
         web = executor.environment.create_web_ui(host, port)
         gevent.sleep(0.2)
         if web.greenlet.ready():
@@ -222,7 +222,7 @@ class Run:
         tell(f"Locust's web UI: http://{host}:{port}")
 
     def _carry_out(self, plan: Plan, executor: Executor) -> None:
-        """Run a plan, watching for its end, Ctrl-C and the robot's death."""
+        """Carry out a plan until its end, Ctrl-C or the robot's death."""
         self._number(plan)
         carried = Carried(plan)
         self.outcome.carried.append(carried)
@@ -230,7 +230,7 @@ class Run:
         executor.run(plan, ceiling, lambda elapsed: self._watch(carried, executor.recorder, elapsed))
 
     def _watch(self, carried: Carried, recorder: Recorder, elapsed: float) -> bool:
-        """Whether to end now."""
+        """Report progress; returns whether to end now."""
         plan = carried.plan
         carried.elapsed_s = max(0.0, min(elapsed, plan.length_s))
         elapsed += plan.offset_s
@@ -249,7 +249,7 @@ class Run:
         return self.outcome.interrupted or self.outcome.dead_at is not None
 
     def _number(self, plan: Plan) -> None:
-        """Have the metrics know a plan's segments."""
+        """Tell the metrics which series a plan's segments belong to."""
         if self.collector is not None:
             self.collector.series_of.update(plan.series_of())
 
@@ -264,7 +264,7 @@ class Run:
 
 
 def carry_out(settings: Settings) -> CommandResult:
-    """Do a run and write its result."""
+    """Carry out a run and write its result."""
     logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of spawning fast, which is what we want
     run = Run(settings)
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -35,7 +35,7 @@ _MOST_RATE = 50.0  # deliveries per second
 
 @dataclass
 class Journeys:
-    """The deliveries over one way that were counted, in their rounds.
+    """The deliveries over one way, by round.
 
     Attributes:
         to_application_ns: from the request's start to the message in the application; None where it never came.
@@ -49,7 +49,7 @@ class Journeys:
 
 
 class Courier:
-    """Sends deliveries over each way, one at a time."""
+    """Sends deliveries, one at a time, over each way."""
 
     def __init__(self, robot: Robot, ways: tuple[str, ...], publisher: Probe) -> None:
         self._robot = robot
@@ -59,7 +59,7 @@ class Courier:
         }
 
     def send(self, way: str, values: Values) -> tuple[int, int | None]:
-        """Send a delivery; returns when that began, and when its answer was there.
+        """Send a delivery; returns when that began, and when its response was received.
 
         Raises:
             CallError: there is no good answer.
@@ -86,7 +86,7 @@ class Courier:
 
 
 def in_order(values: Values) -> tuple[float, ...]:
-    """A delivery's values in the order of the ROS message."""
+    """Return a delivery's values in the order of the ROS message."""
     return tuple(float(values[name]) for name in MESSAGE_FIELDS)
 
 
@@ -98,7 +98,7 @@ def end_to_end(
     stopped: Callable[[], bool],
     tell: Callable[[str], None],
 ) -> dict[str, Journeys]:
-    """Measure every way, the native one too; returns their journeys.
+    """Measure every way, publishing with rclpy included; returns their journeys.
 
     Raises:
         ProbeError: there is no ROS here, or nobody publishes deliveries in the domain.

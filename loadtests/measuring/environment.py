@@ -19,7 +19,7 @@ _PACKAGES = ("roaas", "locust", "gevent", "httptools", "zeep", "requests", "urll
 def describe(
     robot: Robot, output: Output, servers: dict[str, str | None], process: RobotProcess | None
 ) -> dict[str, Any]:
-    """The `environment` of latency.json.
+    """Return the `environment` of latency.json.
 
     Args:
         robot: addresses.

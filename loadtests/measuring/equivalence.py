@@ -18,7 +18,7 @@ _ODOMETRY = ("frame_id", "child_frame_id", "x", "y", "z", "w", "covariance", "se
 
 
 def request_difference(operation: str, rest: Request, soap: Request) -> str | None:
-    """Whether two requests, read back from their octets, ask for the same: None, or what differs.
+    """Return how two requests, read back from their bytes, differ; None where they ask for the same.
 
     Doubles are compared bit for bit, after each has been through its own text form.
     """
@@ -38,7 +38,7 @@ def request_difference(operation: str, rest: Request, soap: Request) -> str | No
 
 
 def requests_difference(operation: str, rest: Sequence[Request], soap: Sequence[Request]) -> str | None:
-    """The first variant in which the interfaces' requests differ; None too where an interface has none."""
+    """Return the first variant in which the interfaces' requests differ; None where one interface has none."""
     if not rest or not soap:
         return None
     for number, (over_rest, over_soap) in enumerate(zip(rest, soap, strict=True)):
@@ -49,7 +49,7 @@ def requests_difference(operation: str, rest: Sequence[Request], soap: Sequence[
 
 
 def pose_difference(rest: bytes, soap: bytes) -> str | None:
-    """Both answers have to carry a whole Odometry: a shorter one would win the duel by leaving out."""
+    """Return how two poses differ: both must be whole Odometry messages, or the shorter one would win the duel."""
     try:
         over_rest = Counter(_json_leaves(json.loads(rest)))
         found = parse_xml(soap).find(f".//{{{NAMESPACE}}}GetPoseResponse")
@@ -65,7 +65,7 @@ def pose_difference(rest: bytes, soap: bytes) -> str | None:
 
 
 def deliveries_missing(listed: list[Any], operation: str, sent: Values) -> list[str]:
-    """What was sent and is not in the robot's own list of the requests that it accepted."""
+    """Return what was sent and is missing from the robot's list of accepted requests."""
     return [
         f"{operation}: the robot does not list the request that was sent over {interface}"
         for interface in ("rest", "soap")

@@ -2,4 +2,4 @@
 
 
 class GeneratorError(Exception):
-    """The load generator cannot work: a port in use, workers that do not come up."""
+    """The load generator cannot work: a port is in use, or workers do not start."""

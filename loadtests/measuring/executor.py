@@ -29,7 +29,7 @@ REPORT_S = 1.0  # how often workers report
 
 
 class RobotUser(User):
-    """A user of the robot: takes requests from the pacer of its process and makes them."""
+    """A user that takes requests from its process's pacer and sends them."""
 
     @task
     def work(self) -> None:
@@ -39,7 +39,7 @@ class RobotUser(User):
 
 @dataclass(slots=True)
 class Member:
-    """A process of the executor, as the result tells of it.
+    """A process that generates load, as the result describes it.
 
     Attributes:
         state: `finished`, `lost`, or `late`: come when the schedule had been dealt out.
@@ -64,17 +64,17 @@ class Member:
 
 
 def new_environment() -> Any:
-    """Locust's environment with our user."""
+    """Return Locust's environment with our user."""
     return Environment(user_classes=[RobotUser], events=Events(), stop_timeout=0)
 
 
 def busiest(members: list[Member]) -> float | None:
-    """The busiest process's share of a core in the plan that was carried out last."""
+    """Return the busiest process's share of a core in the last plan."""
     return max((member.cpu_share for member in members if member.cpu_share is not None), default=None)
 
 
 class LocalExecutor:
-    """This process alone."""
+    """Generates the load in this process alone."""
 
     def __init__(self) -> None:
         self.environment = new_environment()
@@ -85,7 +85,7 @@ class LocalExecutor:
         self._session: Session | None = None
 
     def prepare(self, robots: Sequence[Robot], plan: Plan) -> None:
-        """Get ready: clients built, users waiting."""
+        """Build the clients and start the users."""
         session = Session(self.environment, robots, plan.operations, plan.load.seed, library=LIBRARY in plan.clients)
         self._session = self.environment.roaas_session = session
         self.recorder, self.pacing = session.recorder, session.pacer.pacing
@@ -96,7 +96,7 @@ class LocalExecutor:
                 gevent.sleep(0.01)
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
-        """Carry out a plan; `watch` is called with the seconds since its start, and True from it ends the plan."""
+        """Carry out a plan; `watch` receives the seconds since its start, and ends the plan by returning True."""
         session = self._session
         if session is None:
             raise GeneratorError("run before prepare")
@@ -118,7 +118,7 @@ class LocalExecutor:
             member.requests = sum(cell.service.total + cell.errors for cell in cells)
 
     def close(self) -> None:
-        """Let the users go."""
+        """Stop the users."""
         if self._session is not None:
             self._session.pacer.close()
         self.runner.quit()

@@ -18,7 +18,7 @@ FORMAT = "roaas-worker/1"
 
 
 class LeftBehind:
-    """Keeps all that a worker has reported, which is the master's no longer when it dies."""
+    """Keeps what a worker has reported, in case the master dies."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -27,7 +27,7 @@ class LeftBehind:
         self._place = (0, 0)
 
     def begin(self, plan: Plan, worker: int) -> None:
-        """Know the plan that what follows belongs to; steps are not among the figures."""
+        """Note the plan that the next reports belong to; steps are not among the figures."""
         self._place = (worker, plan.workers)
         if plan.step_rate is None:
             self.plans.append(plan)
@@ -38,11 +38,11 @@ class LeftBehind:
 
     @property
     def requests(self) -> int:
-        """How many requests are kept."""
+        """Return how many requests are kept."""
         return sum(cell.service.total + cell.errors for cell in self.recorder.cells.values())
 
     def write(self, why: str) -> Path | None:
-        """Write the file; None where there is nothing to write.
+        """Write the file; returns None where there is nothing to write.
 
         Raises:
             OSError: the folder does not take it.

@@ -15,14 +15,14 @@ from loadtests.statistics.histogram import Histogram, edges_us
 
 
 class LocustFeed:
-    """Adds to an environment's statistics."""
+    """Adds our requests to the statistics of a Locust environment."""
 
     def __init__(self, environment: Any, operations: tuple[str, ...]) -> None:
         self._environment = environment
         self._operations = operations
 
     def _entry(self, series: int, operation: int) -> tuple[str, str]:
-        """The method and the name under which Locust shows a series."""
+        """Return the method and the name under which Locust shows a series."""
         _, interface, client = SERIES[series]
         name = self._operations[operation]
         method = CATALOGUE[name].method if interface == "rest" else interface.upper()
@@ -51,7 +51,7 @@ class LocustFeed:
                 entry.response_times[time_ms] += count
 
     def failed(self, series: int, operation: int, error: CallError) -> None:
-        """Tell of a failed request."""
+        """Report a failed request."""
         if series >= 0:
             method, name = self._entry(series, operation)
             self._environment.events.request.fire(

@@ -17,7 +17,7 @@ _STEADY = frozenset({"performance"})
 
 @dataclass(frozen=True)
 class Moment:
-    """The machine's counters at one time, in seconds since it started; `at_s` is the sum over its processors."""
+    """The machine's counters at one time, in seconds since boot; `at_s` is the sum over all processors."""
 
     at_s: float
     steal_s: float
@@ -26,13 +26,13 @@ class Moment:
 
     @classmethod
     def now(cls) -> Self:
-        """Look."""
+        """Read the counters."""
         times = psutil.cpu_times()
         return cls(sum(times), getattr(times, "steal", 0.0), _throttled_s(), psutil.getloadavg())
 
 
 def conditions(before: Moment, after: Moment) -> tuple[dict[str, Any], list[str]]:
-    """The `machine` of latency.json's environment between two moments, and remarks on what spoils a run."""
+    """Return the `machine` of latency.json's environment between two moments, and remarks on disturbances."""
     passed = max(after.at_s - before.at_s, 1e-9)
     cpus = os.cpu_count() or 1
     steal = (after.steal_s - before.steal_s) / passed
@@ -71,7 +71,7 @@ def _read(path: Path) -> str | None:
 
 
 def _groups() -> list[Path]:
-    """The folders of this process's control group (cgroup v2) and of those above it."""
+    """Return the folders of this process's control group (cgroup v2) and of its parents."""
     text = _read(Path("/proc/self/cgroup")) or ""
     own = next((line[3:] for line in text.splitlines() if line.startswith("0::")), None)
     if own is None:
@@ -81,7 +81,7 @@ def _groups() -> list[Path]:
 
 
 def cpu_quota() -> float | None:
-    """The least number of CPUs that a control group of ours may use (cpu.max); None where there is no limit."""
+    """Return the lowest CPU quota of our control groups (cpu.max); None without one."""
     found = []
     for folder in _groups():
         words = (_read(folder / "cpu.max") or "").split()
@@ -91,7 +91,7 @@ def cpu_quota() -> float | None:
 
 
 def _throttled_s() -> float:
-    """For how long our control groups have been held back, at most."""
+    """Return for how long our control groups have been throttled, at most."""
     found = [0.0]
     for folder in _groups():
         for line in (_read(folder / "cpu.stat") or "").splitlines():

@@ -28,7 +28,7 @@ def buckets(histogram: Histogram) -> list[tuple[str, float]]:
 
 
 class Collector:
-    """Reads a recorder whenever Prometheus asks."""
+    """Reads a recorder whenever Prometheus scrapes."""
 
     def __init__(self, recorder: Callable[[], Recorder], operations: tuple[str, ...]) -> None:
         self._recorder = recorder
@@ -36,7 +36,7 @@ class Collector:
         self.series_of: dict[int, int] = {}
 
     def collect(self) -> Iterator[Metric]:
-        """What prometheus_client calls."""
+        """Yield the metrics, for prometheus_client."""
         recorder = self._recorder()
         recorder.flush()
         sums: dict[tuple[int, int], Cell] = {}

@@ -27,7 +27,7 @@ _SHARE = 0.2
 
 @dataclass
 class Paused:
-    """A series' service times after a pause and behind one another.
+    """A series' service times after a pause, and right behind one another.
 
     Attributes:
         spacing_s: the least time between two starts behind one another, where a limit asks for one.
@@ -48,7 +48,7 @@ def after_pauses(
     ceiling: float | None,
     stopped: Callable[[], bool],
 ) -> dict[SeriesName, Paused]:
-    """Measure the wire series after pauses and without, in turn; empty where a run of so many seconds is too short.
+    """Measure the wire series after pauses and without, alternately; empty where the run is too short for that.
 
     `ceiling` is the most requests per second that the robot may be given.
     """
@@ -76,7 +76,7 @@ def after_pauses(
 def _one_turn(
     robot: Robot, name: SeriesName, connection: Connection, turn: int, paused: Paused, *, first: bool
 ) -> None:
-    """A pause, a request, and others behind it; the first turn only opens the connection."""
+    """Pause, then send requests right behind one another; the first turn only opens the connection."""
     requests = robot.requests(name[1], name[0], turn)
     gevent.sleep(max(PAUSE_S, paused.spacing_s))
     for number in range(_BEHIND + 1):

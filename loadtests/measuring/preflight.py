@@ -16,7 +16,7 @@ from loadtests.schedule.plan import SeriesName
 
 @dataclass
 class Findings:
-    """What the calls before the run brought.
+    """The results of the calls before the run.
 
     Attributes:
         sizes: octets of request and response of each wire series.
@@ -36,17 +36,17 @@ class Findings:
 
     @property
     def unreachable(self) -> bool:
-        """Somebody who should be called cannot be reached."""
+        """Return whether a service could not be reached."""
         return any(failure.kind in UNREACHABLE for failure in self.failures.values())
 
     def messages(self) -> list[str]:
-        """The failures in words, each once."""
+        """Return the failures as sentences, each once."""
         worded = [f"{name[0]} over {name[1]} ({name[2]}): {failure}" for name, failure in self.failures.items()]
         return list(dict.fromkeys(worded))
 
 
 def preflight(robot: Robot, names: list[SeriesName], seed: int) -> Findings:
-    """Call each series once; compare what the interfaces send and get."""
+    """Call each series once, and compare what the interfaces send and receive."""
     findings = Findings()
     answers: dict[tuple[str, str], Answer] = {}
     for name in names:
@@ -67,7 +67,7 @@ def preflight(robot: Robot, names: list[SeriesName], seed: int) -> Findings:
 def _compare(
     robot: Robot, answers: dict[tuple[str, str], Answer], operations: list[str], seed: int, findings: Findings
 ) -> None:
-    """Note how what the interfaces send and get differs."""
+    """Note how the requests and responses of the interfaces differ."""
     differences = [
         requests_difference(name, robot.requests("rest", name, seed), robot.requests("soap", name, seed))
         for name in operations
@@ -122,7 +122,7 @@ def _library_call(robot: Robot, operation: str, interface: str, seed: int) -> No
 
 
 def _listed_deliveries(robot: Robot) -> list[Any] | None:
-    """What the robot says that it accepted, where it tells (GET /robot/app/delivery/, an extension)."""
+    """Return the robot's list of accepted requests, where it has one (GET /robot/app/delivery/, an extension)."""
     try:
         with new_session(robot) as session:
             answer = session.get(

@@ -18,7 +18,7 @@ MOST_RATE = 1000.0
 
 
 def leaves_the_robot_room(plan: Plan, processors: int) -> bool:
-    """Whether a plan's workers may come first: an open model at a moderate rate, and a processor that none of them has.
+    """Return whether the workers may run first: open model, moderate rate, and a processor left for the robot.
 
     The workers are taken to be all on this machine: of those elsewhere they do not know.
     """
@@ -28,7 +28,7 @@ def leaves_the_robot_room(plan: Plan, processors: int) -> bool:
 
 @contextmanager
 def first_in_line(*, wanted: bool) -> Iterator[bool]:
-    """This thread is scheduled before all usual ones while the context lasts; yields whether that was allowed.
+    """Run this thread before all ordinary ones while the context lasts; yields whether that was allowed.
 
     Processes that are started meanwhile do not inherit it.
     """

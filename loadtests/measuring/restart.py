@@ -17,7 +17,7 @@ _SHOWN = 300
 
 
 def start_anew(command: str, look: Callable[[], Findings], stopped: Callable[[], bool]) -> None:
-    """Run the command, and wait until everything that `look` calls is answered.
+    """Run the restart command, and wait until everything that `look` calls responds.
 
     Raises:
         GeneratorError: the robot did not come back; the message says why.
@@ -27,7 +27,7 @@ def start_anew(command: str, look: Callable[[], Findings], stopped: Callable[[],
 
 
 def _run(command: str) -> None:
-    """Run a command without a shell, and wait for its end."""
+    """Run a command without a shell, and wait until it ends."""
     words = shlex.split(command)
     try:
         done = subprocess.run(  # noqa: S603 -- the user's own command, given for this
@@ -51,7 +51,7 @@ def _run(command: str) -> None:
 
 
 def _until_ready(look: Callable[[], Findings], stopped: Callable[[], bool]) -> None:
-    """Call everything once, again and again, until all of it is answered."""
+    """Call everything repeatedly, until all of it responds."""
     deadline = time.monotonic() + _READY_S
     while True:
         findings = look()

@@ -42,7 +42,7 @@ class RisingLoad:
         self._interfaces = [n for n in self.first.interfaces if self._operation in self.first.offered(n, "wire")]
 
     def _run(self, interfaces: Sequence[str], *, rate: float | None = None, users: int | None = None) -> list[Step]:
-        """One plan, interface after interface, at a rate or with so many users; empty when there is to be an end."""
+        """Run one plan, interface after interface, at a rate or with some users; empty when the run has to end."""
         if self.stopped():
             return []
         load = replace(self.first.load, rate=rate, users=users, duration_s=self.settings.steps.step_s, warmup_s=0.0)
@@ -71,7 +71,7 @@ class RisingLoad:
         return results
 
     def steps(self) -> list[Step]:
-        """The `steps` of latency.json: up until no interface is left that keeps to the criterion."""
+        """Return the `steps` of latency.json: up to the rate at which no interface meets the criterion any more."""
         standing = self._interfaces
         found: list[Step] = []
         for rate in self.settings.steps.rates:
@@ -92,7 +92,7 @@ class RisingLoad:
         )
 
     def knees(self) -> list[dict[str, Any]]:
-        """Search each interface's knee, and that of both at once; empty where that was not asked for."""
+        """Search the knee of each interface, and of both together; empty where that was not asked for."""
         wanted = self.settings.steps
         if not wanted.knee_searches:
             return []
@@ -116,7 +116,7 @@ class RisingLoad:
         return found
 
     def over_connections(self) -> list[dict[str, Any]]:
-        """How latency and throughput grow with the number of connections that are always busy."""
+        """Return how latency and throughput grow with the number of busy connections."""
         found: list[dict[str, Any]] = []
         kept = ("interface", "client", "count", "errors", "p50_ms", "p99_ms", "max_ms", "cpu_share")
         for users in self.settings.steps.connections:

@@ -27,7 +27,7 @@ _AFTER_ERROR_S = 0.02  # closed model: users of a dead robot would spin on refus
 
 
 class _Sink:
-    """What callers record into: the recorder, with the run's clock for failures and Locust told of them."""
+    """Where callers record: the recorder, with the run's clock for failures, and Locust's statistics."""
 
     def __init__(self, session: "Session") -> None:
         self._session = session
@@ -49,7 +49,7 @@ class _Sink:
 
 
 class Session:
-    """A process's part in a run: operations by their plans' numbers, and whether plans may use the library client.
+    """One process's users, pacer and recorder.
 
     `robots` are those that segments name by their place: the one under load, and the one that it is compared with.
     """
@@ -78,7 +78,7 @@ class Session:
         self.after_segment: Callable[[], None] | None = None
 
     def work(self) -> None:
-        """What a user does until it is killed: take a request, make it, take the next."""
+        """Take a request, send it, and take the next, until killed: the loop of one user."""
         callers = [Caller(workload, _Sink(self)) for workload in self._workloads]
         self._callers += callers
         performs, take, segments = [caller.perform for caller in callers], self.pacer.take, self.segments
@@ -139,7 +139,7 @@ class Session:
         self.recorder.count("resends", self._sent.resends)
 
     def _wait_for_answers(self) -> None:
-        """Until no request is under way; each has its own deadline."""
+        """Wait until no request is under way; each has its own deadline."""
         with gevent.Timeout(self._timeout_s + 1, exception=False):
             while self._busy:
                 gevent.sleep(0.01)
@@ -152,7 +152,7 @@ class Session:
         self.recorder.drop(arrival.segment + self._first, arrival.operation, now_ns() - arrival.due_ns)
 
     def _between(self, index: int) -> None:
-        """In the gap before a segment: bin what was recorded, and look at the processor's time."""
+        """Bin what was recorded and read the processor's time, in the gap before a segment."""
         number = index + self._first
         now = self._look_at_processor(number)
         self.recorder.flush()
@@ -168,7 +168,7 @@ class Session:
             self.after_segment()
 
     def _look_at_processor(self, following: int | None) -> tuple[float, float]:
-        """Note the share of a core that the segment which is over took, before one that follows, if any does."""
+        """Note the share of a core that the last segment took, before the `following` one, if any."""
         now = (time.monotonic(), time.process_time())
         if self._block is not None and now[0] > self._block[1]:
             segment, began, spent = self._block
@@ -178,7 +178,7 @@ class Session:
 
 
 def _documents(robot: Robot, operations: tuple[str, ...]) -> dict[str, Any]:
-    """The parsed WSDL of each operation that zeep can call; a WSDL of several operations is read once."""
+    """Return the parsed WSDL of each operation that zeep can call; each WSDL is read once."""
     parsed: dict[str, Any] = {}
     documents: dict[str, Any] = {}
     for name in operations:

@@ -117,7 +117,7 @@ class Worker:
         self._heard = time.monotonic()
 
     def follow(self, parent: int | None) -> None:
-        """End this process when the master is gone: silent for too long, or, on its machine, no parent any more."""
+        """End this process when the master is gone: silent for too long, or no longer the parent process."""
         while True:
             gevent.sleep(_LOOK_S)
             if parent is not None and os.getppid() != parent:
@@ -126,7 +126,7 @@ class Worker:
                 self._end(f"nothing was heard of the master at {self.master} for {MASTER_SILENT_S:g} s")
 
     def _end(self, why: str) -> None:
-        """Stop sending, write down what there is, and end."""
+        """Stop sending, write what was recorded, and end."""
         if self.session is not None:
             self.session.stop()
         self._idle.wait()  # requests under way have deadlines
@@ -138,7 +138,7 @@ class Worker:
         _leave(ExitCode.INCONCLUSIVE, f"{why}: this worker ends; {kept}")
 
     def _packed(self) -> dict[str, Any]:
-        """Everything recorded since the last report, in parts."""
+        """Return everything recorded since the last report, in parts."""
         session = self.session
         waiting, self._report = self._report, None
         parts = [session.recorder.take()] if session else []
@@ -150,7 +150,7 @@ class Worker:
         }
 
     def _pack(self) -> None:
-        """In a gap between blocks, where it delays no request: get the next report ready."""
+        """Prepare the next report in a gap between blocks, where that delays no request."""
         if self._report is None and time.monotonic() - self._reported >= REPORT_S * 0.5:
             self._report = self._packed()
 
@@ -162,7 +162,7 @@ class Worker:
 
 
 def serve(host: str, port: int, tokens: Sequence[str | None], folder: Path, parent: int | None = None) -> None:
-    """Work until the master says quit, or is gone.
+    """Run a worker until the master quits or is gone.
 
     Args:
         host: where the master listens.
@@ -184,7 +184,7 @@ def serve(host: str, port: int, tokens: Sequence[str | None], folder: Path, pare
 
 
 def main() -> None:
-    """A worker of a master on this machine."""
+    """Run a worker of a master on this machine."""
     parent = os.getppid()
     told = json.loads(sys.stdin.readline() or "{}")
     gevent.signal_handler(signal.SIGINT, lambda: None)  # the master says when to stop

@@ -13,13 +13,13 @@ from typing import Any
 
 
 def say(answer: dict[str, Any]) -> None:
-    """A line to who started us."""
+    """Write a line of JSON to the parent process."""
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
 
 
 def main() -> int:
-    """Run the probe; 0 when its input ended, 3 when there is no ROS, or nobody on the topic."""
+    """Run the probe; returns 0 when its input ends, 3 without ROS or without a peer on the topic."""
     parser = argparse.ArgumentParser(prog="python -m loadtests.probe", description=__doc__)
     parser.add_argument("role", choices=["listen", "publish"])
     parser.add_argument("--domain-id", type=int, required=True)

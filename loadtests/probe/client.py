@@ -23,7 +23,7 @@ class ProbeError(Exception):
 
 
 class Probe:
-    """A process with a role on the graph, `listen` or `publish`; `await_ready` before anything else."""
+    """A process on the ROS graph, in the role `listen` or `publish`; call `await_ready` first."""
 
     def __init__(self, role: str, domain_id: int, topic: str) -> None:
         command = [sys.executable, "-m", "loadtests.probe", role, "--domain-id", str(domain_id), "--topic", topic]
@@ -45,7 +45,7 @@ class Probe:
         self._reader = gevent.spawn(self._listen)
 
     def await_ready(self) -> None:
-        """Wait until it is on the graph.
+        """Wait until the probe is on the graph.
 
         Raises:
             ProbeError: it does not start, for want of ROS or of the message package, or finds nobody.
@@ -53,7 +53,7 @@ class Probe:
         self.next(_START_S)
 
     def publish(self, values: tuple[float, ...]) -> int:
-        """Have a publisher publish a delivery; returns when it began to (CLOCK_MONOTONIC, ns).
+        """Publish a delivery; returns when that began (CLOCK_MONOTONIC, ns).
 
         Raises:
             ProbeError: it has ended.
@@ -67,7 +67,7 @@ class Probe:
         return int(self.next(_ANSWER_S)["sent_ns"])
 
     def arrival_ns(self, values: tuple[float, ...], within_s: float) -> int | None:
-        """When a listener got a delivery of these values; None where it does not come in time.
+        """Return when a listener received a delivery with these values; None where it does not come in time.
 
         Raises:
             ProbeError: it has ended.
@@ -81,7 +81,7 @@ class Probe:
         return None
 
     def next(self, within_s: float) -> dict[str, Any]:
-        """The next line.
+        """Return the next line.
 
         Raises:
             ProbeError: none comes in time, or it tells of a problem.

@@ -21,7 +21,7 @@ _DEPTH = 1000
 
 
 class DeliveryNode:
-    """A node on the topic of deliveries.
+    """A ROS node on the topic of deliveries.
 
     Args:
         domain_id: the robot's ROS domain.
@@ -42,7 +42,7 @@ class DeliveryNode:
         self._thread.start()
 
     def listen(self) -> str | None:
-        """Take the application's place, once somebody publishes deliveries; returns the problem, if there is one."""
+        """Subscribe in the application's place, once there is a publisher; returns the problem, if there is one."""
         if not self._found(lambda: self._node.count_publishers(self._topic)):
             return f"nobody publishes {self._topic} in ROS domain {self._context.get_domain_id()}"
         publishers = self._node.get_publishers_info_by_topic(self._topic)
@@ -54,7 +54,7 @@ class DeliveryNode:
         return None
 
     def publish_to(self) -> str | None:
-        """Become a publisher, once somebody listens; returns the problem, if there is one."""
+        """Become a publisher, once there is a subscriber; returns the problem, if there is one."""
         self._publisher = self._node.create_publisher(DeliveryRequestMsg, self._topic, QoSProfile(depth=_DEPTH))
         if not self._found(self._publisher.get_subscription_count):
             return f"nobody listens to {self._topic} in ROS domain {self._context.get_domain_id()}"

@@ -19,7 +19,7 @@ class BaselineError(ValueError):
 
 
 def folder_of(baselines: Path, name: str) -> Path:
-    """Where a baseline is kept.
+    """Return the folder of a baseline.
 
     Raises:
         BaselineError: no name for a folder.
@@ -30,7 +30,7 @@ def folder_of(baselines: Path, name: str) -> Path:
 
 
 def newest(folder: Path) -> Path:
-    """The result that was stored last.
+    """Return the result that was stored last.
 
     Raises:
         BaselineError: there is none.
@@ -42,7 +42,7 @@ def newest(folder: Path) -> Path:
 
 
 def store(result: Path, folder: Path) -> Path | None:
-    """Store a result; None where it is not valid, for nothing may be measured by it.
+    """Store a result; returns None for an invalid one, which nothing may be compared with.
 
     Raises:
         BaselineError: the folder cannot be written to.

@@ -8,7 +8,7 @@ from loadtests.statistics import figures
 
 
 def process_figures(members: list[Member]) -> tuple[list[dict[str, Any]], list[str]]:
-    """An entry for each process, and remarks."""
+    """Return an entry for each process, and remarks on those that did not do their share."""
     found, remarks = [], []
     for member in members:
         lost = member.state == "lost"
@@ -33,7 +33,7 @@ def process_figures(members: list[Member]) -> tuple[list[dict[str, Any]], list[s
 
 
 def _remarks(member: Member, missing: int | None) -> list[str]:
-    """Sentences on one process."""
+    """Return remarks on one process."""
     name, said = f"worker {member.id} ({member.host})", []
     if member.state == "lost":
         arrivals = "" if missing is None else f", {missing} of its arrivals were never made or never reported"

@@ -15,14 +15,14 @@ def _ms(value: float | None) -> str:
 
 
 def _times(entry: dict[str, Any]) -> str:
-    """A ratio with its interval."""
+    """Return a ratio with its interval."""
     bounds = entry["ci95"]
     sure = f" (95 %: {bounds[0]:.3f} to {bounds[1]:.3f})" if bounds else ""
     return f"{entry['ratio']:.3f}{sure} times"
 
 
 def summary(document: dict[str, Any]) -> str:
-    """A table of the series, the comparisons of medians, thresholds; at the end, where one looks, the headline."""
+    """Return a table of the series, the comparisons of medians, the thresholds, and the headline as the last line."""
     lines = ["operation  interface  client     count  errors  service p50      p90      p99  response p99   (ms)"]
     for entry in document["series"]:
         service, response = entry["service_ms"], entry["response_ms"]
@@ -46,7 +46,7 @@ def summary(document: dict[str, Any]) -> str:
 
 
 def _medians(document: dict[str, Any]) -> list[str]:
-    """Each interface's median beside REST's."""
+    """Return each interface's median beside REST's."""
     soap = [
         f"{entry['operation']} ({entry['client']}): SOAP takes {_times(entry)} as long as REST at the median, "
         f"{entry['soap_minus_rest_ms']:+.3f} ms: {_JUDGED[entry['judgement']]}"
@@ -63,7 +63,7 @@ def _medians(document: dict[str, Any]) -> list[str]:
 
 
 def _knees(document: dict[str, Any]) -> list[str]:
-    """Where the robot gives way, by steps and by bisection."""
+    """Return the rates at which the robot breaks down, by steps and by bisection."""
     lines = []
     for entry in document["knee"]:
         highest = entry["highest_rate"]
@@ -84,7 +84,7 @@ def _knees(document: dict[str, Any]) -> list[str]:
 
 
 def _against(compared: dict[str, Any] | None) -> list[str]:
-    """What the comparison with another robot found, a line for each figure that is judged."""
+    """Return what the comparison with another robot found, a line for each judged figure."""
     if compared is None:
         return []
     lines = []
@@ -99,7 +99,7 @@ def _against(compared: dict[str, Any] | None) -> list[str]:
 
 
 def _end_to_end(found: dict[str, Any] | None) -> list[str]:
-    """How long a delivery takes over each way until the application has it."""
+    """Return how long a delivery takes over each way until the application has it."""
     lines = []
     for entry in (found or {"ways": []})["ways"]:
         times, lost = entry["to_application_ms"], entry["lost"] + entry["errors"]

@@ -28,7 +28,7 @@ _TFD_FLAGS = os.O_NONBLOCK | os.O_CLOEXEC if hasattr(os, "O_CLOEXEC") else 0  # 
 
 
 class Alarm(Protocol):
-    """Calls back in the hub at the time that it was set to; setting it again replaces the earlier time."""
+    """Calls back in the hub at a given time; setting it again replaces the earlier time."""
 
     name: str
 
@@ -36,7 +36,7 @@ class Alarm(Protocol):
         """Ring at `at_ns` (time.monotonic_ns); a time gone by rings at once."""
 
     def close(self) -> None:
-        """Ring no more."""
+        """Cancel the alarm."""
 
 
 class _Timespec(ctypes.Structure):
@@ -48,7 +48,7 @@ class _Itimerspec(ctypes.Structure):
 
 
 class TimerfdAlarm:
-    """timerfd_create(2). Python has it as os.timerfd_create from 3.13 on; by ctypes it is the same everywhere."""
+    """timerfd_create(2), by ctypes: Python has os.timerfd_create only from 3.13 on."""
 
     name = "timerfd"
 
@@ -96,7 +96,7 @@ class TimerfdAlarm:
             raise OSError(ctypes.get_errno(), "timerfd_settime failed")
 
     def close(self) -> None:
-        """Ring no more."""
+        """Cancel the alarm."""
         if self._fd >= 0:
             self._awake.stop()
             self._awake.close()
@@ -123,7 +123,7 @@ class LoopAlarm:
         self._timer.start(self._ring, update=True)
 
     def close(self) -> None:
-        """Ring no more."""
+        """Cancel the alarm."""
         if self._timer is not None:
             self._timer.stop()
             self._timer.close()
@@ -131,5 +131,5 @@ class LoopAlarm:
 
 
 def make_alarm(ring: Callable[[], None]) -> Alarm:
-    """The best alarm of this system."""
+    """Return the best alarm of this system."""
     return TimerfdAlarm(ring) if sys.platform == "linux" else LoopAlarm(ring)

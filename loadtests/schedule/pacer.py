@@ -20,7 +20,7 @@ from loadtests.schedule.arrivals import Schedule
 
 
 class Arrival(NamedTuple):
-    """One request to make: where it stands in the plan, which operation, which payload, and when (monotonic ns).
+    """One request to send: its segment, operation and payload, and when it is due (monotonic ns).
 
     `queued`: no user was free when it was due, so that its delay is the robot's affair and not the pacer's.
     """
@@ -63,7 +63,7 @@ class Pacer:
 
     @property
     def waiting(self) -> int:
-        """Users that are ready to take a request."""
+        """Return how many users are ready to take a request."""
         return len(self._idle)
 
     def start(self, schedule: Schedule, origin_ns: int, *, open_model: bool, interval_ns: int = 0) -> None:
@@ -84,7 +84,7 @@ class Pacer:
         self.done.set()
 
     def give_up(self) -> None:
-        """Drop what nobody has started yet."""
+        """Drop the arrivals that no user has started yet."""
         while self._backlog:
             self.on_drop(self._backlog.popleft())
 
@@ -95,7 +95,7 @@ class Pacer:
         self._alarm.close()
 
     def take(self) -> Arrival:
-        """Wait for the next request to make. Called by a user."""
+        """Wait for the next request to send. Called by a user."""
         if self.open_model:
             while self._backlog:
                 late = self._backlog.popleft()
@@ -119,7 +119,7 @@ class Pacer:
         return arrival
 
     def _wait_turn(self, now: int) -> int:
-        """Keep the closed model below its ceiling; returns the time at which the caller may go on."""
+        """Keep the closed model below its ceiling; returns the time at which the caller may continue."""
         mine = max(self._free_at, now)
         self._free_at = mine + self.interval_ns
         if mine > now:
@@ -127,7 +127,7 @@ class Pacer:
         return now_ns()
 
     def _in_turn(self, schedule: Schedule, now: int) -> Arrival:
-        """The closed model's next request: operations one after the other, payloads likewise."""
+        """Return the closed model's next request: operations and payloads in rotation."""
         operations = schedule.operations(self._segment)
         self._turn += 1
         return Arrival(self._segment, operations[self._turn % len(operations)], self._turn // len(operations), now)
@@ -181,7 +181,7 @@ class Pacer:
         self._arm(schedule)
 
     def _open_gate(self, schedule: Schedule) -> None:
-        """The closed model: the segment begins, or is over."""
+        """Begin a segment of the closed model, or end it."""
         if self._closes:
             self._closes = 0
             self._next_segment()

@@ -69,18 +69,18 @@ class Segment:
 
     @property
     def opens_ns(self) -> int:
-        """Offset at which its requests may start: after the quiet gap."""
+        """Return the offset at which its requests may start: after the quiet gap."""
         return self.start_ns + min(int(GAP_S * _NS), (self.end_ns - self.start_ns) // 8)
 
     @property
     def active_s(self) -> float:
-        """For how long its requests may start."""
+        """Return for how long its requests may start."""
         return (self.end_ns - self.opens_ns) / _NS
 
 
 @dataclass(frozen=True)
 class Load:
-    """How much is asked of the robot, and for how long.
+    """How many requests the robot gets, and for how long.
 
     Attributes:
         rate: arrivals per second over all workers (open model); None in the closed model.
@@ -129,22 +129,22 @@ class Plan:
     least_block_s: float = BLOCK_S
 
     def as_message(self) -> dict[str, Any]:
-        """A form that msgpack carries."""
+        """Return the plan in a form that msgpack carries."""
         message: dict[str, Any] = msgspec.to_builtins(self)
         return message
 
     @classmethod
     def from_message(cls, message: dict[str, Any]) -> Self:
-        """Read what `as_message` wrote."""
+        """Return the plan that `as_message` wrote."""
         return msgspec.convert(message, cls)
 
     def offered(self, interface: str, client: str) -> tuple[int, ...]:
-        """The operations that a client can call over an interface, by number."""
+        """Return the numbers of the operations that a client can call over an interface."""
         found = self.offers.get(f"{interface}/{client}")
         return tuple(range(len(self.operations))) if found is None else tuple(found)
 
     def series_names(self) -> list[SeriesName]:
-        """Everything that is measured."""
+        """Return the names of everything that is measured."""
         return [
             (self.operations[number], interface, client)
             for client in self.clients
@@ -154,17 +154,17 @@ class Plan:
 
     @property
     def open_model(self) -> bool:
-        """Requests start at their times, whether or not earlier ones have come back."""
+        """Return whether requests start on schedule, whether or not earlier ones have been answered."""
         return self.load.users is None
 
     @cached_property
     def blocks(self) -> int:
-        """How many blocks the duel has: whole rounds, or half of one where there is no time for more."""
+        """Return how many blocks the duel has: whole rounds, or half of one where there is no time for more."""
         return len(self._rounds)
 
     @cached_property
     def _rounds(self) -> list[Segment]:
-        """The duel's blocks in their order, without their times."""
+        """Return the duel's blocks in order, without their times."""
         arrivals = _ARRIVALS_PER_BLOCK * len(self.operations)
         least = max(self.least_block_s, self.load.duration_s / _MAX_BLOCKS, arrivals / (self.load.rate or math.inf))
         most = int(self.load.duration_s / least + 1e-9)
@@ -179,16 +179,16 @@ class Plan:
 
     @property
     def block_s(self) -> float:
-        """Length of a block."""
+        """Return the length of a block."""
         return self.load.duration_s / self.blocks
 
     @cached_property
     def segments(self) -> list[Segment]:
-        """All segments in order; their numbers begin at `first_segment`."""
+        """Return all segments in order; their numbers begin at `first_segment`."""
         return self._steps() if self.step_rate is not None else [*self._warmup(), *self._duel()]
 
     def active_s(self, elapsed_s: float, phases: tuple[str, ...]) -> float:
-        """For how long requests of some phases may have started in the segments that were over by then."""
+        """Return for how long requests of some phases could start in the segments that had ended by then."""
         return sum(
             segment.active_s
             for segment in self.segments
@@ -196,7 +196,7 @@ class Plan:
         )
 
     def again(self) -> Self:
-        """The same once more, after this one, with the lots drawn anew."""
+        """Return the next repeat, after this one, with its random order drawn anew."""
         return replace(
             self,
             repeat=self.repeat + 1,
@@ -206,7 +206,7 @@ class Plan:
 
     @cached_property
     def length_s(self) -> float:
-        """From start to end."""
+        """Return the time from start to end."""
         return self.segments[-1].end_ns / _NS if self.segments else 0.0
 
     def _warmup(self) -> list[Segment]:
@@ -235,7 +235,7 @@ class Plan:
         return placed
 
     def _round(self, number: int, *, swapped: bool) -> list[Segment]:
-        """All sides in turn, and then in reverse: four blocks of two sides, six of three.
+        """Return the blocks of all sides in order and then in reverse: four blocks of two sides, six of three.
 
         Of five rounds the second goes to the library clients, the third and the fifth to A/A.
         """
@@ -263,7 +263,7 @@ class Plan:
         ]
 
     def _steps(self) -> list[Segment]:
-        """One step of the stepped load: each interface for `duration_s`, with quiet between to drain what piled up."""
+        """Return one step: each interface for `duration_s`, with a pause between for queues to drain."""
         made = []
         at = 0.0
         for interface in self.interfaces:
@@ -275,7 +275,7 @@ class Plan:
         return made
 
     def series_of(self) -> dict[int, int]:
-        """The series number of each segment."""
+        """Return the series number of each segment."""
         return {
             self.first_segment + index: SERIES.index((segment.phase, segment.interface, segment.client))
             for index, segment in enumerate(self.segments)
@@ -292,6 +292,6 @@ SERIES = [
 
 
 def step_operation(operations: tuple[str, ...]) -> int:
-    """The operation of the stepped load: a read where there is one, for it goes far beyond what is usual."""
+    """Return the operation of the steps: a read where there is one, because their rates are unusually high."""
     reads = [number for number, name in enumerate(operations) if name not in MOVES]
     return reads[0] if reads else 0

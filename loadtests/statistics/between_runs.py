@@ -21,7 +21,7 @@ _REACH = 1.959964  # standard deviations to either side hold 95 %
 
 
 def between_runs(machine: dict[str, Any], cpus: int, repeats: int) -> float:
-    """The standard deviation to reckon with, by the `machine` of the environment; 0 where repeats show it."""
+    """Return the standard deviation between runs, by the `machine` of the environment; 0 where repeats show it."""
     if repeats >= LEAST_REPEATS:
         return 0.0
     load = machine["load_average_before"]
@@ -29,14 +29,14 @@ def between_runs(machine: dict[str, Any], cpus: int, repeats: int) -> float:
 
 
 def widened_ratio(ratio: float, interval: Interval, deviation: float) -> Interval:
-    """A ratio's interval with the deviation between runs in it: variances add, on the logarithmic scale."""
+    """Widen a ratio's interval by the deviation between runs: variances add, on the logarithmic scale."""
     low, high = (math.log(bound / ratio) for bound in interval)
     reach = _REACH * deviation
     return ratio * math.exp(-math.hypot(min(low, 0.0), reach)), ratio * math.exp(math.hypot(max(high, 0.0), reach))
 
 
 def widened_difference(difference: float, interval: Interval, deviation_ms: float) -> Interval:
-    """Likewise a difference's, by a deviation in milliseconds."""
+    """Widen a difference's interval likewise, by a deviation in milliseconds."""
     low, high = (bound - difference for bound in interval)
     reach = _REACH * deviation_ms
     return difference - math.hypot(min(low, 0.0), reach), difference + math.hypot(max(high, 0.0), reach)

@@ -24,7 +24,7 @@ Journey = Sequence[int | None]
 def ways(
     arrivals: Mapping[str, Journey], answers: Mapping[str, Journey], errors: Mapping[str, int], waited_ns: int
 ) -> list[dict[str, Any]]:
-    """An entry for each way.
+    """Return an entry for each way.
 
     Args:
         arrivals: nanoseconds from the request's start to the application, by round; None where it never came.
@@ -61,7 +61,7 @@ def _way(way: str, times: Journey, answers: Journey, errors: int, waited_ns: int
 
 
 def _over(times: Journey, base: Journey) -> dict[str, Any]:
-    """The median of the ratios of neighbours, and its interval from their order (the sign test's).
+    """Return the median of the ratios of neighbours, and its interval by their order (the sign test's).
 
     One that never arrived took longer than any; of two that did not nothing is known.
     """

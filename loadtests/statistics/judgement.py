@@ -18,7 +18,7 @@ _SHARP = 2.0
 
 @dataclass(frozen=True)
 class Judgement:
-    """What may be said.
+    """What may be claimed.
 
     Attributes:
         verdict: `differs`: the ratio is what it is, within its interval; `bounded`: it is beyond `bound`; `noise`: no
@@ -33,7 +33,7 @@ class Judgement:
 
 
 def judge(ratio: float, effect: Interval | None, noise: Interval | None) -> Judgement:
-    """Judge a ratio by its 95 % interval and by that of an interface against itself."""
+    """Judge a ratio by its 95 % interval and by the interval of the A/A control."""
     if effect is None or noise is None:
         return Judgement("none", reason=f"the run is too short for an {'' if effect is None else 'A/A '}interval")
     if ratio < 1:  # the same question from the other side
@@ -54,7 +54,7 @@ def judge(ratio: float, effect: Interval | None, noise: Interval | None) -> Judg
 
 
 def _beyond_bias(ratio: float, low: float, noise: Interval) -> float:
-    """The least ratio that is left when the bias that the A/A run shows is taken off.
+    """Return the least ratio that is left after the bias that the A/A control shows.
 
     Ratio and bias are known by their intervals, each by blocks of its own, so that their uncertainties add as variances
     do (JCGM 100:2008, GUM, 5.1.2), on the logarithmic scale. Which way the bias goes is not known: the worse is taken.

@@ -20,7 +20,7 @@ _NEAR = 1.5  # how far from an earlier search's bracket the next one begins
 
 @dataclass
 class Search:
-    """One search for the highest rate that is kept.
+    """One search for the highest rate that meets the criterion.
 
     Attributes:
         lowest, highest: rates to stay within.
@@ -37,7 +37,7 @@ class Search:
     trials: dict[float, Step] = field(default_factory=dict)
 
     def next_rate(self) -> float | None:
-        """The rate to try next; None when the bracket is narrow enough, or an end of what is allowed is reached."""
+        """Return the rate to try next; None when the bracket is narrow enough, or a limit is reached."""
         if self.kept is None and self.missed is None:
             return self._within(self.near[0] / _NEAR if self.near else self.lowest)
         if self.missed is None:
@@ -48,7 +48,7 @@ class Search:
         return None if self.missed / self.kept <= RESOLUTION else math.sqrt(self.kept * self.missed)
 
     def learn(self, rate: float, trial: Step) -> None:
-        """Take a trial in."""
+        """Add the result of a trial."""
         self.trials[rate] = trial
         if trial.meets:
             self.kept = max(rate, self.kept or rate)
@@ -56,7 +56,7 @@ class Search:
             self.missed = min(rate, self.missed or rate)
 
     def estimate(self) -> float | None:
-        """The knee: between the ends of the bracket; None where one of them was not found."""
+        """Return the knee, between the ends of the bracket; None where an end was not found."""
         return None if self.kept is None or self.missed is None else math.sqrt(self.kept * self.missed)
 
     def _within(self, rate: float) -> float:
@@ -91,7 +91,7 @@ def knee_search(interface: str, criterion: str, searches: list[Search]) -> dict[
 
 
 def search_again(searches: int, limits: tuple[float, float], attempt: Callable[[float], Step | None]) -> list[Search]:
-    """Search so often within the limits; `attempt` offers a rate, and returns None when there is no more time."""
+    """Search several times within the limits; `attempt` tries a rate, and returns None when time is up."""
     found: list[Search] = []
     near: tuple[float, float] | None = None
     for _ in range(searches):

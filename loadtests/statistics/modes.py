@@ -25,7 +25,7 @@ _COLUMNS, _ROWS = 40, 24  # of the heat map: as many as a page can draw without 
 
 
 def modes(histogram: Histogram) -> dict[str, Any] | None:
-    """The `modes` of a series of latency.json; None where there are too few samples to speak of."""
+    """Return the `modes` of a series of latency.json; None where there are too few samples."""
     if histogram.total < _FEWEST:
         return None
     times = _quantiles_ms(histogram, min(_POINTS, histogram.total))
@@ -59,7 +59,7 @@ def _share_above(histogram: Histogram, limit_ms: float) -> float:
 
 
 def _valley_ms(times: Floats) -> float | None:
-    """Where two modes part, if they do."""
+    """Return where two modes part, if they do."""
     logs = np.log(times)
     counts, edges = np.histogram(logs, _BINS)
     smooth = counts.astype(np.float64)
@@ -87,7 +87,7 @@ def _two_sides(times: Floats, split: float) -> bool:
 
 
 def heat_map(measured: Measured) -> dict[str, Any]:
-    """The `heat_map` of latency.json: how many requests took how long, when; rows of time, columns of latency."""
+    """Return the `heat_map` of latency.json: how many requests took how long, when."""
     plan = measured.plan
     last = measured.plans[-1]
     width_s = max(1.0, (last.offset_s + last.length_s) / _COLUMNS)

@@ -53,7 +53,7 @@ class Cell:
         self.dropped += other.dropped
 
     def histograms(self) -> dict[str, Histogram]:
-        """Its histograms by name."""
+        """Return its histograms by name."""
         return {name: getattr(self, name) for name in _HISTOGRAMS}
 
 
@@ -62,7 +62,7 @@ _HISTOGRAMS = ("service", "response", "failed_service", "failed_response", "queu
 
 @dataclass(slots=True)
 class Spans:
-    """Where the time of a series went, and how late the generator started it."""
+    """Where the time of a series went, and how late the generator started its requests."""
 
     build: Histogram = field(default_factory=Histogram)
     wire: Histogram = field(default_factory=Histogram)
@@ -71,7 +71,7 @@ class Spans:
     lag: Histogram = field(default_factory=Histogram)
 
     def parts(self) -> dict[str, Histogram]:
-        """The histograms by name."""
+        """Return the histograms by name."""
         return {name: getattr(self, name) for name in ("build", "wire", "server", "parse", "lag")}
 
     def merge(self, other: Self) -> None:
@@ -90,7 +90,7 @@ class Failure:
     last_ns: int
 
     def merge(self, other: Self) -> None:
-        """Add another one of the kind."""
+        """Add further failures of this kind."""
         if other.first_ns < self.first_ns:
             self.message = other.message
         self.count += other.count
@@ -172,7 +172,7 @@ class Recorder:
             known.merge(failure)
 
     def drop(self, segment: int, operation: int, age_ns: int = 0) -> None:
-        """Record an arrival that nobody started before its deadline, `age_ns` after it was due."""
+        """Record an arrival that was not started before its deadline, `age_ns` after it was due."""
         cell = self.cells[segment, operation]
         cell.dropped += 1
         age = np.array([age_ns])
@@ -180,7 +180,7 @@ class Recorder:
         cell.failed_response.record(age)
 
     def was_busy(self, segment: int, share: float) -> None:
-        """Record the share of a core that the generator's process used during a segment; the busiest one's counts."""
+        """Record a generator process's share of a core during a segment; the highest one is kept."""
         self.busy[segment] = max(share, self.busy.get(segment, 0.0))
 
     def count(self, name: str, number: int = 1) -> None:
@@ -232,7 +232,7 @@ class Recorder:
             self.was_busy(segment, share)
 
     def take(self) -> dict[str, Any]:
-        """Hand over everything in a form that msgpack carries, and begin anew."""
+        """Return everything in a form that msgpack carries, and begin again."""
         self.flush()
         packed = {
             "cells": [
@@ -260,7 +260,7 @@ class Recorder:
 
     @classmethod
     def unpack(cls, packed: dict[str, Any]) -> Self:
-        """Read what `take` handed over."""
+        """Return the recorder that `take` packed."""
         made = cls()
         for segment, operation, parts, errors, late, dropped in packed["cells"]:
             histograms = {name: Histogram.unpack(part) for name, part in parts.items()}

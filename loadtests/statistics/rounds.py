@@ -32,7 +32,7 @@ _LEAST_FOR_LAG = 6
 
 
 class Unit(NamedTuple):
-    """A pair of the plan's blocks: in which repeat it ran, and one histogram for each side that is compared."""
+    """A pair of the plan's blocks: its repeat, and one histogram for each side that is compared."""
 
     repeat: int
     sides: tuple[Histogram, ...]
@@ -54,7 +54,7 @@ class Sample:
 
     @classmethod
     def of(cls, units: Sequence[Unit]) -> Self:
-        """From units, of which there has to be one, in order of time."""
+        """Return a sample from units, at least one, in order of time."""
         arrays = [[side.arrays() for side in unit.sides] for unit in units]
         occupied = np.unique(np.concatenate([bins for sides in arrays for bins, _ in sides]))
         counts = np.zeros((len(arrays[0]), len(units), len(occupied)))
@@ -65,11 +65,11 @@ class Sample:
 
     @property
     def size(self) -> int:
-        """How many units."""
+        """Return how many units there are."""
         return int(self.counts.shape[1])
 
     def statistic_ms(self, weights: Floats, name: str) -> Floats:
-        """The mean or a quantile of weighted sums of units.
+        """Return the mean or a quantile of weighted sums of units.
 
         Args:
             weights: how often each unit counts, shape (resamples, units).
@@ -81,7 +81,7 @@ class Sample:
         return np.array([_statistic_ms(self.bins, weights @ side, name) for side in self.counts])
 
     def influence(self, name: str) -> Floats:
-        """What each unit contributes to the figure's error, shape (units,): of two sides the second less the first."""
+        """Return each unit's contribution to the figure's error, shape (units,); of two sides the difference."""
         whole = self.statistic_ms(np.ones((1, self.size)), name)[:, 0]
         lower, width = edges_us(self.bins)
         found = []
@@ -131,13 +131,13 @@ class Rounds:
 
     @property
     def widening(self) -> float:
-        """By how much what is left of the correlation makes an interval wider, 1 or more."""
+        """Return by how much the remaining correlation widens an interval, 1 or more."""
         left = min(max(self.correlation or 0.0, 0.0), _MOST)
         return math.sqrt((1 + left) / (1 - left))
 
 
 def lag_correlation(values: Floats, repeats: Ints) -> float | None:
-    """The correlation of each value with the one after it, within repeats; None where there are too few values.
+    """Return the correlation of each value with the next, within repeats; None where there are too few values.
 
     A short series makes it look smaller than it is; that is put right to first order (Marriott and Pope 1954).
     """
@@ -173,7 +173,7 @@ def in_rounds(sample: Sample, name: str) -> Rounds:
 
 
 def _first_of_each(repeats: Ints, length: int) -> Ints:
-    """The first unit of each round of so many; what is over at a repeat's end goes to its last round."""
+    """Return the first unit of each round; what is left at a repeat's end goes to its last round."""
     first: list[int] = []
     for repeat in np.unique(repeats).tolist():
         members = np.flatnonzero(repeats == repeat)
