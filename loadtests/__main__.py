@@ -1,9 +1,9 @@
 """The process that measures: `python -m loadtests`.
 
-On its standard input stand the name of the file into which it puts the result's path, and the settings as JSON.
+Its standard input contains the name of the file into which it writes the result's path, and the settings as JSON.
 
-It is a process of its own because importing Locust makes gevent replace the sockets, locks and sleeps of
-everything in the process: front door, reports and tests keep the real ones.
+It is a process of its own because importing Locust makes gevent replace the sockets, locks and sleeps of the whole
+process: front door, reports and tests keep the real ones.
 """
 
 import signal

@@ -1,8 +1,8 @@
 """Users for plain Locust, with its web UI: `locust -f loadtests/locustfile.py --rest URL`.
 
-Closed users of both interfaces, wire and library clients, as many of each as the UI is told. Locust's buckets of
-whole milliseconds are replaced by microseconds, so that its percentiles say something at a robot's speed. For
-figures to rely on (open model, alternating blocks, intervals) there is `roaas load`.
+Closed-model users of both interfaces, with wire and library clients, as many of each as the web UI asks for. Locust's
+buckets of whole milliseconds are replaced by microseconds, because a robot responds in less than one. For reliable
+figures (open model, alternating blocks, intervals) use `roaas load`.
 """
 
 from typing import Any
@@ -87,7 +87,7 @@ def settings_of(options: Any) -> Settings:
     """Return settings from Locust's options, checked as `roaas load` checks its own.
 
     Raises:
-        SettingsError: see there.
+        SettingsError: the options do not make a run.
     """
     names = [name.replace("-", "_") for name in (*_TEXTS, *_FILES)]
     given = {name: getattr(options, name) for name in names}
@@ -100,7 +100,7 @@ def workload_of(options: Any) -> Workload:
     """Return what all users share: requests built beforehand, WSDLs parsed.
 
     Raises:
-        StopTest: the options do not lead to a robot; the message says why.
+        StopTest: the options do not make a run; the message says why.
     """
     try:
         robot = with_addresses(settings_of(options).robot)

@@ -1,8 +1,8 @@
-"""A load test's master or one of its workers, as the Locust operator for Kubernetes starts them.
+"""A master or a worker of a load test, as the Locust operator for Kubernetes starts them.
 
-The operator runs one image as `--master ARGS` once and as `--worker --master-host SERVICE ARGS` as often as asked,
-with the same ARGS. Here ARGS are those of `roaas load`; the worker passes over what only the master needs. When the
-master is done it lingers, for its pod and the result in it vanish with it.
+The operator runs one image as `--master ARGS` once and as `--worker --master-host SERVICE ARGS` as often as wanted,
+with the same ARGS. Here ARGS are those of `roaas load`; a worker ignores what only the master needs. When the master is
+done it lingers, because its pod and the result in it vanish with it.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""What one simulated user holds: its connections and clients; it performs arrivals and records them."""
+"""One simulated user: its connections and clients; it sends requests and records their outcome."""
 
 import re
 from typing import Any
@@ -19,7 +19,7 @@ _DURATION = re.compile(rb"([\w-]+)\s*;[^,]*?dur\s*=\s*\"?([0-9.]+)")
 def server_ns(timing: bytes | None) -> int:
     """Return the time that a robot says it spent (Server-Timing, W3C), in ns; -1 where it does not say.
 
-    The metric called `total` if there is one, else the longest: metrics may overlap, so no sum is taken.
+    The metric called `total` counts if there is one, else the longest: metrics may overlap, so they are not added.
     """
     if not timing:
         return -1
@@ -122,7 +122,7 @@ class Caller:
                     self._soap = LibrarySoap(workload.robot, workload.documents, workload.sent)
                 return self._soap.call(name, values)
         except gevent.Timeout:
-            raise CallError("timeout", f"no complete answer within {workload.robot.timeout_s:g} s") from None
+            raise CallError("timeout", f"no complete response within {workload.robot.timeout_s:g} s") from None
 
     def close(self) -> None:
         """Close all connections; the next calls open new ones."""

@@ -1,6 +1,6 @@
-"""Where a service listens, as a value, and what goes wrong on the way there.
+"""Where a service listens, as a value.
 
-A URL may carry a base-path prefix (a robot behind a gateway), an IPv6 literal and either scheme.
+A URL may have a base-path prefix (a robot behind a gateway), an IPv6 literal and either scheme.
 """
 
 import re
@@ -46,16 +46,16 @@ class Endpoint:
             parts = urlsplit(url.strip())
             port = parts.port
         except ValueError as error:
-            raise EndpointError(f"{url!r} is no URL: {error}") from None
+            raise EndpointError(f"{url!r} is not a URL: {error}") from None
         if parts.scheme not in schemes:
             wanted = " or ".join(f"{name}://" for name in schemes)
             raise EndpointError(f"{url!r} does not begin with {wanted}")
         if not parts.hostname:
             raise EndpointError(f"{url!r} names no host")
         if parts.username is not None or parts.password is not None:
-            raise EndpointError(f"the URL of {parts.hostname} carries a password: give a --token-file instead")
+            raise EndpointError(f"the URL of {parts.hostname} contains a password: use a --token-file instead")
         if _FORBIDDEN.search(parts.netloc + parts.path):
-            raise EndpointError(f"{url!r} holds a space or a control character")
+            raise EndpointError(f"{url!r} contains a space or a control character")
         return cls(
             parts.scheme, parts.hostname, schemes[parts.scheme] if port is None else port, parts.path.rstrip("/")
         )
@@ -81,7 +81,7 @@ def tls_context(ca_file: Path | None) -> ssl.SSLContext:
     """Return a TLS context that checks certificate and host name; `ca_file` adds trusted authorities.
 
     Raises:
-        EndpointError: `ca_file` cannot be read or holds no certificate.
+        EndpointError: `ca_file` cannot be read or contains no certificate.
     """
     try:
         return ssl.create_default_context(cafile=None if ca_file is None else str(ca_file))

@@ -1,8 +1,8 @@
-"""The library clients: what a user's program would write, with its cost.
+"""The library clients: what a user's program would use, and what it costs.
 
-SOAP through zeep: one Document (the parsed WSDL) for each process, for it takes milliseconds to build, and a
-transport for each user. REST through `requests`. Both pass through one urllib3 adapter that counts what is put
-on the wire: a request that was sent twice for one call is a silent resend, and the run says so.
+SOAP goes through zeep: one Document (the parsed WSDL) for each process, because it takes milliseconds to build, and one
+transport for each user. REST goes through `requests`. Both use a urllib3 adapter that counts the requests on the wire:
+two requests for one call are a silent retry, which makes a run invalid.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 
-#: What options and results call it, after the library that speaks SOAP; over REST it is requests.
+#: Options and results call it after the library for SOAP; over REST it is requests.
 LIBRARY = Client.ZEEP
 
 
@@ -91,7 +91,7 @@ def new_session(robot: Robot, sent: Sent | None = None, *, staying: bool = False
         staying: follow no redirect.
     """
     session = _Staying() if staying else requests.Session()
-    session.trust_env = False  # a proxy from the environment would be measured in the robot's place
+    session.trust_env = False  # a proxy from the environment would be measured instead of the robot
     for scheme in ("http://", "https://"):
         session.mount(scheme, _CountingAdapter(sent or Sent()))
     if robot.ca_file:
@@ -114,13 +114,13 @@ def request_error(error: requests.RequestException, where: str, timeout_s: float
     if isinstance(error, requests.ConnectTimeout):
         return connect_error(TimeoutError(), where)
     if isinstance(error, requests.ReadTimeout) or isinstance(cause, TimeoutError):
-        return CallError("timeout", f"no complete answer within {timeout_s:g} s")
+        return CallError("timeout", f"no complete response within {timeout_s:g} s")
     if isinstance(cause, ConnectionResetError | BrokenPipeError):
-        return CallError("closed", f"the robot broke the connection off: {cause}")
+        return CallError("closed", f"the robot reset the connection: {cause}")
     if isinstance(cause, OSError):
         return connect_error(cause, where)
     if "RemoteDisconnected" in repr(error) or "IncompleteRead" in repr(error):
-        return CallError("closed", "the robot closed the connection before its answer was complete")
+        return CallError("closed", "the robot closed the connection before its response was complete")
     return CallError("network", f"{where}: {error}")
 
 
@@ -148,7 +148,7 @@ def read_document(location: str, robot: Robot) -> Document:
     """Parse a WSDL for zeep.
 
     Raises:
-        Exception: whatever zeep and lxml find wrong with it; the caller words it.
+        Exception: of any kind that zeep and lxml raise; the caller words it.
     """
     transport: Any = Transport(session=new_session(robot), timeout=robot.timeout_s)  # zeep annotates the class itself
     return Document(location, transport, settings=zeep.Settings())
@@ -172,7 +172,7 @@ class LibrarySoap:
         """Call an operation.
 
         Raises:
-            CallError: the robot answered with a fault, or not at all.
+            CallError: the response is a fault, or there is none.
         """
         self._sent.calls += 1
         where = self._robot.address("soap", operation) or ""
@@ -185,9 +185,9 @@ class LibrarySoap:
         except zeep.exceptions.TransportError as error:
             raise CallError("status", f"status {error.status_code}: {error.message}") from None
         except zeep.exceptions.Error as error:
-            raise CallError("content", f"zeep cannot read the answer: {error}") from None
+            raise CallError("content", f"zeep cannot read the response: {error}") from None
         if not values and answer is None:
-            raise CallError("content", "zeep found nothing in the answer")
+            raise CallError("content", "zeep found nothing in the response")
         return self._transport.timed
 
     def close(self) -> None:
@@ -216,7 +216,7 @@ class LibraryRest:
         """Call an operation.
 
         Raises:
-            CallError: the answer is an error, or there is none.
+            CallError: the response is an error, or there is none.
         """
         self._sent.calls += 1
         kind = CATALOGUE[operation]
@@ -235,7 +235,7 @@ class LibraryRest:
             try:
                 response.json()
             except requests.JSONDecodeError as error:
-                raise CallError("content", f"the answer is no JSON: {error}") from None
+                raise CallError("content", f"the response is not JSON: {error}") from None
         timing = response.headers.get("Server-Timing")
         timed.timing = timing.encode("latin-1") if timing else None
         return timed

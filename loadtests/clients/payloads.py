@@ -1,7 +1,7 @@
-"""What is sent: the same calls as octets for REST and for SOAP, built before the clock runs.
+"""What is sent: the same calls as bytes for REST and for SOAP, built before the measurement.
 
-Delivery is the paper's example (section on the delivery application) with its coordinates varied by lot; 64
-variants, so that no cache on the way answers for the robot.
+Delivery is the paper's example (section on the delivery application) with random coordinates. There are 64 variants, so
+that no cache on the way responds for the robot.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ class Operation:
         code: message code of a delivery; None for a read.
         service: which SOAP service has it, `publishers` or `subscribers`.
         method: the REST method.
-        rest_expects, soap_expects: octets that a good answer holds.
+        rest_expects, soap_expects: bytes that a good response contains.
     """
 
     element: str

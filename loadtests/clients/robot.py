@@ -1,4 +1,4 @@
-"""The robot under load, as far as the generator knows it: addresses, credentials, deadline."""
+"""The robot under load, as the generator knows it: addresses, credentials, deadline."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +18,7 @@ class Robot:
 
     Attributes:
         publishers, subscribers: the SOAP services' addresses.
-        publishers_wsdl, subscribers_wsdl: URL or file of their descriptions, for the zeep client.
+        publishers_wsdl, subscribers_wsdl: URL or file of their WSDLs, for zeep.
         token: bearer token.
         rosbridge: the address of a rosbridge to the robot's ROS graph (ws or wss).
         delivery_topic: where deliveries are published on that graph.
@@ -76,7 +76,7 @@ class Robot:
         address = self.address(interface, operation)
         if address is None:
             return []
-        if interface == "rosbridge":  # values of its own: an echo of what another interface sent is not its own
+        if interface == "rosbridge":  # its own values: it must not take another interface's delivery for its echo
             return [*bridge_requests(variants(operation, seed + 1), self.delivery_topic)]
         endpoint = Endpoint.parse(address)
         return [BUILDERS[interface](endpoint, operation, values, self.token) for values in variants(operation, seed)]

@@ -1,13 +1,13 @@
-"""The third way to a robot: rosbridge, ROS messages as JSON over a WebSocket.
+"""The third interface: rosbridge, ROS messages as JSON over a WebSocket.
 
-By the rosbridge v2 protocol (github.com/RobotWebTools/rosbridge_suite, ROSBRIDGE_PROTOCOL.md, section 3.2). It has no
-answer to a publish, so that a delivery counts as done when its echo is back: the client subscribes to the topic that
-it publishes to, and an echo has been through ROS. A pose is a subscription until its first message, which waits for
-the robot's next odometry.
+It follows the rosbridge v2 protocol (github.com/RobotWebTools/rosbridge_suite, ROSBRIDGE_PROTOCOL.md, section 3.2),
+which has no response to a publish. So a delivery counts as done when its echo is back: the client subscribes to the
+topic that it publishes to, and an echo has been through ROS. A pose is a subscription until its first message, which
+waits for the robot's next odometry.
 
-A process has one connection that all its users share, as a program with rosbridge's own client library has: were each
-to subscribe for itself, rosbridge would send every echo to all of them. The WebSocket (RFC 6455) is `websockets`'
-protocol without its sockets, which are gevent's here; of the kept libraries it is the one that masks and parses in C.
+All users of a process share one connection, as in a program with rosbridge's own client library: if each subscribed for
+itself, rosbridge would send every echo to all of them. The WebSocket (RFC 6455) is the protocol of `websockets` on
+gevent's sockets; of the maintained libraries it is the one that masks and parses in C.
 """
 
 import ssl
@@ -37,8 +37,8 @@ _DELIVERY_TYPE = "mybot_delivery_app/msg/DeliveryRequestMsg"
 _ODOMETRY_TYPE = "nav_msgs/msg/Odometry"
 _CHUNK = 65_536
 _MAX_MESSAGE = 16 * 1024 * 1024
-_STATUS_OK = 200  # what callers judge by; rosbridge has no status of its own
-#: DDS needs a moment to match a new publisher with a new subscription, and rosbridge has no word for "matched".
+_STATUS_OK = 200  # callers check it; rosbridge has no status of its own
+#: DDS needs a moment to match a new publisher with a new subscription; rosbridge does not say when they match.
 _MATCHING_S = 0.5
 
 Key = tuple[float, ...]
@@ -49,7 +49,7 @@ class BridgeRequest(Request):
     """A request over rosbridge: the JSON message to send, and which ROS message answers it.
 
     Attributes:
-        topic: on which the answer comes.
+        topic: on which its answer arrives.
         echo: the values of a delivery in the order of the ROS message; empty for a read.
     """
 
@@ -76,7 +76,7 @@ class Bridge:
 
     Args:
         url: ws or wss.
-        timeout_s: deadline of a whole request, connecting included.
+        timeout_s: deadline of a whole request, including the connection.
         tls: the context for wss.
         token: bearer token of the handshake, for a gateway in front of rosbridge.
         delivery_topic: full name.
@@ -104,10 +104,10 @@ class Bridge:
         """Send a request and wait for what answers it.
 
         Raises:
-            CallError: whatever went wrong; the request was sent at most once.
+            CallError: of any kind; the request was sent at most once.
         """
         if not isinstance(request, BridgeRequest):
-            raise TypeError(f"{type(request).__name__} is no request over rosbridge")
+            raise TypeError(f"{type(request).__name__} is not a request over rosbridge")
         with gevent.Timeout(self.timeout_s, CallError("timeout", f"no echo or message within {self.timeout_s:g} s")):
             with self._opening:
                 if self._socket is None:
@@ -213,7 +213,7 @@ class Bridge:
                     break
                 self._flush()  # answers to pings
         except (OSError, CallError) as error:
-            failure = CallError("closed", f"rosbridge broke the connection off: {error}")
+            failure = CallError("closed", f"rosbridge reset the connection: {error}")
         if not opened.ready():
             opened.set_exception(failure)
         if self._socket is plain:
@@ -230,7 +230,7 @@ class Bridge:
             message = msgspec.json.decode(octets)
             kind, topic = message["op"], message.get("topic")
         except (msgspec.DecodeError, TypeError, KeyError, AttributeError):
-            self._fail(CallError("malformed", f"no message of rosbridge's protocol: {shown(octets)}"))
+            self._fail(CallError("malformed", f"not a message of the rosbridge protocol: {shown(octets)}"))
             return
         answer = Answer(_STATUS_OK, {}, octets, received, len(octets))
         if kind == "publish" and topic == self._delivery_topic:
@@ -246,7 +246,7 @@ class Bridge:
         try:
             key = tuple(float(values[name]) for name in MESSAGE_FIELDS)
         except (KeyError, TypeError, ValueError):
-            self._fail(CallError("content", f"no delivery on {self._delivery_topic}: {shown(answer.body)}"))
+            self._fail(CallError("content", f"not a delivery on {self._delivery_topic}: {shown(answer.body)}"))
             return
         waiting = self._echoes.get(key)
         if waiting:
@@ -280,7 +280,7 @@ def bridge_endpoint(url: str) -> Endpoint:
     """Return the endpoint of a rosbridge.
 
     Raises:
-        EndpointError: no ws(s) URL, no host, a port out of range, or user information in it.
+        EndpointError: not a ws(s) URL, no host, a port out of range, or user information in it.
     """
     return Endpoint.parse(url, {"ws": 80, "wss": 443})
 

@@ -1,4 +1,4 @@
-"""Reading a service's address from its WSDL (WSDL 1.1 section 3.8, soap:address)."""
+"""The address of a service, read from its WSDL (WSDL 1.1 section 3.8, soap:address)."""
 
 from dataclasses import replace
 from ipaddress import ip_address
@@ -27,8 +27,8 @@ def fetch(location: str, robot: Robot) -> bytes:
     """Return the content of a WSDL, from a file or a URL.
 
     Raises:
-        WsdlError: no such file, or the answer is no document.
-        CallError: nobody answers at the URL.
+        WsdlError: no such file, or the response is not a document.
+        CallError: the URL does not respond.
     """
     if not location.startswith(("http://", "https://")):
         try:
@@ -49,16 +49,16 @@ def address_in(content: bytes, location: str, element: str) -> str:
     """Return the address of the service whose port type offers an operation.
 
     Raises:
-        WsdlError: no XML, no WSDL, another service's WSDL, or no address in it.
+        WsdlError: not XML, not a WSDL, another service's WSDL, or no address in it.
     """
     if len(content) > _MOST:
-        raise WsdlError(f"WSDL {location!r} is longer than {_MOST} octets")
+        raise WsdlError(f"WSDL {location!r} is longer than {_MOST} bytes")
     try:
         root = parse_xml(content)
     except XmlError as error:
         raise WsdlError(f"WSDL {location!r} {error}") from None
     if root.tag != f"{{{_WSDL}}}definitions":
-        raise WsdlError(f"{location!r} is no WSDL 1.1: its root element is {root.tag!r}")
+        raise WsdlError(f"{location!r} is not a WSDL 1.1: its root element is {root.tag!r}")
     offered = {found.get("name") for found in root.iter(f"{{{_WSDL}}}operation")}
     imports = root.findall(f"{{{_WSDL}}}import")
     if element not in offered and not imports:
@@ -76,7 +76,7 @@ def address_in(content: bytes, location: str, element: str) -> str:
         except EndpointError as error:
             raise WsdlError(f"WSDL {location!r}: its soap:address cannot be used: {error}") from None
         return _reachable(url, location)
-    raise WsdlError(f"WSDL {location!r} holds no soap:address: say where the service is with --…-endpoint URL")
+    raise WsdlError(f"WSDL {location!r} has no soap:address: give the address with --…-endpoint URL")
 
 
 def with_addresses(robot: Robot) -> Robot:
@@ -84,7 +84,7 @@ def with_addresses(robot: Robot) -> Robot:
 
     Raises:
         WsdlError: a WSDL cannot be used.
-        CallError: nobody answers at a WSDL's URL.
+        CallError: a WSDL's URL does not respond.
     """
     found: dict[str, Any] = {}
     for name, operation in CATALOGUE.items():

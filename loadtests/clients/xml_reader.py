@@ -1,4 +1,4 @@
-"""The one XML parser of the load tests: it refuses a DOCTYPE, expands no entity and fetches nothing."""
+"""The XML parser of the load tests: it refuses a DOCTYPE, expands no entity and fetches nothing."""
 
 from lxml import etree
 from lxml.etree import _Element
@@ -18,7 +18,7 @@ def parse_xml(content: bytes) -> _Element:
     try:
         root = etree.fromstring(content, parser)
     except etree.XMLSyntaxError as error:
-        raise XmlError(f"is no XML: {error}") from None
+        raise XmlError(f"is not XML: {error}") from None
     if root.getroottree().docinfo.internalDTD is not None:
-        raise XmlError("holds a document type declaration (DOCTYPE), which is refused")
+        raise XmlError("has a document type declaration (DOCTYPE), which is refused")
     return root

@@ -1,4 +1,4 @@
-"""When a robot counts as dead: nothing has succeeded for seconds, though much was tried."""
+"""When a robot counts as dead: no request has succeeded for seconds, although many were sent."""
 
 _DEAD_S = 3.0
 _DEAD_REQUESTS = 10

@@ -1,4 +1,4 @@
-"""From settings and robot to the plan that is carried out first."""
+"""The first plan of a run, from settings and robot."""
 
 from conformance.packs.table1.thresholds import ApiStyle
 from loadtests.clients.library import LIBRARY
@@ -10,11 +10,11 @@ ROSBRIDGE = ApiStyle.ROSBRIDGE
 
 
 _BRIDGE_NOTE = (
-    "rosbridge has no answer to a publish: a delivery is timed until its echo is back, which has been through ROS, "
+    "rosbridge does not answer a publish: a delivery is timed until its echo is back, which has been through ROS, "
     "and a pose from subscribing until the robot's next odometry"
 )
 _LEAST_USERS, _MOST_USERS = 32, 512
-_STALL_S = 3.0  # the stall that the users of an open model outlast before arrivals queue for one
+_STALL_S = 3.0  # users of an open model suffice for a stall of this length before arrivals wait for a user
 
 
 def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:

@@ -1,4 +1,4 @@
-"""Carries a run out, from looking at the robot to the written result."""
+"""One run, from the first call to the written result."""
 
 import logging
 import os
@@ -54,7 +54,7 @@ class Run:
         other = () if settings.against is None else (settings.against.robot,)
         self.robots: tuple[Robot, ...] = (settings.robot, *other)
         self.outcome = Outcome(settings, self.robots, datetime.now(UTC))
-        self.plan, _ = duel_plan(settings, *self.robots)  # as far as can be said before the WSDLs are read
+        self.plan, _ = duel_plan(settings, *self.robots)  # preliminary: the WSDLs have not been read
         self.collector: Collector | None = None
         self._liveness = Liveness(REPORT_S if settings.generator.expect else 0.0)
         self._told = 0.0
@@ -63,7 +63,7 @@ class Run:
     def interrupt(self) -> None:
         """End the run on Ctrl-C and keep what was measured; a second Ctrl-C ends at once."""
         if self.outcome.interrupted:
-            os._exit(ExitCode.INTERRUPTED)  # asked for twice: not even for the result
+            os._exit(ExitCode.INTERRUPTED)  # the second Ctrl-C: do not wait for the result
         self.outcome.interrupted = True
 
     # Before the measurement.
@@ -72,7 +72,7 @@ class Run:
         """Read the addresses that only a WSDL contains, and make the plan.
 
         Raises:
-            RunAborted: a WSDL is wrong, or nobody answers.
+            RunAborted: a WSDL is wrong, or the robot does not respond.
         """
         try:
             self.robots = self.outcome.robots = tuple(map(with_addresses, self.robots))
@@ -87,7 +87,7 @@ class Run:
         """Call everything once.
 
         Raises:
-            RunAborted: the robot does not answer as it should; what it did answer is kept for the result.
+            RunAborted: a response is wrong or missing; the others are kept for the result.
         """
         names = self.plan.series_names()
         if not names:
@@ -104,7 +104,7 @@ class Run:
             if findings.unreachable:
                 raise RunAborted(ExitCode.UNREACHABLE, f"{whose} cannot be reached: {told}")
             if findings.failures:
-                raise RunAborted(ExitCode.INCONCLUSIVE, f"{whose} does not answer as it should: {told}")
+                raise RunAborted(ExitCode.INCONCLUSIVE, f"{whose} does not respond as the contract says: {told}")
             self.outcome.invalid += [
                 f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
             ]
@@ -140,7 +140,7 @@ class Run:
             plan = self._repeat(plan, executor)
             if self._over:
                 return
-            tell("measuring what requests cost after a pause")
+            tell("measuring requests after a pause")
             self.outcome.paused = after_pauses(
                 self.robots[0],
                 plan.series_names(),
@@ -234,7 +234,7 @@ class Run:
         plan = carried.plan
         carried.elapsed_s = max(0.0, min(elapsed, plan.length_s))
         elapsed += plan.offset_s
-        if os.getppid() != self._parent:  # whoever started us is gone
+        if os.getppid() != self._parent:  # the parent process has ended
             self.outcome.interrupted = True
         if self.outcome.dead_at is None and self._liveness.is_due(elapsed):
             succeeded = sum(cell.service.total for cell in recorder.cells.values())
@@ -265,7 +265,7 @@ class Run:
 
 def carry_out(settings: Settings) -> CommandResult:
     """Carry out a run and write its result."""
-    logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of spawning fast, which is what we want
+    logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of fast spawning, which we want
     run = Run(settings)
     for number in (signal.SIGINT, signal.SIGTERM):
         gevent.signal_handler(number, run.interrupt)

@@ -1,9 +1,9 @@
-"""Workers' clocks against the master's, by messages over the channel that they have anyway.
+"""Workers' clocks compared with the master's, by messages over the channel that they already have.
 
-An exchange gives the offset as NTP does (RFC 5905, section 8), with one moment of the worker's in place of two,
-because it answers at once: the worker's clock less the middle between sending and receiving. Of several exchanges the
-one with the shortest round trip counts, for it waited least in queues; it is wrong by half its round trip at most,
-where the whole of it was spent on one way. Clocks are CLOCK_MONOTONIC, in ns, which no administrator sets.
+An exchange gives the offset as in NTP (RFC 5905, section 8), with one moment of the worker's instead of two, because it
+answers at once: the worker's clock less the middle between sending and receiving. Of several exchanges the one with the
+shortest round trip counts, because it waited least in queues; its error is at most half its round trip. Clocks are
+CLOCK_MONOTONIC, in ns, which no administrator sets.
 """
 
 import time
@@ -54,8 +54,8 @@ class WorkerClock:
     """A worker's clock, as read over the run.
 
     Attributes:
-        shared: it is the master's own.
-        first, last: None until it answered.
+        shared: the worker uses the master's clock.
+        first, last: readings; None until the worker answered.
     """
 
     shared: bool = False

@@ -1,4 +1,4 @@
-"""A Locust master and its workers as an executor: processes of this machine, or of others."""
+"""An executor of worker processes, on this machine or on others, led by a Locust master."""
 
 import json
 import subprocess
@@ -32,8 +32,8 @@ _GRACE_S = 15.0
 class _Master(MasterRunner):
     """A master that distributes the users once.
 
-    Locust would do so anew whenever a worker comes, in mid-run: users of the others would be killed with the requests
-    that they had under way, which nobody would count.
+    Locust distributes them again whenever a worker comes, in mid-run: that kills users of other workers with their
+    requests under way, which would not be counted.
     """
 
     def start(self, *args: Any, **kwargs: Any) -> None:
@@ -47,9 +47,9 @@ class DistributedExecutor:
 
     Args:
         generator: where the master listens; how many workers to start here, and how many to wait for in all.
-        folder: where workers of this machine leave what they recorded, should the master die.
-        tell: says how things stand, for the terminal.
-        stopped: whether somebody wants an end; asked while waiting for workers.
+        folder: where workers of this machine leave what they recorded if the master dies.
+        tell: writes progress to the terminal.
+        stopped: returns whether to stop waiting for workers.
     """
 
     def __init__(
@@ -128,9 +128,9 @@ class DistributedExecutor:
                 raise GeneratorError("interrupted while waiting for workers")
             dead = [child.returncode for child in self._children.values() if child.poll() is not None]
             if dead:
-                raise GeneratorError(f"a worker process ended at once, with exit code {dead[0]}")
+                raise GeneratorError(f"a worker process ended early, with exit code {dead[0]}")
             if time.monotonic() > deadline:
-                raise GeneratorError(f"{self.runner.worker_count} of {self._expected} {what} in time")
+                raise GeneratorError(f"only {self.runner.worker_count} of {self._expected} {what} in time")
 
     def _is_there(self, client: str) -> bool:
         """Return whether a worker has not quit and still sends heartbeats."""
@@ -145,7 +145,7 @@ class DistributedExecutor:
             return
         late = max(0.0, (now_ns() - self._began) / _NS) if self._began else 0.0
         member = self._new_member(msg.data, state="late", joined_at_s=late)
-        self.tell(f"worker {member.id} ({member.host}) came {late:.1f} s into the run, too late to take part")
+        self.tell(f"worker {member.id} ({member.host}) joined {late:.1f} s into the run, too late to take part")
         self.runner.send_message("roaas_late", None, msg.node_id)
 
     def _new_member(self, told: dict[str, Any], **known: Any) -> Member:
@@ -181,7 +181,7 @@ class DistributedExecutor:
         del environment
         self._on_report(msg.node_id, msg.data)
         member = self._by_client.get(msg.node_id)
-        if member is not None:  # one that was given up and has done its part all the same is not lost
+        if member is not None:  # a worker that was given up and reports all the same is not lost
             member.state, member.done, member.lost_at_s, member.share = "finished", True, None, None
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
@@ -235,7 +235,7 @@ class DistributedExecutor:
     def _look_for_lost(self, present: list[tuple[str, Member]], plan: Plan, *, overdue: bool) -> None:
         """Give up workers whose process has ended, whose heartbeat has stopped, or that are overdue.
 
-        A heart that beats again takes the word back: a busy machine silences workers that go on with their part.
+        A worker whose heartbeat returns is no longer lost: a busy machine delays heartbeats of workers that still work.
         """
         for number, (client, member) in enumerate(present):
             child = self._children.get(member.pid)

@@ -1,8 +1,8 @@
-"""From the request to the message in the application: what an operator waits for is not the 204.
+"""The time from a request to the message in the application: what an operator waits for is not the 204.
 
-Deliveries are sent one at a time over every way that there is, in rounds whose order is drawn by lot, and a probe in
-the application's place says when each arrived. Its clock is the generator's: both run on one machine, wherever the
-robot is. Publishing with rclpy, without any web service, is the floor.
+Deliveries are sent one at a time over every way, in rounds in random order, and a probe in the application's place says
+when each arrived. The probe shares the generator's clock: both run on one machine, wherever the robot is. Publishing
+with rclpy, without any web service, is the floor.
 """
 
 from collections.abc import Callable
@@ -22,9 +22,9 @@ from loadtests.clients.wire import Connection, Request, now_ns
 from loadtests.probe.client import Probe
 from loadtests.settings.settings import EndToEnd
 
-#: What has not arrived by then is lost.
+#: A delivery that has not arrived by then is lost.
 LOST_S = 2.0
-#: What publishes without a web service.
+#: The way without a web service.
 NATIVE = "ros"
 _DELIVERY = "delivery"
 _NS = 1_000_000_000
@@ -39,8 +39,8 @@ class Journeys:
 
     Attributes:
         to_application_ns: from the request's start to the message in the application; None where it never came.
-        answer_ns: from the request's start to its answer; None where the way has none.
-        errors: of requests that brought no good answer.
+        answer_ns: from the request's start to its response; None where the way has none.
+        errors: of requests without a good response.
     """
 
     to_application_ns: list[int | None] = field(default_factory=list)
@@ -62,7 +62,7 @@ class Courier:
         """Send a delivery; returns when that began, and when its response was received.
 
         Raises:
-            CallError: there is no good answer.
+            CallError: there is no good response.
             ProbeError: the publisher has ended.
         """
         if way == NATIVE:
@@ -101,12 +101,12 @@ def end_to_end(
     """Measure every way, publishing with rclpy included; returns their journeys.
 
     Raises:
-        ProbeError: there is no ROS here, or nobody publishes deliveries in the domain.
+        ProbeError: this machine has no ROS, or the domain has no publisher of deliveries.
     """
     with ExitStack() as stack:
         listener = Probe("listen", settings.domain_id, robot.delivery_topic)
         stack.callback(listener.close)
-        listener.await_ready()  # before there is a publisher of ours, which it would take for the robot's
+        listener.await_ready()  # before our own publisher exists, which it would take for the robot's
         publisher = Probe("publish", settings.domain_id, robot.delivery_topic)
         stack.callback(publisher.close)
         publisher.await_ready()

@@ -25,7 +25,7 @@ def describe(
         robot: addresses.
         output: the robot's name, vendor and version as the statement gives them, and our command line.
         servers: Server header by interface.
-        process: who listens at the robot's address, where that is known.
+        process: the process at the robot's address, where that is known.
     """
     return {
         "cpu": _cpu_model(),

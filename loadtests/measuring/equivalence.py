@@ -1,4 +1,4 @@
-"""Do both interfaces carry the same? Judgements on octets sent and answers received; nothing here talks to a robot."""
+"""Whether both interfaces carry the same, judged on bytes sent and received; nothing here talks to a robot."""
 
 import json
 import struct
@@ -13,14 +13,14 @@ from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values
 from loadtests.clients.wire import Request
 from loadtests.clients.xml_reader import XmlError, parse_xml
 
-#: Leaves of nav_msgs/Odometry that have to be in both interfaces' answers, in the same number.
+#: Leaves of nav_msgs/Odometry that both interfaces' responses must contain, equally often.
 _ODOMETRY = ("frame_id", "child_frame_id", "x", "y", "z", "w", "covariance", "sec")
 
 
 def request_difference(operation: str, rest: Request, soap: Request) -> str | None:
     """Return how two requests, read back from their bytes, differ; None where they ask for the same.
 
-    Doubles are compared bit for bit, after each has been through its own text form.
+    Doubles are compared bit for bit, each read back from its own text.
     """
     if CATALOGUE[operation].code is None:
         return None
@@ -54,9 +54,9 @@ def pose_difference(rest: bytes, soap: bytes) -> str | None:
         over_rest = Counter(_json_leaves(json.loads(rest)))
         found = parse_xml(soap).find(f".//{{{NAMESPACE}}}GetPoseResponse")
     except XmlError as error:
-        return f"pose: an answer cannot be read: it {error}"
+        return f"pose: a response cannot be read: it {error}"
     except ValueError as error:
-        return f"pose: an answer cannot be read: {error}"
+        return f"pose: a response cannot be read: {error}"
     over_soap = Counter(_xml_leaves(found)) if found is not None else Counter()
     for leaf in _ODOMETRY:
         if over_rest[leaf] != over_soap[leaf]:

@@ -1,4 +1,4 @@
-"""What keeps the load generator itself from working."""
+"""Errors of the load generator itself."""
 
 
 class GeneratorError(Exception):

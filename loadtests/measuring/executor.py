@@ -1,8 +1,8 @@
-"""Who does the work: this process, or workers that a Locust master leads.
+"""What generates the load: this process, or workers that a Locust master leads.
 
-Both carry out plans one after the other and end up with one recorder. Workers rebuild the plan from a message,
-take their share of its schedule, and report what they recorded once a second; a worker that is lost takes with
-it what it had not yet reported, and the result says so.
+Both carry out plans one after the other and end up with one recorder. Workers rebuild the plan from a message, take
+their share of its schedule, and report what they recorded once a second. When a worker is lost, what it had not
+reported is lost too, and the result says so.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,9 +42,9 @@ class Member:
     """A process that generates load, as the result describes it.
 
     Attributes:
-        state: `finished`, `lost`, or `late`: come when the schedule had been dealt out.
-        accounted: arrivals of the plan under way that its reports speak of.
-        share: arrivals of the plan in which it was lost; None while it is not, and in the closed model.
+        state: `finished`, `lost`, or `late`: joined after the schedule was distributed.
+        accounted: arrivals of the current plan in its reports.
+        share: its arrivals in the plan in which it was lost; None unless it was, and in the closed model.
         clock: None in the master's own process.
     """
 
@@ -91,7 +91,7 @@ class LocalExecutor:
         self.recorder, self.pacing = session.recorder, session.pacer.pacing
         users = plan.connections
         self.runner.start(users, spawn_rate=users)
-        with gevent.Timeout(30, GeneratorError(f"only {session.pacer.waiting} of {users} users came up within 30 s")):
+        with gevent.Timeout(30, GeneratorError(f"only {session.pacer.waiting} of {users} users started within 30 s")):
             while session.pacer.waiting < users:
                 gevent.sleep(0.01)
 

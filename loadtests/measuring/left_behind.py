@@ -1,7 +1,7 @@
-"""What a worker leaves in a file when its master is gone: the figures of its own share, for people to look at.
+"""The file that a worker leaves when its master is gone: the figures of its own share, for people to read.
 
-Nothing reads the file, and no verdict is in it: the other workers' shares are missing. But a long run that ends so has
-not been for nothing.
+Nothing reads the file, and it contains no verdict, because the other workers' shares are missing. But the figures of a
+long run are not lost.
 """
 
 import json
@@ -45,7 +45,7 @@ class LeftBehind:
         """Write the file; returns None where there is nothing to write.
 
         Raises:
-            OSError: the folder does not take it.
+            OSError: the folder cannot be written to.
         """
         if not self.plans or not self.requests:
             return None

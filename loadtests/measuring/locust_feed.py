@@ -1,8 +1,8 @@
-"""Feeds Locust's own statistics, so that its web UI shows what our histograms hold.
+"""Locust's own statistics, fed so that its web UI shows what our histograms contain.
 
-Locust rounds to milliseconds when it logs a request by itself, and its request event costs some 8 us. Here whole
-buffers of successful requests go in at once, with the histogram's microseconds as keys; failures, which are few or
-make timing moot, go through the event, where other listeners expect them.
+Locust itself rounds to milliseconds, and its request event costs some 8 us. Here whole buffers of successful requests
+go in at once, with the histogram's microseconds as keys. Failures, which are rare, go through the event, where other
+listeners expect them.
 """
 
 import time

@@ -1,4 +1,4 @@
-"""What else went on on the generator's machine: time stolen by its host, quota, governor, load."""
+"""What else happened on the generator's machine: time stolen by its host, quota, governor, load."""
 
 import os
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import psutil
 
 _GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
 _GROUPS = Path("/sys/fs/cgroup")
-#: From these shares on it is worth a word.
+#: From these shares on there is a remark.
 _NOTED_STEAL = 0.02
 _NOTED_THROTTLED = 0.01
 _STEADY = frozenset({"performance"})
@@ -41,7 +41,9 @@ def conditions(before: Moment, after: Moment) -> tuple[dict[str, Any], list[str]
     load = before.load[0] if before.load else None
     remarks = []
     if steal > _NOTED_STEAL:
-        remarks.append(f"the machine's host took {steal:.1%} of its time (steal): a virtual machine measures its host")
+        remarks.append(
+            f"the machine's host took {steal:.1%} of its time (steal), so that the figures depend on the host"
+        )
     if throttled > _NOTED_THROTTLED:
         remarks.append(
             f"the generator's control group was throttled for {throttled:.1%} of the run: its quota is {quota:g} CPUs"

@@ -1,9 +1,8 @@
-"""Cold and warm: what a request costs after a pause, and what one costs right behind another.
+"""Cold and warm: what a request costs after a pause, and right behind another.
 
-A robot that nobody has asked for a while has lost its caches, its processor its clock rate; a figure from an even
-stream of requests lies somewhere between the two. Here one connection of one series at a time is left alone for a
-tenth of a second, asked once, and then asked at once again and again. Our own process pauses as well: what that
-costs is in the cold figure, for both interfaces alike.
+An idle robot loses its caches, and its processor its clock rate; a figure from an even stream of requests lies between
+cold and warm. Here one connection of one series at a time is idle for a tenth of a second, sends one request, and then
+sends others without a pause. Our own process idles as well: what that costs is in the cold figure of both interfaces.
 """
 
 from collections.abc import Callable
@@ -30,8 +29,8 @@ class Paused:
     """A series' service times after a pause, and right behind one another.
 
     Attributes:
-        spacing_s: the least time between two starts behind one another, where a limit asks for one.
-        failed: requests that brought no good answer.
+        spacing_s: the least time between two requests, where the rate is limited.
+        failed: requests without a good response.
     """
 
     spacing_s: float
@@ -50,7 +49,7 @@ def after_pauses(
 ) -> dict[SeriesName, Paused]:
     """Measure the wire series after pauses and without, alternately; empty where the run is too short for that.
 
-    `ceiling` is the most requests per second that the robot may be given.
+    `ceiling` is the highest rate allowed, in requests per second.
     """
     names = [name for name in names if name[2] == "wire" and name[1] in {"rest", "soap"}]
     turns = min(_MOST, int(_SHARE * duration_s / (PAUSE_S * 1.1) / max(1, len(names))))

@@ -1,4 +1,4 @@
-"""One call of every kind before the run: does the robot answer, and do both interfaces carry the same?"""
+"""One call of every kind before the run: does the robot respond, and do both interfaces carry the same?"""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,12 +19,12 @@ class Findings:
     """The results of the calls before the run.
 
     Attributes:
-        sizes: octets of request and response of each wire series.
+        sizes: bytes of request and response of each wire series.
         servers: Server header by interface.
         failures: what failed, by series.
         unequal: how the interfaces' payloads differ.
         notes: what could not be compared.
-        slowest_s: the longest that the wire client waited for an answer, connecting included.
+        slowest_s: the longest time that the wire client waited for a response, including the connection.
     """
 
     sizes: dict[SeriesName, tuple[int, int]] = field(default_factory=dict)
@@ -81,7 +81,9 @@ def _compare(
             continue
         listed = _listed_deliveries(robot)
         if listed is None:
-            findings.notes.append("the robot does not list the requests it accepted, so what arrived was not compared")
+            findings.notes.append(
+                "the robot does not list the requests it accepted, so that their arrival was not checked"
+            )
         else:
             findings.unequal += deliveries_missing(listed, operation, variants(operation, seed)[0])
 

@@ -1,9 +1,9 @@
-"""First in line for a processor while requests are sent, where the system allows it.
+"""Real-time priority for the generator while it sends requests, where the system allows it.
 
-On a machine that others use too a woken process waits for the end of another's time slice, milliseconds at times: the
-request starts late, and its answer is read late. A process of the lowest real-time class does not wait (sched(7)). It
-takes CAP_SYS_NICE, and is done only where the generator needs a small part of one processor of several: it must not
-take the robot's.
+On a shared machine a woken process waits for the end of another's time slice, sometimes for milliseconds: the request
+starts late, and its response is read late. A process of the lowest real-time class does not wait (sched(7)). That needs
+CAP_SYS_NICE, and is used only where the generator needs a small part of one of several processors: it must not take the
+robot's.
 """
 
 import os
@@ -20,7 +20,7 @@ MOST_RATE = 1000.0
 def leaves_the_robot_room(plan: Plan, processors: int) -> bool:
     """Return whether the workers may run first: open model, moderate rate, and a processor left for the robot.
 
-    The workers are taken to be all on this machine: of those elsewhere they do not know.
+    It assumes that all workers are on this machine.
     """
     moderate = plan.load.rate is not None and plan.load.rate / plan.workers <= MOST_RATE
     return moderate and plan.open_model and plan.step_rate is None and plan.workers < processors
@@ -30,7 +30,7 @@ def leaves_the_robot_room(plan: Plan, processors: int) -> bool:
 def first_in_line(*, wanted: bool) -> Iterator[bool]:
     """Run this thread before all ordinary ones while the context lasts; yields whether that was allowed.
 
-    Processes that are started meanwhile do not inherit it.
+    Child processes do not inherit the priority.
     """
     if not wanted or sys.platform != "linux":
         yield False

@@ -1,4 +1,4 @@
-"""Starting the robot anew between repeats, by a command of its owner's."""
+"""Restarting the robot between repeats, with a command of its owner."""
 
 import shlex
 import subprocess
@@ -42,7 +42,7 @@ def _run(command: str) -> None:
         raise GeneratorError(f"--restart-command {command!r}: {error.strerror or error}") from None
     except subprocess.TimeoutExpired:
         raise GeneratorError(
-            f"--restart-command {command!r} did not end within {_COMMAND_S:g} s: it has to leave the robot running "
+            f"--restart-command {command!r} did not end within {_COMMAND_S:g} s: it must leave the robot running "
             "in the background"
         ) from None
     if done.returncode:

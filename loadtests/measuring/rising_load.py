@@ -1,4 +1,4 @@
-"""Offers rates until it is known where a robot gives way, and connections to see how latency grows with them."""
+"""Raises the rate until the robot breaks down, and the connections to see how latency grows with them."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -22,9 +22,9 @@ class RisingLoad:
 
     Args:
         first: the duel's plan.
-        stopped: whether somebody wants an end.
-        announce: hears of each plan before it begins.
-        tell: how things stand, for the terminal.
+        stopped: returns whether to end.
+        announce: receives each plan before it begins.
+        tell: writes progress to the terminal.
     """
 
     first: Plan
@@ -103,7 +103,7 @@ class RisingLoad:
 
             def attempt(rate: float, interface: str = interface) -> Step | None:
                 if time.monotonic() > until:
-                    self.tell(f"knee: {_MOST_S:.0f} s are over: what has been found stands")
+                    self.tell(f"knee: ended after {_MOST_S:.0f} s, with the searches done so far")
                     return None
                 results = self._run([interface], rate=rate)
                 if not results:

@@ -1,6 +1,6 @@
-"""The process that listens at the robot's address, where that is on this machine: its command line and processor time.
+"""The process that listens at the robot's address, if it is on this machine: its command line and processor time.
 
-A robot's other processes, such as a simulation behind its web services, are not in it.
+The robot's other processes, such as a simulation behind its web services, are not included.
 """
 
 import ipaddress

@@ -1,4 +1,4 @@
-"""One process's part in a run: its users, its pacer, its recorder. The same locally and in a worker."""
+"""One process's part in a run: its users, its pacer and its recorder, in the master's process or in a worker."""
 
 import gc
 import os
@@ -51,7 +51,7 @@ class _Sink:
 class Session:
     """One process's users, pacer and recorder.
 
-    `robots` are those that segments name by their place: the one under load, and the one that it is compared with.
+    `robots` are numbered as in segments: the one under load, and the one that it is compared with.
     """
 
     def __init__(
@@ -110,8 +110,8 @@ class Session:
     def run(self, plan: Plan, worker: int, origin_ns: int, ceiling: float | None = None) -> None:
         """Carry out a worker's share of a plan, whose times count from `origin_ns` (monotonic).
 
-        Returns when its last request has come back, or `stop` was called. In the closed model `ceiling` is the most
-        starts per second of this process.
+        Returns when the last response has come, or `stop` was called. In the closed model `ceiling` limits the requests
+        per second of this process.
         """
         self._first = plan.first_segment
         self.series_of.update(plan.series_of())
@@ -133,7 +133,7 @@ class Session:
             self.pacer.done.wait()
         self._look_at_processor(None)
         self._wait_for_answers()
-        self.pacer.give_up()  # what is late by a whole deadline will not be started any more
+        self.pacer.give_up()  # arrivals that are late by a whole deadline are not started any more
         self._wait_for_answers()
         self.recorder.flush()
         self.recorder.count("resends", self._sent.resends)

@@ -1,7 +1,7 @@
 """A worker process: `python -m loadtests.measuring.worker HOST PORT`, with a JSON object on its standard input.
 
-The object holds the robots' bearer tokens, which do not travel over the network with the rest, and the folder for what
-the worker leaves when its master dies: `{"tokens": […], "folder": "…"}`.
+The object contains the robots' bearer tokens, which do not travel over the network with the rest, and the folder for
+what the worker leaves when its master dies: `{"tokens": […], "folder": "…"}`.
 """
 
 import json
@@ -29,7 +29,7 @@ from loadtests.measuring.left_behind import LeftBehind
 from loadtests.measuring.user_session import Session
 from loadtests.schedule.plan import Plan
 
-#: The master answers a heartbeat each second. Silent for so long, it is dead, or the network to it is.
+#: The master answers a heartbeat each second. If it is silent for this long, it is dead, or the network to it is.
 MASTER_SILENT_S = 20.0
 _LOOK_S = 0.5
 
@@ -70,7 +70,7 @@ class Worker:
         self._heard = time.monotonic()
         environment.events.heartbeat_received.add_listener(self._on_heartbeat)
         self._about = {"pid": os.getpid(), "host": platform.node(), "clock": clock_id()}
-        # Locust has long said that we are here, and drops what we await.
+        # Locust has announced us long before this worker could listen to messages.
         self.runner.send_message("roaas_listening", self._about)
 
     def _on_prepare(self, environment: Any, msg: Any) -> None:
@@ -111,7 +111,7 @@ class Worker:
 
     def _on_late(self, environment: Any, msg: Any) -> None:
         del environment, msg
-        _say(f"the master at {self.master} had dealt the run out already: this worker takes no part in it")
+        _say(f"the master at {self.master} had already distributed the run: this worker takes no part in it")
 
     def _on_heartbeat(self, **_: Any) -> None:
         self._heard = time.monotonic()
@@ -123,7 +123,7 @@ class Worker:
             if parent is not None and os.getppid() != parent:
                 self._end(f"the master (process {parent}) has ended")
             if time.monotonic() - self._heard > MASTER_SILENT_S:
-                self._end(f"nothing was heard of the master at {self.master} for {MASTER_SILENT_S:g} s")
+                self._end(f"the master at {self.master} has been silent for {MASTER_SILENT_S:g} s")
 
     def _end(self, why: str) -> None:
         """Stop sending, write what was recorded, and end."""
@@ -166,10 +166,10 @@ def serve(host: str, port: int, tokens: Sequence[str | None], folder: Path, pare
 
     Args:
         host: where the master listens.
-        port: likewise.
+        port: its port.
         tokens: one for each robot.
-        folder: for what is recorded, should the master die.
-        parent: the master's process, where it started this one.
+        folder: for what was recorded if the master dies.
+        parent: the master's process id, if it started this process.
     """
     logging.getLogger("locust").setLevel(logging.ERROR)
     try:
@@ -177,7 +177,7 @@ def serve(host: str, port: int, tokens: Sequence[str | None], folder: Path, pare
     except ConnectionError:
         _leave(
             ExitCode.UNREACHABLE,
-            f"no master answers at {host}:{port}: give its address by --master-host and --master-port",
+            f"no master responds at {host}:{port}: give its address with --master-host and --master-port",
         )
     gevent.spawn(worker.follow, parent)
     worker.runner.greenlet.join()

@@ -1,9 +1,9 @@
 """A probe's process: `python -m loadtests.probe listen|publish --domain-id N --topic NAME`.
 
-Says in one line of JSON that it is ready, or what its problem is. A listener then writes a line for each delivery that
-it gets, `{"at_ns": …, "values": […]}`; a publisher reads lines of values, publishes each and writes `{"sent_ns": …}`.
+It writes a line of JSON that says that it is ready, or what its problem is. A listener then writes a line for each
+delivery, `{"at_ns": …, "values": […]}`. A publisher reads lines of values, publishes each and writes `{"sent_ns": …}`.
 Times are of CLOCK_MONOTONIC, which all processes of a machine share; values are in the order of the ROS message, in
-hexadecimal, which loses no bit. It ends when its input ends.
+hexadecimal, which loses no bit. The process ends when its input ends.
 """
 
 import argparse
@@ -26,7 +26,7 @@ def main() -> int:
     parser.add_argument("--topic", required=True)
     options = parser.parse_args()
     try:
-        # Here and nowhere else: a machine without ROS gets an answer, not a traceback.
+        # Imported here: a machine without ROS gets a message, not a traceback.
         from loadtests.probe.node import DeliveryNode  # noqa: PLC0415
 
         node = DeliveryNode(options.domain_id, options.topic, say)

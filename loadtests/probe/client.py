@@ -1,6 +1,6 @@
-"""The load test's end of the probes: starts their processes, and never waits for ever.
+"""The load test's end of the probes: starts their processes; every wait has a deadline.
 
-For a process that gevent has patched: waiting for a probe holds nobody else up.
+For a process that gevent has patched: waiting for a probe blocks no other greenlet.
 """
 
 import json
@@ -27,8 +27,8 @@ class Probe:
 
     def __init__(self, role: str, domain_id: int, topic: str) -> None:
         command = [sys.executable, "-m", "loadtests.probe", role, "--domain-id", str(domain_id), "--topic", topic]
-        # A robot that only looks on its own machine hears no multicast: it is told of us directly. Shared memory that
-        # killed processes left behind, or that a container does not share, swallows messages.
+        # A robot with discovery limited to its own machine receives no multicast: as static peer it finds us. Shared
+        # memory left behind by killed processes, or not shared by a container, loses messages.
         peers = ";".join(filter(None, [os.environ.get("ROS_STATIC_PEERS"), "127.0.0.1"]))
         environment = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"} | os.environ
         environment |= {"ROS_DOMAIN_ID": str(domain_id), "ROS_STATIC_PEERS": peers}
@@ -39,7 +39,7 @@ class Probe:
             stderr=subprocess.DEVNULL,
             env=environment,
             text=True,
-            start_new_session=True,  # Ctrl-C is for the load test, which then ends the probe
+            start_new_session=True,  # Ctrl-C goes to the load test, which then ends the probe
         )
         self._lines: Queue[dict[str, Any]] = Queue()
         self._reader = gevent.spawn(self._listen)
@@ -48,7 +48,7 @@ class Probe:
         """Wait until the probe is on the graph.
 
         Raises:
-            ProbeError: it does not start, for want of ROS or of the message package, or finds nobody.
+            ProbeError: it does not start (no ROS, no message package), or finds no peer on the topic.
         """
         self.next(_START_S)
 
@@ -84,7 +84,7 @@ class Probe:
         """Return the next line.
 
         Raises:
-            ProbeError: none comes in time, or it tells of a problem.
+            ProbeError: none comes in time, or it reports a problem.
         """
         try:
             told: dict[str, Any] = self._lines.get(timeout=within_s)

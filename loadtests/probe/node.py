@@ -1,4 +1,4 @@
-"""The probe's ROS node: hears deliveries as the application does, or publishes them without any web service."""
+"""The probe's ROS node: receives deliveries as the application does, or publishes them without any web service."""
 
 import threading
 import time
@@ -26,7 +26,7 @@ class DeliveryNode:
     Args:
         domain_id: the robot's ROS domain.
         topic: full name.
-        say: told of each delivery that comes, on the executor's thread.
+        say: receives each delivery, on the executor's thread.
     """
 
     def __init__(self, domain_id: int, topic: str, say: Callable[[dict[str, Any]], None]) -> None:
@@ -44,7 +44,7 @@ class DeliveryNode:
     def listen(self) -> str | None:
         """Subscribe in the application's place, once there is a publisher; returns the problem, if there is one."""
         if not self._found(lambda: self._node.count_publishers(self._topic)):
-            return f"nobody publishes {self._topic} in ROS domain {self._context.get_domain_id()}"
+            return f"nothing publishes {self._topic} in ROS domain {self._context.get_domain_id()}"
         publishers = self._node.get_publishers_info_by_topic(self._topic)
         best_effort = any(one.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for one in publishers)
         reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
@@ -57,7 +57,7 @@ class DeliveryNode:
         """Become a publisher, once there is a subscriber; returns the problem, if there is one."""
         self._publisher = self._node.create_publisher(DeliveryRequestMsg, self._topic, QoSProfile(depth=_DEPTH))
         if not self._found(self._publisher.get_subscription_count):
-            return f"nobody listens to {self._topic} in ROS domain {self._context.get_domain_id()}"
+            return f"nothing subscribes to {self._topic} in ROS domain {self._context.get_domain_id()}"
         return None
 
     def publish(self, values: list[str]) -> int:

@@ -1,6 +1,6 @@
-"""Stored results, by name: what later runs are compared with, and what a history is made of.
+"""Results stored by name, which later runs are compared with and a history is made of.
 
-A baseline is a folder of latency.json files that are named by when they were measured; the last one is compared with.
+A baseline is a folder of latency.json files, named by when they were measured; the latest one is compared with.
 """
 
 import json
@@ -22,10 +22,10 @@ def folder_of(baselines: Path, name: str) -> Path:
     """Return the folder of a baseline.
 
     Raises:
-        BaselineError: no name for a folder.
+        BaselineError: the name is not allowed.
     """
     if not _NAME.fullmatch(name):
-        raise BaselineError(f"baseline {name!r}: a name is made of letters, digits, '.', '_' and '-'")
+        raise BaselineError(f"baseline {name!r}: a name consists of letters, digits, '.', '_' and '-'")
     return baselines / name
 
 
@@ -33,7 +33,7 @@ def newest(folder: Path) -> Path:
     """Return the result that was stored last.
 
     Raises:
-        BaselineError: there is none.
+        BaselineError: there is no result.
     """
     stored = sorted(folder.glob(_PATTERN))
     if not stored:

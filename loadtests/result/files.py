@@ -1,4 +1,4 @@
-"""Writing a result: latency.json and one .hgrm file for each series, each in one piece or not at all."""
+"""The files of a result: latency.json and one .hgrm file for each series, each written completely or not at all."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""What became of a run, as it goes along: the document is made of it in the end."""
+"""What became of a run, collected while it runs; latency.json is made of it."""
 
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -38,13 +38,13 @@ class Outcome:
 
     Attributes:
         robots: the one under load, and the one that it is compared with, if any.
-        findings: of the calls to the first before the run.
-        notes: worth knowing; invalid: makes the run worthless.
+        findings: of the calls to the robot under load before the run.
+        notes: worth knowing; invalid: reasons why the figures are worthless.
         interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
         carried: each repeat's plan, and how many seconds of it were carried out.
-        paused: what requests cost after a pause and behind one another, by series.
+        paused: what requests cost after a pause and right behind one another, by series.
         before: the machine when the run began.
-        robot_process: who listened at the robot's address before the first request of the duel, where that is known.
+        robot_process: the process at the robot's address before the duel, where that is known.
         cpu_share: the busiest worker's share of a core in the duel.
         steps: results of the stepped load.
         knee_searches: results of the searches for the knee; over_connections: of more and more connections.

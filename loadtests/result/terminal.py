@@ -1,12 +1,12 @@
-"""What a run has to say in the end, for the terminal."""
+"""The summary of a run, for the terminal."""
 
 from typing import Any
 
 _JUDGED = {
     "differs": "a difference",
-    "bounded": "a difference of which only a bound is known",
-    "noise": "cannot be told from noise",
-    "none": "says nothing",
+    "bounded": "a difference, known only by a bound",
+    "noise": "not significant",
+    "none": "inconclusive",
 }
 
 
@@ -68,17 +68,17 @@ def _knees(document: dict[str, Any]) -> list[str]:
     for entry in document["knee"]:
         highest = entry["highest_rate"]
         reached = (
-            "no rate offered meets" if highest is None else f"{highest:g}/s is the highest rate offered that meets"
+            "no offered rate meets" if highest is None else f"{highest:g}/s is the highest offered rate that meets"
         )
         lines.append(f"{entry['interface']}: {reached}: {entry['criterion']}")
     for entry in document["knee_search"]:
         if entry["rate"] is not None:
             low, high = entry["interval"]
-            found = f"gives way at {entry['rate']:.0f}/s ({low:.0f} to {high:.0f}, {entry['searches']} searches)"
+            found = f"breaks down at {entry['rate']:.0f}/s ({low:.0f} to {high:.0f}, {entry['searches']} searches)"
         elif entry["held_up_to"] is not None:
-            found = f"did not give way up to {entry['held_up_to']:.0f}/s"
+            found = f"did not break down up to {entry['held_up_to']:.0f}/s"
         else:
-            found = "no rate tried meets the criterion"
+            found = "no rate meets the criterion"
         lines.append(f"{entry['interface']}: {found}")
     return lines
 
@@ -104,7 +104,7 @@ def _end_to_end(found: dict[str, Any] | None) -> list[str]:
     for entry in (found or {"ways": []})["ways"]:
         times, lost = entry["to_application_ms"], entry["lost"] + entry["errors"]
         answer = entry["answer_ms"]["p50"] if entry["answer_ms"] else None
-        answered = "" if answer is None else f", the answer after {answer:.3f} ms"
+        answered = "" if answer is None else f", the response after {answer:.3f} ms"
         missing = f", {lost} never arrived" if lost else ""
         lines.append(
             f"{entry['interface']} to the application: {_ms(times['p50']).strip()} ms at the median, "

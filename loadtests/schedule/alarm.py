@@ -1,11 +1,12 @@
 """A clock that rings at an absolute time, inside gevent's loop.
 
-On Linux a timerfd on CLOCK_MONOTONIC, watched by the loop like a socket. A process that has slept for milliseconds
-wakes up some 0.1 ms late, for its processor has slept too; so the timer goes off a little early and the loop turns
-without sleeping until the time has come, which takes at most an eighth of a processor and is right to a few
-microseconds. Sockets are served all the while: an answer never waits for the next request.
-gevent.sleep wakes on libev's millisecond grid, which would drown a service time of 0.1 ms. Where there is no
-timerfd the loop's own timer serves, and the result says so.
+On Linux it is a timerfd on CLOCK_MONOTONIC, watched by the loop like a socket. A process that has slept for
+milliseconds wakes up some 0.1 ms late, because its processor has slept too. So the timer goes off a little early, and
+the loop spins until the time has come: that takes at most an eighth of a processor and is exact to a few microseconds.
+Sockets are served all the while: a response never waits for the next request.
+
+gevent.sleep wakes on libev's millisecond grid, which would hide a service time of 0.1 ms. Where there is no timerfd the
+loop's own timer is used, and the result says so.
 """
 
 import ctypes

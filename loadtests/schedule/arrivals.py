@@ -1,7 +1,7 @@
-"""When requests start: constant spacing or a Poisson process, fixed by the seed, dealt out to the workers.
+"""When requests start: constant spacing or a Poisson process, fixed by the seed, divided among the workers.
 
-Every worker computes the whole schedule and takes its own share of each segment, so that the shares add up to
-the schedule without any message between them.
+Every worker computes the whole schedule and takes its own share of each segment, so that the shares add up to the
+schedule without any message between workers.
 """
 
 from collections import Counter
@@ -29,7 +29,7 @@ class Schedule:
     def _counted(self) -> list[int]:
         """Return the arrivals of each segment over all workers: the rate times the time that the segment is open.
 
-        Constant: rounding errors do not add up over segments.
+        With constant spacing, rounding errors do not add up over segments.
         """
         plan = self.plan
         if not plan.open_model:
@@ -51,7 +51,7 @@ class Schedule:
     def _counted_before(self) -> list[int]:
         """Return how many arrivals a segment's client and interface had in the segments before it.
 
-        Workers and operations take turns from there on: in short blocks whoever comes first would get more.
+        Workers and operations continue in turn from there: in short blocks the first one would otherwise get more.
         """
         so_far: Counter[tuple[str, str, str]] = Counter()
         before = []
@@ -96,7 +96,7 @@ class Schedule:
         rng = self._rng(segment, 3)
         if self.plan.load.arrivals == "poisson":
             places = np.sort(rng.random(count))
-        else:  # a phase by lot, lest the schedule beat with the robot's own clock
+        else:  # a random phase, so that the schedule does not beat with the robot's clock
             places = (np.arange(count) + rng.random()) / max(count, 1)
         due: list[int] = (start + places * (end - start)).astype(np.int64).tolist()
         return due

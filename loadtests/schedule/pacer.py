@@ -1,9 +1,9 @@
 """Starts requests at their times.
 
-The pacer runs in gevent's hub, rung by an alarm. In the open model it hands each due arrival to a user that
-waits; when none does, the arrival waits for the next user that becomes free, its response time running on,
-and is dropped (and counted) once its deadline has passed. In the closed model it only opens and closes the
-gate of each segment: every user takes its next request as soon as it has finished the last.
+The pacer runs in gevent's hub, woken by an alarm. In the open model it hands each due arrival to a waiting user. When
+no user is free the arrival waits for the next one, while its response time runs on; once its deadline has passed it is
+dropped and counted. In the closed model the pacer only opens and closes the gate of each segment: every user takes its
+next request as soon as it has finished the last.
 """
 
 from collections import deque
@@ -22,7 +22,7 @@ from loadtests.schedule.arrivals import Schedule
 class Arrival(NamedTuple):
     """One request to send: its segment, operation and payload, and when it is due (monotonic ns).
 
-    `queued`: no user was free when it was due, so that its delay is the robot's affair and not the pacer's.
+    `queued`: no user was free when it was due, so that its delay is due to the robot and not to the pacer.
     """
 
     segment: int
@@ -38,7 +38,7 @@ class Pacer:
     Args:
         timeout_ns: an arrival older than this is dropped.
         on_segment: called in the quiet gap before each segment, with its index.
-        on_drop: called with an arrival that nobody could start.
+        on_drop: called with an arrival that no user could start.
     """
 
     def __init__(self, timeout_ns: int, on_segment: Callable[[int], None], on_drop: Callable[[Arrival], None]) -> None:
@@ -193,6 +193,6 @@ class Pacer:
             now = now_ns()
             if now < self._closes:
                 waiter.switch(self._in_turn(schedule, now))
-            else:  # this process was held up until the segment was over: a request of now is none of its
+            else:  # this process was delayed until the segment was over: a request now would not belong to it
                 self._idle.append(waiter)
         self._arm(schedule)

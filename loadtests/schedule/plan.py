@@ -1,13 +1,13 @@
 """What a run does when: segments of one client on one interface, a schedule that the seed fixes.
 
-A fair duel: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse by lot (ABBA).
-A machine's level wanders within a second: the sooner one follows the other, the more of it they share. A block has to
-be long beside an answer, though, for what is under way when it ends meets the other interface. In two quartets of
-five one interface meets itself under two names (A/A): what difference that shows is noise, and it is given as
-much time as the duel, so that it is known as well as the effect is. The library clients get quartets of their
-own, for their CPU time would delay the wire client's starts.
+A fair duel: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse at random (ABBA).
+The machine's speed drifts within a second: the sooner one follows the other, the more they share of it. But a block has
+to be long beside a response, because requests under way at its end overlap with the other interface. In two quartets of
+five, one interface meets itself under two names (the A/A control): the difference that this shows is noise. It gets as
+much time as the duel, so that it is known as exactly as the effect. The library clients have quartets of their own,
+because their CPU time would delay the wire client's starts.
 
-Three interfaces take turns likewise, in sextets; two robots over one interface in each quartet.
+Three interfaces take turns in the same way, in sextets; two robots over one interface in each quartet.
 """
 
 import math
@@ -52,9 +52,9 @@ class Segment:
         start_ns, end_ns: offsets from the run's start.
         phase: `warmup`, `duel`, `aa`, `against` (the duel's blocks of the other robot) or `step`.
         label: in phase `aa` the name that the interface goes by, `a` or `b`.
-        pair: neighbours that are compared share a number.
+        pair: neighbours that are compared with one another share a number.
         rate: arrivals per second over all workers; 0 in the closed model.
-        robot: which robot is called: 0, or 1 for the one that it is compared with.
+        robot: 0, or 1 for the robot that it is compared with.
     """
 
     start_ns: int
@@ -84,7 +84,7 @@ class Load:
 
     Attributes:
         rate: arrivals per second over all workers (open model); None in the closed model.
-        users: users that each wait for their answer (closed model).
+        users: users that each wait for their response (closed model).
         arrivals: `constant` or `poisson`.
         seed: fixes schedule, payloads and intervals.
     """
@@ -103,11 +103,11 @@ class Plan:
 
     Attributes:
         offers: operation numbers by `interface/client`, where not all are offered.
-        robots: 2 where two robots meet in place of two interfaces.
-        first_segment: numbers the segments on from those of the plan before it.
+        robots: 2 where two robots are compared instead of two interfaces.
+        first_segment: number of its first segment; numbers go on from plan to plan.
         step_rate: a step of the stepped load instead of a duel: arrivals per second; 0 in the closed model.
-        connections: users that are up in all; in the closed model as many take part as the load says.
-        repeat: which of several runs of the same plan this is; those after the first begin with new connections.
+        connections: users started in total; in the closed model as many take part as the load says.
+        repeat: which repeat of the duel this is; repeats after the first begin with new connections.
         offset_s: when it starts, in seconds of load since the first one's start.
         least_block_s: BLOCK_S, or SHORT_BLOCK_S where the robot is known to be quick.
     """
@@ -237,7 +237,7 @@ class Plan:
     def _round(self, number: int, *, swapped: bool) -> list[Segment]:
         """Return the blocks of all sides in order and then in reverse: four blocks of two sides, six of three.
 
-        Of five rounds the second goes to the library clients, the third and the fifth to A/A.
+        Of five rounds the second goes to the library clients, the third and the fifth to the A/A control.
         """
         turn = number % _TURNS
         client = self.clients[-1] if turn == _LIBRARY_TURN else self.clients[0]
@@ -254,7 +254,7 @@ class Plan:
         if swapped:
             sides.reverse()
         if len(sides) == 1:
-            sides *= 2  # one interface alone has as many blocks
+            sides *= 2  # one interface alone gets as many blocks
         rate = self.load.rate or 0.0
         return [
             Segment(0, 0, phase, interface, client, label, 2 * number + half, rate, robot)

@@ -1,10 +1,10 @@
-"""What runs differ by and one run cannot see: a component of the interval that comes from other measurements.
+"""The part of an interval that one run cannot show: by how much runs differ.
 
-Within a run the ratio of the interfaces hardly wanders, and resampling says how well that run knows it. Another run of
-the same robot finds another ratio all the same, for what else the machine does adds to both interfaces' times, and
-that changes over minutes. This is an uncertainty of type B (JCGM 100:2008, GUM, 4.3): its size was found by measuring
-one robot again and again (`benchmarks/repeatability.py`; the figures stand in docs/load.md). Where a run is repeated
-often enough, its own repeats say it, and nothing is added.
+Within a run the ratio of the interfaces hardly drifts, and resampling shows how exactly that run knows it. Another run
+of the same robot finds another ratio all the same: what else the machine does adds to both interfaces' times, and that
+changes over minutes. This is an uncertainty of type B (JCGM 100:2008, GUM, 4.3). Its size was found by measuring one
+robot repeatedly (`benchmarks/repeatability.py`; the figures are in docs/load.md). Where a run has enough repeats, they
+show it themselves, and nothing is added.
 """
 
 import math

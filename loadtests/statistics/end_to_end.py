@@ -1,7 +1,7 @@
 """The `end_to_end` of latency.json: journeys from the request to the application, as figures.
 
-A delivery that failed or never arrived counts in every figure, as at least the time for which it was waited: a robot
-that loses what it is slow at is not quick.
+A delivery that failed or never arrived counts in every figure, with at least the time for which it was waited: a robot
+that loses its slow deliveries is not fast.
 """
 
 import math
@@ -28,9 +28,9 @@ def ways(
 
     Args:
         arrivals: nanoseconds from the request's start to the application, by round; None where it never came.
-        answers: likewise to the request's answer; None where the way has none.
-        errors: requests that brought no good answer.
-        waited_ns: how long was waited for each.
+        answers: nanoseconds to the response; None where the way has none.
+        errors: requests without a good response.
+        waited_ns: how long each delivery was waited for.
     """
     return [
         _way(way, times, answers[way], errors[way], waited_ns)
@@ -63,7 +63,7 @@ def _way(way: str, times: Journey, answers: Journey, errors: int, waited_ns: int
 def _over(times: Journey, base: Journey) -> dict[str, Any]:
     """Return the median of the ratios of neighbours, and its interval by their order (the sign test's).
 
-    One that never arrived took longer than any; of two that did not nothing is known.
+    A delivery that never arrived counts as longer than any other; pairs of two such deliveries are left out.
     """
     taken = ([math.inf if time is None else time for time in side] for side in (times, base))
     ratios = [one / other for one, other in zip(*taken, strict=False) if other and min(one, other) < math.inf]

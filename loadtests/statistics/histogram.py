@@ -1,9 +1,9 @@
 """HdrHistogram's bins on NumPy arrays: one microsecond and three significant digits, up to an hour.
 
-The bins are those of HdrHistogram (http://hdrhistogram.org), so that any of its readers takes our files; the
-pure-Python recorder of the `hdrhistogram` package costs 2 us a value, and here whole buffers are binned at
-once. Counts are kept sparsely: adding two histograms is adding counts, hence a merge of parts equals the
-histogram of the whole, whatever the order.
+The bins are those of HdrHistogram (http://hdrhistogram.org), so that any of its readers can read our files. The
+pure-Python recorder of the `hdrhistogram` package costs 2 us a value; here whole buffers are binned at once. Counts are
+sparse: adding two histograms is adding counts, so that a merge of parts equals the histogram of the whole, in any
+order.
 """
 
 from collections.abc import Iterable
@@ -47,8 +47,8 @@ def edges_us(bins: Ints) -> tuple[Ints, Ints]:
 class Histogram:
     """Counts by bin, with the exact number, sum and extremes (nanoseconds).
 
-    What is added waits in arrays and is summed at once when there is enough of it, or when somebody looks: a merge
-    costs some 10 ns a bin, whereas adding bin by bin to a dict costs ten times that.
+    Added counts wait in arrays until there are enough of them, or until they are read: a merge costs some 10 ns a bin,
+    and adding bin by bin to a dict ten times that.
     """
 
     __slots__ = ("_bins", "_counts", "_pending", "_waiting", "highest_ns", "lowest_ns", "sum_ns", "total")

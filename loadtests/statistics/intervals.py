@@ -1,10 +1,10 @@
 """Confidence intervals of medians, p99s and other quantiles, and of their ratios and differences.
 
-By scipy's bootstrap over rounds (see `rounds`), or over repeats and the rounds within them (Davison and Hinkley 1997,
-section 3.8) where the run was repeated often enough. Percentile intervals of few rounds are too narrow; they are taken
-at the level that makes them as wide as Student's t (Hesterberg 2015), and widened by what correlation is left between
-rounds and by what the repeats differ beyond what each run's own scatter explains (Birge 1932). How often they are
-right is measured by `benchmarks/calibration.py`.
+They come from scipy's bootstrap over rounds (module `rounds`), or over repeats and the rounds within them (Davison and
+Hinkley 1997, section 3.8) where the run has enough repeats. Percentile intervals of few rounds are too narrow: they are
+taken at the level that makes them as wide as Student's t (Hesterberg 2015). They are widened by the correlation that is
+left between rounds, and by what the repeats differ beyond each run's own scatter (Birge 1932). How often they are right
+is measured by `benchmarks/calibration.py`.
 """
 
 import math
@@ -23,8 +23,8 @@ LEAST_ROUNDS = 6
 _AT_ONCE = 100  # resamples held in memory together
 _TAIL = 0.025
 _UPPER_TAIL = 0.99
-#: On the logarithmic scale: an interval that reaches farther than a factor of 1e13 says no more than one that does not,
-#: and further on its bounds would be zero and infinite.
+#: On the logarithmic scale: an interval wider than a factor of 1e13 says no more than one of that width, and its bounds
+#: would become zero and infinite.
 _FARTHEST = 30.0
 
 
@@ -187,7 +187,7 @@ def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
 def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
     """Return the distribution-free 95 % interval of a quantile, from the order of the samples alone.
 
-    It takes them as independent, which requests are not quite: it serves where there are too few blocks to resample.
+    It assumes independent samples, which requests are not quite: it is used where there are too few blocks to resample.
     """
     samples = histogram.total
     if samples < samples_for_interval(quantile):

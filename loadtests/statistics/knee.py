@@ -1,8 +1,8 @@
-"""Where a robot gives way, found by bisection and found again: the `knee_search` of latency.json.
+"""The rate at which a robot breaks down, found by repeated bisection: the `knee_search` of latency.json.
 
-A search brackets the knee between a rate that was kept and one that was not. It is repeated, because a single search
-ends where chance lets one step fail. Of n searches' estimates the lowest and the highest enclose the median with
-probability 1 - 2^(1 - n) (the sign test's interval); the brackets' own ends make it no narrower.
+A search brackets the knee between a rate that met the criterion and one that missed it. It is repeated, because a
+single search ends where one step fails by chance. Of n searches' estimates the lowest and the highest enclose the
+median with probability 1 - 2^(1 - n) (the sign test's interval); the brackets' own ends make it no narrower.
 """
 
 import math
@@ -15,7 +15,7 @@ from loadtests.statistics.steps import Step
 
 RESOLUTION = 1.08  # a bracket whose ends differ by no more is narrow enough
 _GROWTH = 2.0
-_NEAR = 1.5  # how far from an earlier search's bracket the next one begins
+_NEAR = 1.5  # the next search begins this far from an earlier one's bracket
 
 
 @dataclass
@@ -23,10 +23,10 @@ class Search:
     """One search for the highest rate that meets the criterion.
 
     Attributes:
-        lowest, highest: rates to stay within.
-        kept: the highest rate that was kept so far; None: none yet.
-        missed: the lowest rate that was not.
-        trials: everything that was tried, by rate.
+        lowest, highest: limits on the rate.
+        kept: the highest rate that has met the criterion so far.
+        missed: the lowest rate that has missed it.
+        trials: all trials, by rate.
     """
 
     lowest: float

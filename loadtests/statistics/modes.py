@@ -1,8 +1,8 @@
-"""Does a series have two modes? Quantiles and an interval do not show it: half the requests may take ten times as long.
+"""Whether a series has two modes, which quantiles and intervals hide: half the requests may take ten times as long.
 
-Hartigan's dip (The dip test of unimodality, Annals of Statistics 13, 1985; by the `diptest` package) on the logarithm
-of the service times, which are read off the histogram at evenly spaced quantiles. The test finds bumps of no account in
-thousands of samples: two modes are told where there is a valley between them as well, with enough on both sides of it.
+The test is Hartigan's dip (The dip test of unimodality, Annals of Statistics 13, 1985; by the `diptest` package) on the
+logarithm of the service times, read from the histogram at evenly spaced quantiles. In thousands of samples it finds
+insignificant bumps too: two modes are reported only where there is a valley between them, with enough on both sides.
 """
 
 from typing import Any

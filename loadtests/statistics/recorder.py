@@ -1,9 +1,9 @@
-"""Keeps what happened, in memory that does not grow with the number of requests.
+"""Records what happened, in memory that does not grow with the number of requests.
 
-A request is seven integers appended to a buffer; the buffer is binned by NumPy in the quiet gap between blocks.
-A cell holds the histograms of one operation in one segment of the plan (a block): the blocks are what the
-statistics resample, and their sums are the series. The number of segments is bounded by the plan, that of bins
-by the histogram. Cells add, so that those of processes and machines merge into exactly their union.
+A request is eight integers appended to a buffer; NumPy bins the buffer in the quiet gap between blocks. A cell holds
+the histograms of one operation in one segment of the plan (a block): the statistics resample blocks, and a series is
+their sum. The plan bounds the number of segments, and the histogram the number of bins. Cells add, so that those of
+several processes merge into exactly their union.
 """
 
 from array import array
@@ -28,9 +28,9 @@ class Cell:
     """One operation in one segment: histograms of the successful requests, and the ages of the others.
 
     Attributes:
-        service, response: of the requests that were answered as they should be.
-        failed_service, failed_response: of the others, until they were given up: from the actual and from the
-            intended start. One that never started has its wait in both.
+        service, response: times of the successful requests.
+        failed_service, failed_response: of the others, until they were given up, from the actual and from the
+            intended start. A request that never started has its wait in both.
         queued: how long arrivals waited because no user was free when they were due.
         errors: requests that failed; late: started over 1 ms after their time; dropped: never started.
     """
@@ -108,8 +108,8 @@ class Recorder:
     """What happened so far.
 
     Args:
-        series_of: the series number of each segment (see `Plan.series_of`); spans and errors are kept by series.
-        listener: told of each buffer's response times, by series and operation.
+        series_of: the series number of each segment (`Plan.series_of`); spans and errors are kept by series.
+        listener: receives each buffer's response times, by series and operation.
     """
 
     def __init__(

@@ -1,14 +1,14 @@
-"""What is resampled: rounds of neighbouring pairs of blocks, long enough that one says nothing about the next.
+"""What is resampled: rounds of neighbouring pairs of blocks, long enough to be independent of one another.
 
-Requests that follow one another are not independent, and blocks are not either: a stall or a drift meets several.
-Resampling what depends on its neighbour makes intervals too narrow (Carlstein 1986). The smallest unit is the pair of
-neighbouring blocks; units are put together, two at least where there are enough for that (a quartet, in which both
-sides have been first), until the correlation between one round and the next is gone. What is left of it then widens
-the interval by as much as it makes the mean of a first-order autoregressive series less certain.
+Consecutive requests are not independent, and blocks are not either: a stall or a drift affects several. Resampling
+dependent parts makes intervals too narrow (Carlstein 1986). The smallest unit is the pair of neighbouring blocks. Units
+are put together, at least two where there are enough (a quartet, in which both sides have been first), until one round
+does not correlate with the next. The correlation that is left widens the interval by as much as it makes the mean of a
+first-order autoregressive series less certain.
 
-The correlation is that of each unit's influence on the figure in question: for a quantile the share of its samples
-that lie beyond, for a mean their sum. This is what the figure's error is made of (Hampel 1974), and unlike a median of
-few samples it exists for every unit.
+The correlation is that of each unit's influence on the figure: for a quantile the share of its samples beyond it, for a
+mean their sum. The figure's error is made of this influence (Hampel 1974), and unlike a median of few samples it exists
+for every unit.
 """
 
 import math
@@ -139,7 +139,7 @@ class Rounds:
 def lag_correlation(values: Floats, repeats: Ints) -> float | None:
     """Return the correlation of each value with the next, within repeats; None where there are too few values.
 
-    A short series makes it look smaller than it is; that is put right to first order (Marriott and Pope 1954).
+    A short series makes it look too small; that is corrected to first order (Marriott and Pope 1954).
     """
     number = len(values)
     if number < _LEAST_FOR_LAG:

@@ -23,13 +23,13 @@ def test_the_address_is_read_from_the_wsdl():
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"<html><body>Welcome</body></html>", "is no WSDL 1.1: its root element is 'html'"),
-        (b"no xml", "is no XML"),
-        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", "holds a document type declaration"),
+        (b"<html><body>Welcome</body></html>", "is not a WSDL 1.1: its root element is 'html'"),
+        (b"no xml", "is not XML"),
+        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", "has a document type declaration"),
         ((CONTRACT_DIR / "subscribers.wsdl").read_bytes(), "has no operation 'ExecuteDeliveryRequest'"),
         (
             (CONTRACT_DIR / "publishers.wsdl").read_bytes().replace(b"soap:address", b"soap:nothing"),
-            "holds no soap:address",
+            "has no soap:address",
         ),
         (
             (CONTRACT_DIR / "publishers.wsdl").read_bytes().replace(b"http://127.0.0.1:5555", b"REPLACE_ME"),
