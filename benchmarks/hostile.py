@@ -183,6 +183,7 @@ class Hostile:
 async def main(rest: int, soap: int) -> None:
     """Keep all kinds busy until standard input ends."""
     hostile = Hostile(rest, soap)
+    print("ready", flush=True)
     tasks = [asyncio.create_task(hostile.for_ever(kind)) for kind, count in hostile.kinds() for _ in range(count)]
     await asyncio.to_thread(sys.stdin.read)
     for task in tasks:

@@ -9,18 +9,14 @@ Intervals that are right at 95 % overlap less often than one thinks: of ten, all
 """
 
 import argparse
-import json
 import math
-import os
-import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from robot import running_robot
+from programs import machine, median_of, roaas_load, running_robot
 from scipy import stats
 
 _WITHIN = 0.05
@@ -37,23 +33,16 @@ class Run(NamedTuple):
 
 
 def measured(rest: str, soap: str, seconds: float, seed: int) -> Run:
-    """One run of `roaas load`."""
-    with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-c", "from loadtests.cli import load; load()", _STATEMENT, "--rest", rest]
-        services = ["--publishers-wsdl", soap, "--subscribers-wsdl", soap.replace("publisher", "subscriber")]
-        what = ["--allow-motion", "--operation", "delivery", "--client", "wire", "--rate", "200", "--warmup", "1"]
-        times = ["--duration", f"{seconds:g}", "--seed", str(seed), "--out", folder]
-        done = subprocess.run([*command, *services, *what, *times], check=False, capture_output=True, text=True)
-        file = Path(folder) / "latency.json"
-        if not file.exists():
-            raise RuntimeError(done.stderr)
-        found: dict[str, Any] = json.loads(file.read_text())
-    median = next(entry for entry in found["comparisons"] if entry["quantile"] == "p50")
+    """Run `roaas load` once."""
+    services = ["--publishers-wsdl", soap, "--subscribers-wsdl", soap.replace("publisher", "subscriber")]
+    what = ["--allow-motion", "--operation", "delivery", "--rate", "200", "--warmup", "1"]
+    times = ["--duration", f"{seconds:g}", "--seed", seed]
+    found = roaas_load(_STATEMENT, "--rest", rest, *services, *what, *times)
+    median = median_of(found)
     low, high = median["ci95"] or (math.nan, math.nan)
-    load = os.getloadavg()[0]
     print(
         f"run {seed}: {median['ratio']:.3f} ({low:.3f} to {high:.3f}), {median['judgement']}, "
-        f"{'valid' if found['valid'] else '; '.join(found['invalid_because'])}, load average {load:.1f}",
+        f"{'valid' if found['valid'] else '; '.join(found['invalid_because'])}, {machine()}",
         flush=True,
     )
     return Run(median["ratio"], low, high)
@@ -84,7 +73,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=20.0, help="of each [20]")
     parser.add_argument("--domain-id", default="50", help="ROS domain of the robot [50]")
     options = parser.parse_args()
-    with running_robot(options.domain_id) as robot:
+    with running_robot(f"--domain-id={options.domain_id}") as robot:
         rest = f"http://{robot.rest.host}:{robot.rest.port}"
         soap = f"http://{robot.soap.host}:{robot.soap.port}{robot.soap.target}?wsdl"
         runs = [measured(rest, soap, options.seconds, seed) for seed in range(1, options.runs + 1)]

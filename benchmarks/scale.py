@@ -7,20 +7,17 @@ the books have to balance to the request. The exit code is 1 where anything diff
 """
 
 import argparse
-import json
 import multiprocessing
-import os
 import signal
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import msgpack
 import numpy as np
+from fixed import POSE, running_bare
+from programs import machine, roaas_load
 
 from loadtests.statistics.recorder import Recorder
 
@@ -28,25 +25,6 @@ _SEGMENTS = 600
 _REPORTED = 4000  # requests in a report: what a worker at 4,000/s has to tell after a second
 _BLOCKS = 10  # that it tells of
 _SERIES = {segment: 4 + 2 * (segment % 2) for segment in range(_SEGMENTS)}
-_SERVER = """
-import json, sys
-sys.path.insert(0, sys.argv[1])
-import bare
-count = 0
-inner = bare.application(json.loads(sys.argv[2]))
-async def counting(scope, receive, send):
-    global count
-    count += 1
-    await inner(scope, receive, send)
-bare.application = lambda _: counting
-try:
-    bare.main(sys.argv[3])
-except KeyboardInterrupt:
-    pass
-finally:
-    print(count, flush=True)
-"""
-_POSE = '{"pose": {"pose": {"position": {"x": 1.0, "y": 2.0, "z": 0.0}}}, "covariance": []}'
 
 
 def record(book: Recorder, seed: int, first: int, requests: int) -> None:
@@ -138,27 +116,12 @@ def recorders(requests: int, workers: int, seed: int) -> bool:
 
 
 def run(seconds: float, workers: int, users: int) -> bool:
-    """`roaas load` over workers, beside what the server has counted."""
-    answer = {
-        "status": 200,
-        "body": _POSE,
-        "headers": [["content-type", "application/json"], ["content-length", str(len(_POSE))]],
-    }
-    with tempfile.TemporaryDirectory() as folder:
-        answers = Path(folder) / "answers.json"
-        answers.write_text(json.dumps({"/robot/pose/": answer}))
-        command = [sys.executable, "-c", _SERVER, Path(__file__).parent, answers.read_text(), answers]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-            if server.stdout is None:
-                return False
-            url = f"http://127.0.0.1:{server.stdout.readline().strip()}"
-            load = [sys.executable, "-c", "from loadtests.cli import load; load()", "--rest", url, "--client", "wire"]
-            times = ["--users", str(users), "--duration", f"{seconds:g}", "--warmup", "0"]
-            subprocess.run([*load, *times, "--processes", str(workers), "--out", folder], check=False)
-            server.send_signal(signal.SIGINT)
-            reached = int(server.stdout.readline())
-        found: dict[str, Any] = json.loads((Path(folder) / "latency.json").read_text())
-    return balance(found, reached)
+    """Run `roaas load` over workers, and compare with what the server has counted."""
+    with running_bare([POSE], "--count") as (port, server):
+        options = ["--users", users, "--duration", f"{seconds:g}", "--warmup", "0", "--processes", workers]
+        found = roaas_load("--rest", f"http://127.0.0.1:{port}", *options)
+        server.send_signal(signal.SIGINT)
+        return balance(found, int(server.stdout.readline() if server.stdout else 0))
 
 
 def balance(found: dict[str, Any], reached: int) -> bool:
@@ -195,7 +158,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=["recorders", "run"], help="one part alone")
     options = parser.parse_args()
-    print(f"{os.cpu_count()} processors, load average {os.getloadavg()[0]:.1f}")
+    print(machine())
     met = []
     if options.only != "run":
         met.append(recorders(options.requests, options.workers, options.seed))

@@ -23,13 +23,12 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from fixed import running_bare
-from footprint import Footprint
-from loader import Call
-from robot import DELIVERY, ENVELOPE, report
+from fixed import answers_to, running_bare
+from programs import HERE, Footprint, report, running_robot, started
+from robot import DELIVERY, ENVELOPE
 
 RATE = 100.0  # good requests a second, and as many to the bare application
 SLICES = 10  # of a window; its p99 is the median of theirs, so that a neighbour's burst is none of the robot's
@@ -96,18 +95,20 @@ class Soak:
         """Keep everything busy for as long as asked, and look at what is left."""
         with contextlib.ExitStack() as stack:
             simulation = stack.enter_context(self._simulation())
-            pid, rest, soap = stack.enter_context(self._web_services())
-            pose = Call("127.0.0.1", rest, "GET", "/robot/pose/")
+            log = stack.enter_context(self.log.open("w", encoding="utf-8"))
+            robot = stack.enter_context(running_robot("--attach", self._domain, stderr=log))
+            pid, rest, soap = robot.pids[0], robot.rest.port, robot.soap.port
             self._await_pose(rest)
-            bare, _ = stack.enter_context(running_bare([pose]))
+            bare, _ = stack.enter_context(running_bare(answers_to([replace(robot.rest, target="/robot/pose/")])))
             clients = {False: Client(rest), True: Client(soap)}
             yardstick = Client(bare)
             before = Footprint.of(pid)
-            hostile = stack.enter_context(self._hostile(rest, soap))
-            started = time.monotonic()
+            command = (sys.executable, HERE / "hostile.py", rest, soap)
+            hostile, _ = stack.enter_context(started(*command, stdin=subprocess.PIPE))
+            began = time.monotonic()
             tenth = self.seconds / 10
             next_kill, asked = 2 * tenth, 0
-            while (now := time.monotonic() - started) < self.seconds:
+            while (now := time.monotonic() - began) < self.seconds:
                 if not self.warm.threads and now > tenth:
                     self.warm = Footprint.of(pid)
                 # None in the last part, whose time is compared with that of the first.
@@ -120,7 +121,7 @@ class Soak:
                     self.processor.append((now, Footprint.of(pid).processor))
                 if asked % (10 * RATE) == 0:
                     print(f"{now:5.0f} s: {dict(self.good.statuses)}, {Footprint.of(pid)}", flush=True)
-                time.sleep(max(0.0, started + asked / RATE - time.monotonic()))
+                time.sleep(max(0.0, began + asked / RATE - time.monotonic()))
             assert hostile.stdin is not None  # noqa: S101 - tells mypy what PIPE means
             hostile.stdin.close()
             assert hostile.stdout is not None  # noqa: S101 - as above
@@ -169,32 +170,6 @@ class Soak:
     def _start_simulation(self) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", "reference_robot.simulation", self._domain, "--time-scale=5"]
         return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True)
-
-    @contextlib.contextmanager
-    def _web_services(self) -> Iterator[tuple[int, int, int]]:
-        """Run the web services; yields process and ports."""
-        command = [sys.executable, "-m", "reference_robot", "--attach", "--rest-port=0", "--soap-port=0", self._domain]
-        with (
-            self.log.open("w", encoding="utf-8") as log,
-            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True) as process,
-        ):
-            try:
-                assert process.stdout is not None  # noqa: S101 - tells mypy what PIPE means
-                words = dict(word.split("=", 1) for word in process.stdout.readline().split()[1:])
-                rest, soap = (int(words[name].split(":")[2].split("/")[0]) for name in ("rest", "soap"))
-                yield process.pid, rest, soap
-            finally:
-                process.terminate()
-
-    @contextlib.contextmanager
-    def _hostile(self, rest: int, soap: int) -> Iterator[subprocess.Popen[str]]:
-        program = str(Path(__file__).with_name("hostile.py"))
-        pipes: dict[str, int] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        with subprocess.Popen([sys.executable, program, str(rest), str(soap)], text=True, **pipes) as process:
-            try:
-                yield process
-            finally:
-                process.terminate()
 
     def _await_pose(self, port: int) -> None:
         give_up = time.monotonic() + BACK
