@@ -1,9 +1,10 @@
-"""How often `roaas load` claims a difference where there is none, and finds one where there is: calibration and power.
+"""How often `roaas load` claims a difference where there is none, and finds one where there is one.
 
-`python benchmarks/calibration.py` prints the table of docs/load.md, `--quick` a rougher one. Most runs are made: the
-schedule of a real plan, with service times that are log-normal about a level which wanders as a first-order
-autoregressive series (lag-1 autocorrelation of the per-second medians about 0.6, as was measured on a shared machine),
-go through the real recorder and the real statistics. Some are real: `roaas load` over HTTP against `noisy_robot.py`.
+`python benchmarks/calibration.py` prints the table of docs/load.md, `--quick` a rougher one. Most runs are artificial:
+the schedule of a real plan goes through the real recorder and the real statistics, with service times that are
+log-normal around a drifting level. The level is a first-order autoregressive series (lag-1 autocorrelation of the
+per-second medians about 0.6, as measured on a shared machine). Some runs are real: `roaas load` over HTTP against
+`noisy_robot.py`.
 """
 
 import argparse
@@ -36,7 +37,7 @@ CLAIMS = frozenset({"differs", "bounded"})
 
 
 def made_run(seed: int, seconds: float, shift: float) -> Measured:
-    """A run of which only the robot's times are made; SOAP's are `shift` times REST's."""
+    """Return a run in which only the robot's times are artificial; SOAP's are `shift` times REST's."""
     load = Load(RATE, None, seconds, 0.0, "constant", seed)
     plan = Plan(("pose",), ("rest", "soap"), ("wire",), load, 10.0, 1, 32, least_block_s=SHORT_BLOCK_S)
     schedule, recorder = Schedule(plan, 0, 1), Recorder(plan.series_of())
@@ -54,7 +55,7 @@ def made_run(seed: int, seconds: float, shift: float) -> Measured:
 
 
 def judged(run: tuple[int, float, float, str]) -> tuple[str, bool, bool]:
-    """Of a made run: the judgement, and whether the intervals of the duel and of A/A leave the truth out."""
+    """Return the judgement of an artificial run, and whether the intervals of duel and A/A control miss the truth."""
     seed, seconds, shift, quantile = run
     measured = made_run(seed, seconds, shift)
     control = aa_interval(measured, "pose", quantile)
@@ -75,7 +76,7 @@ def real_run(seed: int, seconds: float, shift: float) -> str:
 
 
 def share(number: int, runs: int) -> str:
-    """A share with the 95 % interval of its own."""
+    """Return a share with its own 95 % interval."""
     low, high = stats.binomtest(number, runs).proportion_ci(method="wilson")
     return f"{number} of {runs} = {number / runs:.1%} ({low:.1%} to {high:.1%})"
 
@@ -87,7 +88,7 @@ def row(words: str, cell: str, aim: str, *, met: bool) -> bool:
 
 
 def made_rows(pool: ProcessPoolExecutor, runs: int) -> list[bool]:
-    """The rows of what is made."""
+    """Print the rows of artificial runs."""
     met = []
     for quantile, seconds in (("p50", 20.0), ("p99", 60.0)):
         found = list(pool.map(judged, [(seed, seconds, 1.0, quantile) for seed in range(runs)]))
@@ -110,7 +111,7 @@ def _few(number: int, runs: int) -> bool:
 
 
 def real_rows(same: int, planted: int) -> list[bool]:
-    """The rows of what is real, a run for each processor at a time: robot and generator sleep most of theirs.
+    """Print the rows of real runs, one for each processor at a time: robot and generator mostly sleep.
 
     So few runs show that the made ones are no fiction, and no more.
     """

@@ -1,11 +1,11 @@
-"""The load generator beside its yardsticks, on this machine, in one run: `python benchmarks/generator.py`.
+"""The load generator compared with other tools, on this machine, in one run: `python benchmarks/generator.py`.
 
-Prints ratios and whether each target is met. Against the same bare server: the wire client beside wrk at one
-connection, the open model's rate and scheduling lag, the closed model beside Locust's FastHttpUser. Without a server:
-the recorder's cost and memory over ten million requests, and merging the histograms of a hundred workers.
+It prints ratios and whether each target is met. Against the same bare server: the wire client and wrk on one
+connection, the open model's rate and scheduling lag, the closed model and Locust's FastHttpUser. Without a server: the
+recorder's cost and memory over ten million requests, and merging the histograms of a hundred workers.
 
-Measurements that are compared take turns, and the medians of the rounds are printed: on a machine that others use
-too, single figures say little.
+Measurements that are compared take turns, and the medians of the rounds are printed: on a shared machine single figures
+say little.
 """
 
 import argparse
@@ -60,7 +60,7 @@ def wire(port: int, seconds: float, *options: Any) -> dict[str, Any]:
 
 
 def fast_http_user(url: str, users: int, seconds: float) -> float:
-    """Requests a second of Locust's FastHttpUser."""
+    """Return the requests per second of Locust's FastHttpUser."""
     command = [sys.executable, "-c", _FAST, url, str(users), str(seconds)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return float(re.findall(r"^[\d.]+$", done.stdout, re.MULTILINE)[-1])
@@ -68,7 +68,7 @@ def fast_http_user(url: str, users: int, seconds: float) -> float:
 
 @contextmanager
 def awake() -> Iterator[bool]:
-    """Processors do not sleep while this lasts, if that is allowed; yields whether it was (PM QoS, as cyclictest)."""
+    """Keep processors awake, if that is allowed; yields whether it is (PM QoS, as cyclictest does)."""
     try:
         descriptor = os.open("/dev/cpu_dma_latency", os.O_WRONLY)
     except OSError:
@@ -166,7 +166,7 @@ def recorder(millions: int) -> bool:
 
 
 def _report(seed: int) -> dict[str, Any]:
-    """What a worker reports each second at 4,000 requests a second: ten blocks of two operations."""
+    """Return a worker's report at 4,000 requests a second: ten blocks of two operations."""
     rng = np.random.default_rng(seed)
     book = Recorder({segment: 4 + 2 * (segment % 2) for segment in range(10)})
     for number, service in enumerate(rng.lognormal(np.log(150_000), 0.4, 4000).astype(int).tolist()):
@@ -175,7 +175,7 @@ def _report(seed: int) -> dict[str, Any]:
 
 
 def merging(workers: int) -> bool:
-    """The master's work on one report from each of so many workers."""
+    """Measure the master's work on one report from each of so many workers."""
     reports = [_report(seed) for seed in range(min(workers, 20))]
     size = sum(
         len(part)

@@ -5,9 +5,10 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -68,6 +69,14 @@ def median_of(found: dict[str, Any]) -> dict[str, Any]:
     """Return the comparison of SOAP and REST at the median in a latency.json."""
     entry: dict[str, Any] = next(entry for entry in found["comparisons"] if entry["quantile"] == "p50")
     return entry
+
+
+def matching(patterns: Iterable[str], faults: Iterable[str]) -> list[str]:
+    """Return the faults whose names match a pattern; print the names where none does."""
+    names = [name for name in faults if any(fnmatch(name, pattern) for pattern in patterns)]
+    if not names:
+        print(f"no fault is named {' or '.join(patterns)}; there are {', '.join(faults)}")
+    return names
 
 
 def report(text: str, *, met: bool) -> bool:

@@ -1,11 +1,11 @@
-"""Do runs of `roaas load` agree with one another? `python benchmarks/repeatability.py` measures one robot ten times.
+"""Whether runs of `roaas load` agree: `python benchmarks/repeatability.py` measures one robot ten times.
 
-Ten runs of 20 s, one after the other, of deliveries by the wire client at 200 requests/s: whether the ten intervals of
-SOAP's median over REST's overlap, whether the ratios lie within 5 %, and by how much the ratios scatter beyond what
-the intervals allow for: Birge's ratio, 1 where they allow for all of it (Physical Review 40, 1932), and the
-probability of as much scatter where they do (Cochran's Q).
+There are ten runs of 20 s, one after the other, of deliveries by the wire client at 200 requests/s. The benchmark
+prints whether the ten intervals of SOAP's median over REST's overlap, and whether the ratios lie within 5 %. It also
+prints by how much the ratios scatter beyond their intervals: Birge's ratio, 1 where the intervals explain all of it
+(Physical Review 40, 1932), and the probability of that scatter (Cochran's Q).
 
-Intervals that are right at 95 % overlap less often than one thinks: of ten, all do in about 85 % of such experiments.
+Correct 95 % intervals overlap less often than one expects: all of ten do in about 85 % of such experiments.
 """
 
 import argparse
@@ -25,7 +25,7 @@ _STATEMENT = Path(__file__).parents[1] / "reference_robot" / "statement.toml"
 
 
 class Run(NamedTuple):
-    """What one run said of the median's ratio, and its 95 % interval."""
+    """The median's ratio in one run, and its 95 % interval."""
 
     ratio: float
     low: float
@@ -49,7 +49,7 @@ def measured(rest: str, soap: str, seconds: float, seed: int) -> Run:
 
 
 def agreement(runs: Sequence[Run]) -> bool:
-    """Say how far the runs agree."""
+    """Print how far the runs agree; returns whether they do."""
     lows, highs, ratios = (np.array(column) for column in zip(*[(r.low, r.high, r.ratio) for r in runs], strict=True))
     overlap = bool(lows.max() <= highs.min())
     spread = float(ratios.max() / ratios.min() - 1)
@@ -67,7 +67,7 @@ def agreement(runs: Sequence[Run]) -> bool:
 
 
 def main() -> int:
-    """Measure again and again; the exit code is 1 where the runs do not agree."""
+    """Measure repeatedly; the exit code is 1 where the runs do not agree."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=10, help="[10]")
     parser.add_argument("--seconds", type=float, default=20.0, help="of each [20]")

@@ -1,9 +1,9 @@
-"""How fast the reference robot answers, as ratios to a bare application, and what it uses.
+"""How fast the reference robot responds, as ratios to a bare application, and what it uses.
 
-``python benchmarks/robot.py`` starts the robot with its simulation, and beside it a bare uvicorn application that
-answers the same bytes and, where there is one, nginx with fixed answers. It measures them in turn with the load from
-another process: so the machine's speed and other load cancel.
-It ends with exit code 1 if a target is missed. ``--seconds`` sets the length of each of the measurements.
+``python benchmarks/robot.py`` starts the robot with its simulation, a bare uvicorn application that returns the same
+bytes and, if installed, nginx with fixed responses. It loads them alternately from another process, so that the
+machine's speed and other load cancel out. The exit code is 1 if a target is missed. ``--seconds`` sets the length of
+each measurement.
 """
 
 import argparse

@@ -1,9 +1,9 @@
-"""Nothing is lost and nothing counted twice, over workers: `python benchmarks/scale.py`.
+"""Nothing is lost and nothing counted twice with several workers: `python benchmarks/scale.py`.
 
-Two parts. Recorders: processes record a million requests that a seed gives and hand them over in reports, as workers do
-each second; the merged whole is compared with one recorder that has seen everything, histogram by histogram. A run:
-`roaas load` with workers against a bare server that counts what reaches it, closed users for as long as is said, and
-the books have to balance to the request. The exit code is 1 where anything differs.
+It has two parts. Recorders: processes record a million requests, fixed by a seed, and report them each second as
+workers do; the merged result is compared with one recorder of all requests, histogram by histogram. A run: `roaas load`
+with workers and closed-model users against a bare server that counts its requests; all counts must agree exactly. The
+exit code is 1 where anything differs.
 """
 
 import argparse
@@ -28,7 +28,7 @@ _SERIES = {segment: 4 + 2 * (segment % 2) for segment in range(_SEGMENTS)}
 
 
 def record(book: Recorder, seed: int, first: int, requests: int) -> None:
-    """Record requests, numbered from `first`: one in 500 failed, one in 1,000 was never started."""
+    """Record requests, numbered from `first`: one in 500 fails, one in 1,000 never starts."""
     rng = np.random.default_rng([seed, first])
     service = rng.lognormal(np.log(150_000), 0.6, requests).astype(int).tolist()
     lag = rng.exponential(30_000, requests).astype(int).tolist()
@@ -46,13 +46,13 @@ def record(book: Recorder, seed: int, first: int, requests: int) -> None:
 
 
 def reports(first: int, requests: int) -> Iterator[tuple[int, int]]:
-    """The reports that a worker's share makes up: the first request and the number of each."""
+    """Yield the reports of a worker's share: the first request and the number of each."""
     for at in range(first, first + requests, _REPORTED):
         yield at, min(_REPORTED, first + requests - at)
 
 
 def work(seed: int, first: int, requests: int, pipe: Any) -> None:
-    """A worker: record, and report as often as one does, packed as for the network."""
+    """Record a worker's share, and report as often as a worker does, packed as for the network."""
     book = Recorder(_SERIES)
     for at, number in reports(first, requests):
         record(book, seed, at, number)
@@ -61,7 +61,7 @@ def work(seed: int, first: int, requests: int, pipe: Any) -> None:
 
 
 def contents(book: Recorder) -> dict[str, Any]:
-    """Everything that a recorder holds, in an order that does not depend on who reported first."""
+    """Return everything in a recorder, in an order that does not depend on who reported first."""
     return {name: sorted(map(repr, dict(part).items())) for name, part in _parts(book).items()}
 
 
@@ -75,7 +75,7 @@ def _parts(book: Recorder) -> dict[str, Any]:
 
 
 def recorders(requests: int, workers: int, seed: int) -> bool:
-    """Workers' reports, merged, beside one recorder of all."""
+    """Compare the workers' merged reports with one recorder of all requests."""
     share = requests // workers
     context = multiprocessing.get_context("spawn")
     ends = []
@@ -125,7 +125,7 @@ def run(seconds: float, workers: int, users: int) -> bool:
 
 
 def balance(found: dict[str, Any], reached: int) -> bool:
-    """Whether the books balance: what was due, what workers reported, and what the server has seen."""
+    """Return whether the counts agree: what was due, what workers reported, and what the server received."""
     told = found["generator"]
     due, answered, failed, dropped = (told[name] for name in ("scheduled", "completed", "errors", "dropped"))
     reported = sum(worker["requests"] for worker in found["workers"])
@@ -141,7 +141,7 @@ def balance(found: dict[str, Any], reached: int) -> bool:
 
 
 def _after_pauses(series: dict[str, Any]) -> int:
-    """How many requests a series' look at pauses made; its first turn is not among the counts."""
+    """Return how many requests a series sent after pauses; the first turn is not among its counts."""
     paused = series["after_pause"]
     if not paused or not paused["cold_count"]:
         return 0

@@ -1,13 +1,13 @@
 """Whether the reference robot lasts: good clients beside hostile ones, while the robot behind it dies and comes back.
 
 ``python benchmarks/soak.py`` runs for ten minutes (``--minutes``). The simulation, which is the robot and its action
-servers, is killed and started again every minute. It ends with exit code 1 unless
+servers, is killed and restarted every minute. The exit code is 1 unless
 
-- good clients are always answered, and never by a 5xx but 503 (or the SOAP fault that says the same);
-- hostile clients get no other status than they should, and the robot's log has no traceback;
-- memory is within 5 % of what it was after the first tenth, descriptors and threads where they were;
+- good clients always get a response, and no 5xx but 503 (or the SOAP fault that says the same);
+- hostile clients get only the expected statuses, and the robot's log has no traceback;
+- memory stays within 5 % of its size after the first tenth, descriptors and threads where they were;
 - the good clients' p99 at the end is within 20 % of the beginning's, both under the same load. A bare application,
-  asked in turn with the robot, tells how much slower the machine itself has become, and that is taken out.
+  loaded alternately with the robot, shows how much slower the machine itself has become; that is taken out.
 """
 
 import argparse
@@ -52,7 +52,7 @@ ASKED = (  # (operation, SOAP or REST, method, target, content); deliveries seld
 
 @dataclass
 class Good:
-    """What good clients have seen: times in ms by when they were asked for, s since the start; what went wrong."""
+    """What good clients saw: response times in ms by when they were due, in s since the start, and what went wrong."""
 
     robot: list[tuple[float, float]] = field(default_factory=list)
     bare: list[tuple[float, float]] = field(default_factory=list)
@@ -61,7 +61,7 @@ class Good:
 
 
 class Client:
-    """A good client of one port, which connects again when its connection is closed."""
+    """A good client of one port, which reconnects when its connection is closed."""
 
     def __init__(self, port: int) -> None:
         self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=DEADLINE)
@@ -76,12 +76,12 @@ class Client:
         return answer.status, content, (time.perf_counter() - began) * 1000
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._connection.close()
 
 
 class Soak:
-    """One run: a robot, who asks it, and what was seen."""
+    """One run: a robot, its clients, and what they saw."""
 
     def __init__(self, domain_id: int, seconds: float, log: Path) -> None:
         self.seconds, self.log, self._domain = seconds, log, f"--domain-id={domain_id}"
@@ -92,7 +92,7 @@ class Soak:
         self.restarts = 0
 
     def run(self) -> None:
-        """Keep everything busy for as long as asked, and look at what is left."""
+        """Keep everything busy for the given time, and record what is left."""
         with contextlib.ExitStack() as stack:
             simulation = stack.enter_context(self._simulation())
             log = stack.enter_context(self.log.open("w", encoding="utf-8"))
@@ -210,7 +210,7 @@ def busy(used: list[tuple[float, float]], start: float, end: float) -> float:
 
 
 def judged(soak: Soak) -> list[bool]:
-    """Print what was seen, line by line; return what is as it should be."""
+    """Print the results, line by line; returns which are met."""
     good, warm, left = soak.good, soak.warm, soak.left
     fifth = soak.seconds / 5
     first, last = (fifth / 2, fifth * 1.5), (soak.seconds - fifth, soak.seconds)
@@ -246,7 +246,7 @@ def judged(soak: Soak) -> list[bool]:
 
 
 def main() -> int:
-    """Run, and return 0 when everything is as it should be."""
+    """Run; returns 0 when every result is met."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--minutes", type=float, default=10.0)
     options.add_argument("--domain-id", type=int, default=int(os.environ.get("ROS_DOMAIN_ID", "0")))
