@@ -1,10 +1,10 @@
 """Whether `roaas diff` is right on pairs of a good robot and a faulty one (a mutant), in both directions.
 
 ``python benchmarks/diff_pairs.py --pairs 100`` takes mutants from all classes in turn. It judges each of them, and the
-good robot behind the same proxy, on the mutant's classes, and runs `roaas diff` on the two results. What broke is known:
-the requirements that the mutant is made to break, and any other requirement whose verdict differs between the two
-result files. `roaas diff` must name exactly those as new failures (or new warnings) and exit with 1 where one is a MUST;
-in reverse it must name exactly those as fixed and exit with 0. The exit code is 1 if a pair is wrong.
+good robot behind the same proxy, on the mutant's classes, and runs `roaas diff` on the two results. It is known what
+broke: the requirements that the mutant is made to break, and any other whose verdict differs between the two result
+files. `roaas diff` must name exactly those as new failures (or new warnings), and exit with 1 where one is a
+MUST; in reverse it must name exactly those as fixed, and exit with 0. The exit code is 1 if a pair is wrong.
 """
 
 import argparse
