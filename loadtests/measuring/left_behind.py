@@ -10,6 +10,8 @@ import platform
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from conformance.commandline.atomic_write import write_atomically
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.recorder import Recorder
@@ -63,7 +65,7 @@ class LeftBehind:
             "pid": os.getpid(),
             "requests": self.requests,
             "plan": self.plans[0].as_message(),
-            "series": figures.series(Measured(self.plans, self.recorder), {}),
+            "series": msgspec.to_builtins(figures.series(Measured(self.plans, self.recorder), {})),
             "errors": over_time.errors(self.recorder, self.plans[0].operations),
         }
         self.folder.mkdir(parents=True, exist_ok=True)
