@@ -32,6 +32,7 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
 @click.option(
     "--contract", "pack", metavar="PACK", help="The contract pack, where the result's is in a folder of your own."
 )
+@click.option("--recorded", is_flag=True, help="Judge the traces of the run again; send nothing.")
 @click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="Holds the bearer token to send.")
 @click.option(
     "--token-for",
@@ -48,13 +49,14 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
     metavar="S",
     help="Deadline of one request.  [default: 10]",
 )
-def replay(
+def replay(  # noqa: C901 - one branch for each way to judge
     result: Path,
     requirement: str | None,
     *,
     allow_motion: bool,
     statement_file: Path | None,
     pack: str | None,
+    recorded: bool,
     token_file: str | None,
     trusted: tuple[str, ...],
     ca_file: str | None,
@@ -75,9 +77,14 @@ def replay(
     from conformance.engine.replay import replay as send_again  # noqa: PLC0415
     from conformance.transport.client import Connection  # noqa: PLC0415
 
-    document = _read(result / "result.json" if result.is_dir() else result)
+    folder = result if result.is_dir() else result.parent
+    document = _read(folder / "result.json" if result.is_dir() else result)
     token = Path(token_file).read_text(encoding="utf-8").strip() if token_file else None
     connection = Connection(timeout_s=timeout_s or _TIMEOUT_S, ca_file=Path(ca_file) if ca_file else None, token=token)
+    if recorded:
+        return _judge_recorded(
+            document, result if result.is_dir() else result.parent, statement_file, pack, requirement
+        )
     try:
         chosen = list(findings(document, requirement))
         if not chosen:
@@ -127,7 +134,7 @@ def _judge_again(
 ) -> CommandResult:
     import msgspec  # noqa: PLC0415 - as above
 
-    from conformance.engine.judged_again import judged_by_checks  # noqa: PLC0415
+    from conformance.engine.replay import judged_by_checks  # noqa: PLC0415
     from conformance.statement.statement import StatementError, load_statement  # noqa: PLC0415
 
     if contract is None:
@@ -155,6 +162,34 @@ def _judge_again(
     if verdicts & {"fail", "warn"}:
         return CommandResult(ExitCode.FAILED)
     return CommandResult(ExitCode.PASSED if verdicts == {"pass"} else ExitCode.INCONCLUSIVE)
+
+
+def _judge_recorded(
+    document: dict[str, Any], folder: Path, statement_file: Path | None, pack: str | None, requirement: str | None
+) -> CommandResult:
+    """Judge the traces in a folder by the rules at hand."""
+    from conformance.engine.recorded import judge_recorded  # noqa: PLC0415 - see replay()
+    from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
+    from conformance.scenarios.stored import TracesError  # noqa: PLC0415
+    from conformance.statement.statement import StatementError, empty_statement, load_statement  # noqa: PLC0415
+    from conformance.verdict.run import Run  # noqa: PLC0415
+
+    contract = _contract_of(document, pack)
+    if contract is None:
+        raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
+    try:
+        statement = load_statement(statement_file, contract) if statement_file else empty_statement(contract)
+        run = Run(statement, contract, claims=tuple(contract.classes), allow_motion=True)
+        judged = judge_recorded(RobotUnderTest(run), folder)
+    except (StatementError, TracesError) as error:
+        raise click.UsageError(str(error)) from error
+    chosen = [one for one in judged if requirement in {None, one.requirement}]
+    for one in chosen:
+        word = f"fails: {inert('; '.join(one.failures))}" if one.failures else "passes"
+        click.echo(f"{one.requirement} {word} ({one.cases} cases)")
+    if not chosen:
+        raise click.UsageError(f"no recorded trace shows {requirement or 'any requirement'}")
+    return CommandResult(ExitCode.FAILED if any(one.failures for one in chosen) else ExitCode.PASSED)
 
 
 def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -> None:

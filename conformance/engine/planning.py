@@ -31,23 +31,30 @@ def pytest_options() -> list[str]:
     ]
 
 
-def plan_of(robot: RobotUnderTest) -> list[str]:
-    """Return the plan of a run on a robot, which need not be connected, in lines."""
-    plugin = ChecksPlugin(lambda: robot, lambda: robot.run.contract)
-    seen: list[Step] = []
+def collected(robot: RobotUnderTest, plugin: ChecksPlugin | None = None) -> list[pytest.Item]:
+    """Return the checks of a run on a robot, which need not be connected, in the order of their turns."""
+    plugin = plugin or ChecksPlugin(lambda: robot, lambda: robot.run.contract)
+    seen: list[pytest.Item] = []
 
-    class _Planner:
+    class _Collected:
         """Takes down the checks that were collected."""
 
         def pytest_collection_finish(self, session: pytest.Session) -> None:
             """Take them down."""
-            seen.extend(plugin.step_of(item) for item in session.items if is_check(item))
+            seen.extend(item for item in session.items if is_check(item))
 
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
         environment.delenv("PYTEST_ADDOPTS", raising=False)
         folders = map(str, robot.run.contract.rules)
-        pytest.main([*folders, *pytest_options(), "--collect-only"], plugins=[plugin, _Planner()])
+        pytest.main([*folders, *pytest_options(), "--collect-only"], plugins=[plugin, _Collected()])
+    return seen
+
+
+def plan_of(robot: RobotUnderTest) -> list[str]:
+    """Return the plan of a run on a robot, which need not be connected, in lines."""
+    plugin = ChecksPlugin(lambda: robot, lambda: robot.run.contract)
+    seen: list[Step] = [plugin.step_of(item) for item in collected(robot, plugin)]
     scenarios = {step.scenario.name for step in seen if step.scenario}
     moving = sum(step.moves for step in seen)
     first = f"{len(seen)} checks, {len(scenarios)} scenarios; {moving} checks may move the device."

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from conformance.scenarios.rule import Case, Rule, record
-from conformance.scenarios.scenario import Recordings
+from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.scenarios.stage import Need
 
 if TYPE_CHECKING:
@@ -15,10 +15,14 @@ if TYPE_CHECKING:
 
 
 class RulesPlugin:
-    """A pytest plugin for one run."""
+    """A pytest plugin for one run.
 
-    def __init__(self) -> None:
-        self.recordings = Recordings()
+    Args:
+        recordings: of the run; each scenario is played when its first rule needs it.
+    """
+
+    def __init__(self, recordings: Recordings) -> None:
+        self.recordings = recordings
 
     def pytest_pycollect_makeitem(
         self, collector: pytest.Module | pytest.Class, name: str, obj: object
@@ -26,24 +30,25 @@ class RulesPlugin:
         """Make a check of a rule that a module defines."""
         if not isinstance(obj, Rule) or obj.judge.__module__ != collector.obj.__name__:
             return None
-        needs = obj.on.needs
-        marks = [
-            pytest.mark.requirement(obj.requirement),
-            pytest.mark.phase(obj.on.stage),
-            pytest.mark.scenario(obj.on),
-        ]
-        marks += [pytest.mark.motion] if Need.MOTION in needs else []
-        marks += [pytest.mark.needs(*(str(one) for one in needs - {Need.MOTION}))]
-        item = pytest.Function.from_parent(collector, name=name, callobj=self._check_of(obj))
+        return [self._item(collector, name, obj, scenario) for scenario in obj.on]
+
+    def _item(self, collector: pytest.Module | pytest.Class, name: str, rule: Rule, scenario: Scenario) -> pytest.Item:
+        marks = [pytest.mark.requirement(rule.requirement), pytest.mark.phase(scenario.stage)]
+        marks += [pytest.mark.scenario(scenario), pytest.mark.rule(rule, scenario)]
+        marks += [pytest.mark.needs(*map(str, scenario.needs - {Need.MOTION}))]
+        marks += [pytest.mark.motion] if Need.MOTION in scenario.needs else []
+        item: pytest.Item = pytest.Function.from_parent(
+            collector, name=f"{name}[{scenario.name}]", callobj=self._check_of(rule, scenario)
+        )
         for mark in marks:
             item.add_marker(mark)
-        return [item]
+        return item
 
-    def _check_of(self, rule: Rule) -> Any:
+    def _check_of(self, rule: Rule, scenario: Scenario) -> Any:
         recordings = self.recordings
 
         def check(request: pytest.FixtureRequest, judge: Judge) -> None:
-            recording = recordings.of(rule.on, request.getfixturevalue)
+            recording = recordings.of(scenario, request.getfixturevalue)
             if recording.reason:
                 judge.skip(rule.requirement, recording.reason)
                 return

@@ -23,6 +23,7 @@ class Case:
         expected: what the requirement asks for here, as a noun phrase.
         observed: what the trace shows instead; empty: the response is described.
         cause: failures of one cause are one finding; empty: told by the texts.
+        subject: what was tested; empty: method and target of the request.
     """
 
     holds: bool
@@ -30,6 +31,7 @@ class Case:
     expected: str
     observed: str = ""
     cause: str = ""
+    subject: str = ""
 
 
 @dataclass(frozen=True)
@@ -51,16 +53,16 @@ Outcome = Case | NotTested | Note
 
 @dataclass(frozen=True)
 class Rule:
-    """One requirement's judgement of one scenario's trace.
+    """One requirement's judgement of the traces of scenarios.
 
     Attributes:
         requirement: its id.
-        on: the scenario.
+        on: the scenarios, each of which shows whether it is kept.
         judge: takes the trace, and fixtures by their names; yields cases, or why there are none.
     """
 
     requirement: str
-    on: Scenario
+    on: tuple[Scenario, ...]
     judge: Callable[..., Iterable[Outcome]]
 
     @property
@@ -73,7 +75,7 @@ class Rule:
         return list(self.judge(trace, **{name: fixture(name) for name in self.fixtures}))
 
 
-def rule(requirement: str, *, on: Scenario) -> Callable[[Callable[..., Iterable[Outcome]]], Rule]:
+def rule(requirement: str, *, on: tuple[Scenario, ...]) -> Callable[[Callable[..., Iterable[Outcome]]], Rule]:
     """Return a decorator that makes a rule of a function."""
     return lambda judge: Rule(requirement, on, judge)
 
@@ -83,7 +85,15 @@ def record(judge: Judge, requirement: str, outcomes: Iterable[Outcome]) -> None:
     for one in outcomes:
         match one:
             case Case():
-                judge.check(requirement, one.holds, one.exchange, one.expected, found=one.observed, cause=one.cause)
+                judge.check(
+                    requirement,
+                    one.holds,
+                    one.exchange,
+                    one.expected,
+                    found=one.observed,
+                    cause=one.cause,
+                    subject=one.subject,
+                )
             case NotTested():
                 judge.skip(requirement, one.reason)
             case Note():

@@ -86,7 +86,8 @@ class Recording:
 class Recordings:
     """The recordings of one run: each scenario is played once, when its first rule needs it."""
 
-    _played: dict[str, Recording] = field(default_factory=dict)
+    #: By the scenario's name.
+    played: dict[str, Recording] = field(default_factory=dict)
 
     def of(self, scenario: Scenario, fixture: Callable[[str], Any]) -> Recording:
         """Return a scenario's recording; play it where it was not played before.
@@ -95,9 +96,9 @@ class Recordings:
             scenario: which.
             fixture: returns a fixture of the run by its name.
         """
-        if scenario.name not in self._played:
-            self._played[scenario.name] = _play(scenario, fixture)
-        return self._played[scenario.name]
+        if scenario.name not in self.played:
+            self.played[scenario.name] = _play(scenario, fixture)
+        return self.played[scenario.name]
 
 
 def _play(scenario: Scenario, fixture: Callable[[str], Any]) -> Recording:

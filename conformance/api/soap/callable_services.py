@@ -34,7 +34,7 @@ class SoapServices:
 
 
 def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
-    """The services that may be called, the one that only reads first.
+    """Return the services that may be called, the one that only reads first.
 
     What was not allowed or does not answer is put down against those of the requirements that need it, so that they are
     not passed on half of the evidence.
@@ -60,7 +60,7 @@ def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
 
 
 def _problem(run: Run, service: SoapService) -> str:
-    """Why a service may not be called; empty where it may."""
+    """Return why a service may not be called; empty where it may."""
     if service.name == Interface.PUBLISHERS and not run.allow_motion:
         return _NO_MOTION
     if service.name in run.unreachable:
@@ -69,5 +69,5 @@ def _problem(run: Run, service: SoapService) -> str:
 
 
 def repetitions(effort: Effort, standard: int) -> int:
-    """How often to repeat what one time shows already, for the sake of failures that come now and then."""
+    """Return how often to repeat a request that one time would do for, to notice intermittent failures."""
     return max(1, round(standard * effort.factor))

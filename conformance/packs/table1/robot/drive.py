@@ -1,18 +1,15 @@
-"""Driving a robot by its velocity: what talks to the robot, and keeps a trace for drive_rules to judge."""
+"""Driving a robot by its velocity: commands, watches and keeps a trace; drive_rules judges that."""
 
 import math
-import time
+from dataclasses import replace
 from http import HTTPStatus
 from typing import Final
 
-import pytest
-
 from conformance.packs.table1.robot import drive_rules, windows
-from conformance.packs.table1.robot.drive_rules import Judgement
-from conformance.packs.table1.robot.drive_trace import Command, Trace, Turn
-from conformance.packs.table1.robot.path import judge_path
+from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Sighting, Trace, Turn
 from conformance.packs.table1.robot.robot import STILL, VELOCITY, Robot, Velocity
-from conformance.packs.table1.robot.windows import ALL, SEVERAL
+from conformance.packs.table1.robot.windows import SEVERAL
+from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 
 # A turn of readings is not begun more often than this, s: the robot's odometry has tens of hertz.
@@ -23,7 +20,6 @@ _COUNTED_ON_S: Final = 0.5
 _LONGER_S: Final = 1.0
 # So many requests are a look.
 _LOOK: Final = 3
-_OUTLASTED: Final = "an answer takes so long that a velocity ends before it is read"
 # How often it is begun anew to reach a velocity that was renewed too late, so that it may have ended before.
 _LAPSES: Final = 2
 
@@ -36,63 +32,58 @@ class Drive:
     """
 
     def __init__(self, robot: Robot) -> None:
-        self.robot = robot
-        self.trace = Trace(time.monotonic())
+        self.robot, self.clock = robot, robot.clock
+        self.trace = Trace(self.clock.now())
         self._turn_at = 0.0
 
     def command(self, velocity: Velocity, *, integers: bool = False) -> bool:
-        """PUT a velocity, and judge how it is answered.
+        """PUT a velocity; return whether it is answered as the contract wants.
 
         Args:
             velocity: within the limits.
             integers: write whole numbers without a fraction.
 
         Raises:
-            pytest.skip.Exception: a goal of the robot's own is active, so the check that drives cannot be judged.
+            NotPossibleError: a goal of the robot's own is active, so that it cannot be driven.
         """
-        sent = time.monotonic()
+        sent = self.clock.now()
         if integers:
             whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
             exchange = self.robot.put(VELOCITY, whole)
         else:
             exchange = self.robot.put_velocity(velocity)
-        return self._commanded(Command(velocity, sent, time.monotonic(), exchange, integers=integers))
+        return self._commanded(Command(velocity, sent, self.clock.now(), exchange, integers=integers))
 
     def command_linear(self, velocity: Velocity) -> bool:
-        """PUT the linear part of a velocity, and judge how it is answered.
+        """PUT the linear part of a velocity; return whether it is answered as the contract wants.
 
         Raises:
-            pytest.skip.Exception: a goal of the robot's own is active, so the check that drives cannot be judged.
+            NotPossibleError: a goal of the robot's own is active, so that it cannot be driven.
         """
-        sent = time.monotonic()
+        sent = self.clock.now()
         exchange = self.robot.put_linear(velocity)
-        return self._commanded(Command(velocity, sent, time.monotonic(), exchange, linear_only=True))
+        return self._commanded(Command(velocity, sent, self.clock.now(), exchange, linear_only=True))
 
     def commanded(self, velocity: Velocity, sent: float, exchange: Exchange) -> None:
         """Take down a command that somebody else gave, at a moment of the monotonic clock, as the last one."""
-        self.trace = self.trace.commanded(Command(velocity, sent, time.monotonic(), exchange))
+        self.trace = self.trace.commanded(Command(velocity, sent, self.clock.now(), exchange))
 
     def _commanded(self, command: Command) -> bool:
         self.trace = self.trace.commanded(command)
         if command.exchange.response.status == HTTPStatus.CONFLICT and self.robot.goal()[0] is not None:
-            pytest.skip("the robot follows a goal of its own")
-        return self._judge(drive_rules.answer_of(command))
+            raise NotPossibleError("the robot follows a goal of its own")
+        return drive_rules.answer_of(command).holds
 
     def _renew(self) -> None:
         """Give the last command again, in the same way: a PUT of all components would do what it may have failed to."""
         last = self.trace.last_command
         if last is None:
             return
-        sent = time.monotonic()
+        sent = self.clock.now()
         put = self.robot.put_linear if last.linear_only else self.robot.put_velocity
         exchange = put(last.velocity)
-        again = Command(last.velocity, sent, time.monotonic(), exchange, linear_only=last.linear_only, renewal=True)
+        again = Command(last.velocity, sent, self.clock.now(), exchange, linear_only=last.linear_only, renewal=True)
         self.trace = self.trace.commanded(again)
-
-    def _judge(self, one: Judgement) -> bool:
-        return self.robot.judge.check(
-            one.requirement, one.holds, one.exchange, one.expected, found=one.found, cause=one.cause
-        )
 
     @property
     def holds_until(self) -> float:
@@ -117,30 +108,25 @@ class Drive:
         self.reach(velocity)
 
     def look(self) -> tuple[Velocity | None, Exchange]:
-        """Read odometry, velocity and its linear part, and judge whether they agree; give the velocity."""
-        wait = self._turn_at + _PACE_S - time.monotonic()
+        """Read odometry, velocity and its linear part; return the velocity."""
+        wait = self._turn_at + _PACE_S - self.clock.now()
         if wait > 0:
-            time.sleep(wait)
-        self._turn_at = time.monotonic()
+            self.clock.sleep(wait)
+        self._turn_at = self.clock.now()
         odometry = self.robot.odometry()
-        at = time.monotonic()
+        at = self.clock.now()
         velocity, exchange = self.robot.velocity()
         self.trace = self.trace.looked(Turn(odometry, at, velocity, exchange, *self.robot.linear()))
-        for one in drive_rules.agreement(self.trace, self.robot.limits):
-            self._judge(one)
-        fastest = None if self.robot.limits_declared else drive_rules.speed(self.trace)
-        if fastest is not None:
-            self._judge(fastest)
         return velocity, exchange
 
     def _glance(self) -> None:
         """Read the velocity, and nothing that it could be compared with."""
-        at = time.monotonic()
+        at = self.clock.now()
         velocity, exchange = self.robot.velocity()
         self.trace = self.trace.looked(Turn(None, at, velocity, exchange, None, exchange))
 
     def stop(self, moving: Velocity) -> bool:
-        """Command a velocity once more and then zero; judge that the robot stops because of it, and not by itself."""
+        """Command a velocity once more and then zero; return whether the robot stops because of it, not by itself."""
         if not self.command(moving) or not self.command(STILL):
             return False
         hold_s, settle_s = self.robot.limits.hold_s, self.robot.limits.settle_s
@@ -150,13 +136,13 @@ class Drive:
     def reach(
         self, wanted: Velocity, *ids: str, part: slice = ALL, within: float | None = None, since: float | None = None
     ) -> bool:
-        """Look until the velocity is what was wanted; judge that it comes within the settle time.
+        """Look until the velocity is the wanted one, or has to be; return whether it is.
 
-        What is judged has to be shown by the median of several samples; what is only waited for, by one.
+        What is to be judged has to be shown by the median of several samples; what is only waited for, by one.
 
         Args:
             wanted: velocity.
-            ids: requirements, of any class.
+            ids: requirements that say that it comes to this, of any class.
             part: the components that count.
             within: another time than the settle time, s.
             since: when what brings it about was answered, s of the monotonic clock; by default the last command.
@@ -171,7 +157,7 @@ class Drive:
         every = _COUNTED_ON_S if limits.hold_s is None else _renewed_s(limits.hold_s, limits.settle_s)
         renews = limits.hold_s is None or limits.hold_s < patience
         while True:
-            asked = time.monotonic()
+            asked = self.clock.now()
             lapsed = limits.hold_s is not None and asked > self.trace.sent + certain_s(limits.hold_s)
             # A command that has had no effect when the robot has had its time is not given again: that would hide it.
             if not lapsed and asked > begun + limits.settle_s:
@@ -192,12 +178,10 @@ class Drive:
             decided = windows.shown(limits, late, wanted, part=part, count=count) is not None
             if there or (asked > until and decided) or asked > until + _LONGER_S:
                 break
-        for id_ in ids:
-            if not there and wanted != STILL and self._outlasts_hold:
-                self.robot.judge.skip(id_, _OUTLASTED)
-                continue
-            since = settled if not there and windows.newest(late) else begun
-            self._judge(drive_rules.arrival(id_, self.trace, wanted, limits, part, since))
+        counted = settled if not there and windows.newest(late) else begun
+        outlasted = not there and wanted != STILL and self._outlasts_hold
+        reach = Reach(ids, wanted, part, counted, len(self.trace.turns), bool(there), outlasted)
+        self.trace = replace(self.trace, reaches=(*self.trace.reaches, reach))
         return bool(there)
 
     def sees(
@@ -216,10 +200,10 @@ class Drive:
             Whether it is (None: it was too late to say), and what was seen.
         """
         first = len(self.trace.turns)
-        last = time.monotonic() + _LONGER_S
+        last = self.clock.now() + _LONGER_S
         while True:
             self._glance() if alone else self.look()
-            turns, now = self.trace.turns[first:], time.monotonic()
+            turns, now = self.trace.turns[first:], self.clock.now()
             holds = windows.verdict(self.robot.limits, turns, wanted, factor, part)
             if not holds and now > until:
                 holds = None
@@ -229,17 +213,26 @@ class Drive:
 
     def keep(self, seconds: float) -> None:
         """Look for a while."""
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
+        until = self.clock.now() + seconds
+        while self.clock.now() < until:
             self.look()
 
-    def judge_motion(self) -> None:
-        """Judge whether the pose moved by what the velocity said."""
-        if self._outlasts_hold:
-            for id_ in ("rest-resources/pose-motion", "rest-resources/pose-rotation"):
-                self.robot.judge.skip(id_, _OUTLASTED)
-            return
-        judge_path(self.robot.judge, self.trace.odometry, self.trace.measured, self.robot.limits.noise)
+    def saw(self, shows: str, expected: str, observed: str = "", cause: str = "", *, holds: bool | None) -> None:
+        """Take down what the last look shows of a requirement; the arguments are those of Sighting."""
+        exchange = self.trace.turns[-1].velocity_exchange
+        seen = Sighting(shows, holds, exchange, expected, observed, cause)
+        self.trace = replace(self.trace, sightings=(*self.trace.sightings, seen))
+
+    def refused(self, shows: str, expected: str) -> None:
+        """Take down that the last command was refused, which a requirement forbids."""
+        exchange = self.trace.commands[-1].exchange
+        seen = Sighting(shows, holds=False, exchange=exchange, expected=expected, cause=exchange.came)
+        self.trace = replace(self.trace, sightings=(*self.trace.sightings, seen))
+
+    @property
+    def whole(self) -> Trace:
+        """The trace at the end of a drive whose way is to be judged."""
+        return replace(self.trace, outlasted=self._outlasts_hold)
 
 
 def _renewed_s(hold_s: float, settle_s: float) -> float:

@@ -2,17 +2,19 @@
 
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.packs.table1.limits import Limits
-from conformance.packs.table1.robot.drive_trace import Command, Trace
+from conformance.packs.table1.robot.drive_trace import Command, Reach, Trace
 from conformance.packs.table1.robot.message_shapes import TWIST, VECTOR3, read_as
+from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
-from conformance.packs.table1.robot.windows import ALL, SEVERAL, middle, newest, shown, velocities
+from conformance.packs.table1.robot.windows import SEVERAL, middle, newest, shown, velocities
+from conformance.scenarios.rule import Case, NotTested, Outcome
 from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 # What was measured for so long alike is steady: readings of two resources may be compared, s.
 _STEADY_S: Final = 0.3
@@ -20,31 +22,84 @@ _STEADY_S: Final = 0.3
 _LOOKED_AT: Final = 200
 #: Two writings of one double are no farther apart than this, whatever is accepted.
 ECHO: Final = 1e-9
+_OUTLASTED: Final = NotTested("a response takes so long that a velocity ends before it is read")
+_RESOURCES: Final = "rest-resources"
+_AGREEMENT: Final = (f"{_RESOURCES}/velocity-odometry", f"{_RESOURCES}/linear-agrees")
+_LIMITS_HOLD: Final = "safety/limits-hold"
+_WAY: Final = (f"{_RESOURCES}/pose-motion", f"{_RESOURCES}/pose-rotation")
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """One case of a requirement; see Judge.check()."""
+def judge_drive(judge: Judge, trace: Trace, limits: Limits, *, way: bool = False) -> None:
+    """Record all that a drive shows as evidence; ``way``: also whether the pose followed the velocity."""
+    for requirement, outcome in every_outcome(trace, limits, way=way):
+        match outcome:
+            case Case():
+                judge.check(
+                    requirement,
+                    outcome.holds,
+                    outcome.exchange,
+                    outcome.expected,
+                    found=outcome.observed,
+                    cause=outcome.cause,
+                )
+            case NotTested():
+                judge.skip(requirement, outcome.reason)
 
-    requirement: str
-    holds: bool
-    exchange: Exchange
-    expected: str
-    found: str = ""
-    cause: str = ""
+
+def outcomes(requirement: str, trace: Trace, limits: Limits) -> Iterator[Outcome]:
+    """Yield what a drive shows of one requirement."""
+    return (one for id_, one in every_outcome(trace, limits, way=requirement in _WAY) if id_ == requirement)
 
 
-def answer_of(command: Command) -> Judgement:
-    """Whether a command was answered as the contract wants it: 204, or 200 with what was accepted."""
+def every_outcome(trace: Trace, limits: Limits, *, way: bool) -> Iterator[tuple[str, Outcome]]:
+    """Yield all that a drive shows, each with the id of its requirement."""
+    yield from ((_answered(one), answer_of(one)) for one in trace.commands if not one.renewal)
+    yield from _readings(trace, limits)
+    for reach in trace.reaches:
+        for id_ in reach.shows:
+            yield id_, _OUTLASTED if reach.outlasted else arrival(trace, reach, limits)
+    for one in trace.sightings:
+        if one.holds is not None:
+            yield one.shows, Case(one.holds, one.exchange, one.expected, one.observed, one.cause)
+    if way:
+        yield from _ways(trace, limits)
+
+
+def _readings(trace: Trace, limits: Limits) -> Iterator[tuple[str, Outcome]]:
+    """Yield what each reading shows together with those before it."""
+    for turns in range(1, len(trace.turns) + 1):
+        seen = trace.upto(turns)
+        yield from agreement(seen, limits)
+        if not (limits.linear_declared and limits.angular_declared):
+            fastest = speed(seen)
+            if fastest is not None:
+                yield _LIMITS_HOLD, fastest
+
+
+def _ways(trace: Trace, limits: Limits) -> Iterator[tuple[str, Outcome]]:
+    """Yield whether the pose followed the velocity."""
+    for id_, case in zip(_WAY, way_and_turn(trace.odometry, trace.measured, limits.noise), strict=True):
+        if trace.outlasted:
+            yield id_, _OUTLASTED
+        elif case is not None:
+            yield id_, case
+
+
+def _answered(command: Command) -> str:
+    """Return the id of the requirement on the response to a command."""
+    name = "linear-put" if command.linear_only else "velocity-integers" if command.integers else "velocity-put"
+    return f"{_RESOURCES}/{name}"
+
+
+def answer_of(command: Command) -> Case:
+    """Return whether a command was answered as the contract wants it: 204, or 200 with what was accepted."""
     answer = command.exchange.response
     kind, shape = ("Vector3", VECTOR3) if command.linear_only else ("Twist", TWIST)
     problem = "" if answer.status in {HTTPStatus.OK, HTTPStatus.NO_CONTENT} else command.exchange.came
     if answer.status == HTTPStatus.OK:
         value, problem = read_as(answer, shape)
         problem = problem or _other_number(command, value)
-    name = "linear-put" if command.linear_only else "velocity-integers" if command.integers else "velocity-put"
-    expected = f"200 with the accepted {kind}, or 204"
-    return Judgement(f"rest-resources/{name}", not problem, command.exchange, expected, problem)
+    return Case(not problem, command.exchange, f"200 with the accepted {kind}, or 204", problem)
 
 
 def _other_number(command: Command, value: Any) -> str:
@@ -58,37 +113,35 @@ def _other_number(command: Command, value: Any) -> str:
     return ""
 
 
-def agreement(trace: Trace, limits: Limits) -> list[Judgement]:
-    """Whether velocity and linear part agree with the odometry: their medians over a while in which each was steady.
+def agreement(trace: Trace, limits: Limits) -> Iterator[tuple[str, Case]]:
+    """Yield whether velocity and linear part agree with the odometry: their medians while each was steady.
 
     Only where no command was sent from that while's beginning on. Where answers take long it is as long as several
     turns take. A robot that moves by itself may do so between two readings: what is read of it is then not steady.
     """
     odometry = trace.turns[-SEVERAL].odometry if len(trace.turns) >= SEVERAL else None
     if odometry is None:
-        return []
+        return
     since = min(trace.turns[-1].at - _STEADY_S, odometry.sent)
     window = list(itertools.takewhile(lambda turn: turn.at >= since, reversed(trace.turns)))
     steady = [turn.odometry.velocity for turn in window if turn.odometry is not None]
     count = len(newest(window[::-1], len(window)))
     lasted = len(trace.turns) > len(window) or since == odometry.sent
     if trace.sent > since or not lasted or count < SEVERAL or len(steady) < len(window):
-        return []
+        return
     wanted = middle(steady)
     if not _is_steady(limits, steady):
-        return []
-    found = []
+        return
     turn = window[0]
     read = velocities(window)
     if _is_steady(limits, read):
         expected = f"the velocity that the odometry has, {rounded(wanted)}"
-        found.append(_same("velocity-odometry", read, wanted, (limits, count), turn.velocity_exchange, expected))
+        yield _AGREEMENT[0], _same(read, wanted, (limits, count), turn.velocity_exchange, expected)
     linear = [one.linear for one in window if one.linear is not None]
     if linear and _is_steady(limits, read):
         wanted = Velocity(*middle(read)[:3])
         expected = f"the linear part of the velocity, {rounded(wanted)}"
-        found.append(_same("linear-agrees", linear, wanted, (limits, count), turn.linear_exchange, expected))
-    return found
+        yield _AGREEMENT[1], _same(linear, wanted, (limits, count), turn.linear_exchange, expected)
 
 
 def _is_steady(limits: Limits, readings: Sequence[Velocity]) -> bool:
@@ -97,16 +150,16 @@ def _is_steady(limits: Limits, readings: Sequence[Velocity]) -> bool:
 
 
 def _same(
-    name: str, readings: Sequence[Velocity], wanted: Velocity, by: tuple[Limits, int], exchange: Exchange, expected: str
-) -> Judgement:
+    readings: Sequence[Velocity], wanted: Velocity, by: tuple[Limits, int], exchange: Exchange, expected: str
+) -> Case:
     limits, samples = by
     measured = middle(readings)
     # Either median is off by its own noise, and by a quarter more than a mean would be.
     holds = is_near(limits, measured, wanted, samples=samples / math.pi)
-    return Judgement(f"rest-resources/{name}", holds, exchange, expected, str(measured), "differs")
+    return Case(holds, exchange, expected, str(measured), "differs")
 
 
-def speed(trace: Trace) -> Judgement | None:
+def speed(trace: Trace) -> Case | None:
     """Without declared limits: the robot is not faster than it was asked to be, however it overshoots.
 
     None where there was no command, or too few samples that could be read.
@@ -118,20 +171,19 @@ def speed(trace: Trace) -> Judgement | None:
     fastest = Velocity(*(max(map(abs, each)) for each in zip(*(one.velocity for one in trace.commands), strict=True)))
     holds = all(abs(one) <= 1.5 * asked + 0.2 for one, asked in zip(measured, fastest, strict=True))
     expected = f"a speed that was asked for, at most {rounded(fastest)}"
-    return Judgement("safety/limits-hold", holds, turn.velocity_exchange, expected, str(measured))
+    return Case(holds, turn.velocity_exchange, expected, str(measured))
 
 
-def arrival(
-    requirement: str, trace: Trace, wanted: Velocity, limits: Limits, part: slice = ALL, since: float = 0.0
-) -> Judgement:
-    """Whether a velocity was reached by the last turns, of which those before ``since`` do not count."""
-    turns = [turn for turn in trace.turns[-_LOOKED_AT:] if turn.at >= since]
+def arrival(trace: Trace, reach: Reach, limits: Limits) -> Case:
+    """Return whether a velocity was reached by the last turns of a wait, from its ``since`` on."""
+    seen = trace.turns[: reach.turns]
+    turns = [turn for turn in seen[-_LOOKED_AT:] if turn.at >= reach.since]
     window = velocities(newest(turns))
-    holds = shown(limits, turns, wanted, part=part, count=max(1, min(SEVERAL, len(window))))
-    turn = trace.turns[-1]
-    expected = f"{rounded(wanted)} within {limits.settle_s:g} s of the command"
-    found = str(middle(window)) if window else turn.velocity_exchange.came
-    return Judgement(requirement, bool(holds), turn.velocity_exchange, expected, found, "not reached")
+    holds = shown(limits, turns, reach.wanted, part=reach.part, count=max(1, min(SEVERAL, len(window))))
+    turn = seen[-1]
+    expected = f"{rounded(reach.wanted)} within {limits.settle_s:g} s of the command"
+    observed = str(middle(window)) if window else turn.velocity_exchange.came
+    return Case(bool(holds), turn.velocity_exchange, expected, observed, "not reached")
 
 
 def rounded(velocity: Velocity) -> Velocity:

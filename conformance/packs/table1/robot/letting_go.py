@@ -22,6 +22,15 @@ _AT_LEAST_S: Final = 0.1
 _GAP: Final = 0.25
 
 
+# Where no hold time is declared a velocity has to end within so long, s.
+_ENDS_S: Final = 10.0
+
+
+def ends_by(limits: Limits, settle_s: float) -> float:
+    """Return how long after its command a velocity has to have ended, s; ``settle_s``: the robot has for stopping."""
+    return _ENDS_S if limits.hold_s is None else 1.1 * limits.hold_s + settle_s
+
+
 @dataclass(frozen=True)
 class LetGo:
     """A velocity that was commanded and not renewed.

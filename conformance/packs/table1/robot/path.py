@@ -17,13 +17,13 @@ from statistics import median
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from conformance.packs.table1.robot.geometry import wrapped
+from conformance.scenarios.rule import Case
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from conformance.packs.table1.limits import Noise
     from conformance.packs.table1.robot.robot import Odometry, Velocity
-    from conformance.verdict.evidence import Judge
 
 # Less than this is no drive to judge: m and rad.
 _SHORTEST: Final = 0.08
@@ -176,29 +176,32 @@ def _longest_lapse(trace: Sequence[Odometry]) -> float:
     return max(_SKIPPED_S, _HELD_UP_TIMES * median(lapses)) if lapses else _SKIPPED_S
 
 
-def judge_path(judge: Judge, trace: Sequence[Odometry], measured: Sequence[Velocity], noise: Noise) -> None:
-    """Judge pose-motion and pose-rotation by the readings along a drive, where it went far enough.
+def way_and_turn(
+    trace: Sequence[Odometry], measured: Sequence[Velocity], noise: Noise
+) -> tuple[Case | None, Case | None]:
+    """Return whether the pose moved, and whether it turned, by what the velocity adds up to along a drive.
+
+    None for either where the robot did not go, or turn, far enough to tell.
 
     The robot's stamps or the time of the readings has to fit, as a simulation may run slower than the clock on the
     wall; and the odometry's own velocity or the one that was measured beside it: whether these two agree is another
     requirement.
 
     Args:
-        judge: is told.
         trace: readings of the odometry, in their order.
         measured: a reading of GET /robot/velocity/ for each of them.
         noise: of the robot's odometry.
     """
     if len(trace) < _FEWEST:
-        return
+        return None, None
     unbroken = _longest_unbroken(trace)
     trace, measured = trace[unbroken], measured[unbroken]
     if len(trace) < _FEWEST:
-        return
+        return None, None
     sources = ([one.velocity for one in trace], measured)
     sums = [_summed(trace, source, by_stamp=by_stamp) for source in sources for by_stamp in (True, False)]
-    _judge_way(judge, [one for one in sums if one.each[-1].length >= _SHORTEST], noise)
-    _judge_turn(judge, [one for one in sums if one.each[-1].turned >= _LEAST_TURN], noise)
+    way = _way([one for one in sums if one.each[-1].length >= _SHORTEST], noise)
+    return way, _turn([one for one in sums if one.each[-1].turned >= _LEAST_TURN], noise)
 
 
 def _longest_unbroken(trace: Sequence[Odometry]) -> slice:
@@ -209,9 +212,9 @@ def _longest_unbroken(trace: Sequence[Odometry]) -> slice:
     return max((slice(one, two) for one, two in itertools.pairwise(ends)), key=lambda part: part.stop - part.start)
 
 
-def _judge_way(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
+def _way(sums: Sequence[_Sums], noise: Noise) -> Case | None:
     if not sums:
-        return
+        return None
     misses = []
     for one in sums:
         whole = one.each[-1]
@@ -219,19 +222,18 @@ def _judge_way(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
         room = _SHARE * whole.length + _OFF + whole.off + _NOISES * noise.position_m
         misses.append(min(window, one.whole_miss.way) - room)
     (first, *_, last), whole = sums[0].trace, sums[0].each[-1]
-    judge.check(
-        "rest-resources/pose-motion",
+    return Case(
         any(miss <= 0 for miss in misses),
         last.exchange,
         f"a way of ({whole.x:.3f}, {whole.y:.3f}) m, which is what the velocity adds up to",
-        found=f"the pose moved by ({last.pose.x - first.pose.x:.3f}, {last.pose.y - first.pose.y:.3f}) m",
+        observed=f"the pose moved by ({last.pose.x - first.pose.x:.3f}, {last.pose.y - first.pose.y:.3f}) m",
         cause="another way",
     )
 
 
-def _judge_turn(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
+def _turn(sums: Sequence[_Sums], noise: Noise) -> Case | None:
     if not sums:
-        return
+        return None
     misses = []
     for one in sums:
         whole = one.each[-1]
@@ -239,11 +241,10 @@ def _judge_turn(judge: Judge, sums: Sequence[_Sums], noise: Noise) -> None:
         room = _SHARE * whole.turned + _OFF_TURN + whole.off_turn + _NOISES * noise.heading_rad
         misses.append(min(window, one.whole_miss.turn) - room)
     whole = sums[0].each[-1]
-    judge.check(
-        "rest-resources/pose-rotation",
+    return Case(
         any(miss <= 0 for miss in misses),
         sums[0].trace[-1].exchange,
         f"a turn of {whole.turn:.3f} rad, which is what the angular velocity adds up to",
-        found=f"the heading turned by {whole.turn + whole.turn_error:.3f} rad",
+        observed=f"the heading turned by {whole.turn + whole.turn_error:.3f} rad",
         cause="another turn",
     )

@@ -11,6 +11,7 @@ from urllib.parse import urlencode
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
 from conformance.packs.table1.robot.robot import PLAN, Robot
+from conformance.scenarios.rule import Case, record
 from conformance.transport.exchange import Exchange
 
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
@@ -116,36 +117,63 @@ def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list
     return [*found, *round_about][:count]
 
 
-def judge_start(robot: Robot, plan: Plan, before: Pose, exchange: Exchange, again: Callable[[], Plan | None]) -> None:
-    """Judge that a path begins where the robot was just before, and may have moved from since.
+@dataclass(frozen=True)
+class Start:
+    """Where the path of a plan begins, and where the robot was.
 
-    One reading of a localisation may be out: of what begins elsewhere, most of several plans have to.
+    Attributes:
+        first: the first pose of the path.
+        robot: the robot's pose just before the plan.
+        exchange: of the plan.
+        beyond_m: by how much the path begins farther from the robot than it may, m, for each plan that was asked for.
+    """
+
+    first: Pose
+    robot: Pose
+    exchange: Exchange
+    beyond_m: tuple[float, ...]
+
+    @property
+    def case(self) -> Case:
+        """Whether the path begins at the robot: one reading of a localisation may be wrong, most may not."""
+        return Case(
+            self.beyond_m[0] <= 0 or median(self.beyond_m) <= 0,
+            self.exchange,
+            f"a path that starts at the robot, ({self.robot.x:.3f}, {self.robot.y:.3f})",
+            f"({self.first.x:.3f}, {self.first.y:.3f})",
+            "starts elsewhere",
+        )
+
+
+def start_of(
+    robot: Robot, plan: Plan, before: Pose, exchange: Exchange, again: Callable[[], Plan | None]
+) -> Start | None:
+    """Return where a path begins; None where the robot's pose cannot be read.
 
     Args:
         robot: which.
         plan: with the path.
-        before: the robot's pose just before it.
+        before: the robot's pose just before it; the robot may have moved since.
         exchange: the evidence.
-        again: asks for the same plan once more.
+        again: asks for the same plan once more, where the path does not begin at the robot.
     """
     after = robot.map_pose()
     if after is None:
-        return
+        return None
     offs = [_beyond_start(plan, before, after)]
     while offs[0] > 0 and len(offs) < _STARTS:
         earlier, other, later = robot.map_pose(), again(), robot.map_pose()
         if earlier is None or other is None or later is None:
             break
         offs.append(_beyond_start(other, earlier, later))
-    first = plan.poses[0]
-    robot.judge.check(
-        "rest-resources/plan-start",
-        offs[0] <= 0 or median(offs) <= 0,
-        exchange,
-        f"a path that starts at the robot, ({before.x:.3f}, {before.y:.3f})",
-        found=f"({first.x:.3f}, {first.y:.3f})",
-        cause="starts elsewhere",
-    )
+    return Start(plan.poses[0], before, exchange, tuple(offs))
+
+
+def judge_start(robot: Robot, plan: Plan, before: Pose, exchange: Exchange, again: Callable[[], Plan | None]) -> None:
+    """Judge whether a path begins where the robot was; the arguments are those of start_of()."""
+    start = start_of(robot, plan, before, exchange, again)
+    if start is not None:
+        record(robot.judge, "rest-resources/plan-start", [start.case])
 
 
 def _beyond_start(plan: Plan, before: Pose, after: Pose) -> float:

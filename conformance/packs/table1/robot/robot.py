@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
@@ -13,6 +12,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import projected
+from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.observe.polling import Patience
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.geometry import Pose, pose_of
@@ -112,10 +112,14 @@ class Odometry:
 
 
 class Robot:
-    """One robot, over REST."""
+    """One robot, over REST.
 
-    def __init__(self, api: RestInterface) -> None:
-        self.rest = api.client
+    Attributes:
+        clock: by which it is watched.
+    """
+
+    def __init__(self, api: RestInterface, clock: Clock = WALL_CLOCK) -> None:
+        self.rest, self.clock = api.client, clock
         self._contract = api.run.contract
         self.judge = api.run.judge
         self.statement = said_of(api.run)
@@ -145,7 +149,7 @@ class Robot:
 
     def patience(self, seconds: float) -> Patience:
         """A wait for what the robot has so many seconds for."""
-        return Patience(self.rest.connection.pace, seconds)
+        return Patience(self.rest.connection.pace, seconds, self.clock)
 
     def get(self, path: str) -> Exchange:
         """GET as JSON.
@@ -175,14 +179,14 @@ class Robot:
 
     def odometry(self) -> Odometry | None:
         """The odometry, or None where it cannot be read (which the observers have judged)."""
-        sent = time.monotonic()
+        sent = self.clock.now()
         message, exchange = self.read(POSE, ODOMETRY)
         if message is None:
             return None
         stamp = message["header"]["stamp"]
         return Odometry(
             sent,
-            time.monotonic(),
+            self.clock.now(),
             stamp["sec"] + stamp["nanosec"] * 1e-9,
             pose_of(message["pose"]["pose"]),
             Velocity.of(message["twist"]["twist"]),

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from conformance.packs.table1.robot.drive import Drive, certain_s
+from conformance.packs.table1.robot.drive_trace import ANGULAR_PART
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 
 if TYPE_CHECKING:
     from conformance.packs.table1.limits import Limits
-    from conformance.packs.table1.robot.drive_trace import Turn
-    from conformance.verdict.evidence import Judge
 
 # Beyond any limit, or not to be actuated; and by the linear part alone.
 _BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))
@@ -30,44 +28,43 @@ _RENEWED_TRIES: Final = 5
 _STEP_S: Final = 0.01
 # A look that takes so many times as long as usual must not make a renewal late.
 _LOOKS: Final = 4
-ANGULAR: Final = slice(3, 6)
 
 
-def judge_renewed(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
-    """Judge a robot that turns: its velocity lasts as long as it is renewed, and what is refused disturbs nothing.
+def renewed(robot: Robot, drive: Drive, turning: Velocity) -> bool:
+    """Renew a velocity, and send others that the robot refuses: the renewed one has to last.
 
     Args:
         robot: with its limits.
         drive: whose last command was this velocity, after another one, and which has reached it.
-        judge: is told of safety/renewal and safety/refused-keeps.
         turning: the velocity that was commanded.
+
+    Returns:
+        Whether it could be renewed in time.
     """
     expected, times = f"{turning} as long as it is renewed", _Times.of(robot.limits)
     if robot.usual_s <= _QUICK_S and times.seen_s - times.renewed_s >= _SHOWS_S:
         # One look shows that neither ends it.
-        lasts, found, turn = _renew(robot, drive, turning, times, _BAD)
+        lasts, found = _renew(robot, drive, turning, times, _BAD)
         if lasts:
             for id_ in ("safety/renewal", "safety/refused-keeps"):
-                judge.check(id_, holds=True, exchange=turn.velocity_exchange, expected=expected)
-            return
+                drive.saw(id_, expected, holds=True)
+            return True
     for _ in range(_RENEWED_TRIES):
         drive.command(STILL)
         takes_s = robot.limits.settle_s + robot.sample_s
         if robot.usual_s > _QUICK_S and takes_s < times.seen_s:
             # Reached while it is renewed: who looks for it first, at three slow answers a look, renews it too late.
             drive.command(turning)
-            lasts, found, turn = _renew(robot, drive, turning, times, (), drive.trace.answered + takes_s)
+            lasts, found = _renew(robot, drive, turning, times, (), drive.trace.answered + takes_s)
         else:
             drive.refresh(turning)
-            lasts, found, turn = _renew(robot, drive, turning, times, ())
+            lasts, found = _renew(robot, drive, turning, times, ())
         if lasts is not None:
             break
-    if lasts is None:
-        judge.skip("safety/renewal", "answers came too late to renew a velocity within its hold time")
-    else:
-        judge.check("safety/renewal", lasts, turn.velocity_exchange, expected, found=found, cause="ended")
+    drive.saw("safety/renewal", expected, found, "ended", holds=lasts)
     if lasts is not False:
-        _refused(robot, drive, judge, turning)
+        _refused(robot, drive, turning)
+    return lasts is not None
 
 
 @dataclass(frozen=True)
@@ -97,7 +94,7 @@ class _Times:
 
 def _renew(
     robot: Robot, drive: Drive, turning: Velocity, times: _Times, refused: tuple[Velocity, ...], reached: float = 0.0
-) -> tuple[bool | None, str, Turn]:
+) -> tuple[bool | None, str]:
     """Command the same again and again, until the first command has certainly ended; in the end, what is refused.
 
     Args:
@@ -109,81 +106,64 @@ def _renew(
         reached: when the robot has had its time to reach the velocity, s of the monotonic clock.
 
     Returns:
-        Whether the velocity is still there (None: it was not renewed in time), what was seen, and where.
+        Whether the velocity is still there (None: it was not renewed in time), and what was seen.
     """
     first = len(drive.trace.commands) - 1
     begun = drive.trace.sent
-    while time.monotonic() < begun + times.renewed_s:
+    while drive.clock.now() < begun + times.renewed_s:
         due = drive.trace.sent + times.every
-        if time.monotonic() >= due:
+        if drive.clock.now() >= due:
             drive.command(turning)
         elif _LOOKS * drive.look_s < times.every:
             drive.look()
         else:
-            time.sleep(max(_STEP_S, min(due, begun + times.renewed_s) - time.monotonic()))
+            drive.clock.sleep(max(_STEP_S, min(due, begun + times.renewed_s) - drive.clock.now()))
     for bad in refused:
         robot.put_velocity(bad)
         robot.put_linear(_BAD_LINEAR)
-    time.sleep(max(0.0, max(begun + times.seen_s, reached) - time.monotonic()))
+    drive.clock.sleep(max(0.0, max(begun + times.seen_s, reached) - drive.clock.now()))
     alone = robot.usual_s > _QUICK_S
     lasts, found = drive.sees(turning, 2, until=drive.trace.sent + times.holds_s, alone=alone)
     commands = drive.trace.commands[first:]
     if any(later.answered > one.sent + times.holds_s for one, later in itertools.pairwise(commands)):
         lasts = None
-    return lasts, found, drive.trace.turns[-1]
+    return lasts, found
 
 
-def _refused(robot: Robot, drive: Drive, judge: Judge, turning: Velocity) -> None:
-    """What is refused leaves the robot turning as it did."""
+def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
+    """Send velocities that the robot refuses: it has to turn as before."""
     for bad in _BAD:
         drive.refresh(turning)
         robot.put_velocity(bad)
         robot.put_linear(_BAD_LINEAR)
         drive.look()
-    drive.keep(min(_SHOWS_S, drive.holds_until - time.monotonic()))
+    drive.keep(min(_SHOWS_S, drive.holds_until - drive.clock.now()))
     keeps, found = drive.sees(turning, 2, until=drive.holds_until)
-    if keeps is None:
-        return  # a slow robot: its velocity may have ended by itself
-    judge.check(
-        "safety/refused-keeps",
-        keeps,
-        drive.trace.turns[-1].velocity_exchange,
-        f"the velocity that was there before the refused ones, {turning}",
-        found=found,
-        cause="changed",
-    )
+    # Where it is too late to say, the velocity of a slow robot may have ended by itself.
+    expected = f"the velocity that was there before the refused ones, {turning}"
+    drive.saw("safety/refused-keeps", expected, found, "changed", holds=keeps)
 
 
-def judge_arc(robot: Robot, drive: Drive, judge: Judge, arc: Velocity) -> None:
-    """Judge that a PUT of the linear part, ahead and then back, leaves the angular one.
+def arc(robot: Robot, drive: Drive, bent: Velocity) -> None:
+    """PUT the linear part, ahead and then back: the angular one has to stay.
 
     Args:
         robot: with its limits.
         drive: of that robot.
-        judge: is told of rest-resources/linear-keeps-angular.
-        arc: the velocity that all of it ends with.
+        bent: the velocity that all of it ends with.
     """
-    back = arc._replace(angular_z=0.0)
-    drive.refresh(arc)
+    back = bent._replace(angular_z=0.0)
+    drive.refresh(bent)
     if not drive.command_linear(Velocity(linear_x=-back.linear_x)):
         return
     for attempt in range(_TRIES):
         if attempt or robot.usual_s > _QUICK_S:
             # Whether a PUT of the linear part renews the angular one too is the robot's affair: so again, and in time.
-            drive.refresh(arc)
+            drive.refresh(bent)
         drive.command_linear(back)
-        drive.keep(min(_SHOWS_S, drive.holds_until - time.monotonic()))
-        keeps, found = drive.sees(arc, 1.5, part=ANGULAR, until=drive.holds_until)
+        drive.keep(min(_SHOWS_S, drive.holds_until - drive.clock.now()))
+        keeps, found = drive.sees(bent, 1.5, part=ANGULAR_PART, until=drive.holds_until)
         if keeps is not None:
             break
-    else:
-        judge.note("rest-resources/linear-keeps-angular", "answers came too late to see it within the hold time")
-        return
-    judge.check(
-        "rest-resources/linear-keeps-angular",
-        keeps,
-        drive.trace.turns[-1].velocity_exchange,
-        f"the angular part as it was before the linear PUT, {arc}",
-        found=found,
-        cause="changed",
-    )
+    expected = f"the angular part as it was before the linear PUT, {bent}"
+    drive.saw("rest-resources/linear-keeps-angular", expected, found, "changed", holds=keeps)

@@ -28,13 +28,10 @@ def fastest(robot: Robot, component: int) -> float:
 
 
 def reach(drive: Drive, velocity: Velocity) -> bool:
-    """Whether a velocity is taken and reached; judged as one of the range that the robot declares."""
+    """Command a velocity of the range that the robot declares; return whether it is accepted and reached."""
     if not drive.command(velocity):
-        exchange = drive.trace.commands[-1].exchange
-        expected = f"{velocity} to be taken, which is within the declared limits"
-        return drive.robot.judge.check(
-            "rest-resources/velocity-range", holds=False, exchange=exchange, expected=expected, cause=exchange.came
-        )
+        drive.refused("rest-resources/velocity-range", f"2xx for {velocity}, which is within the declared limits")
+        return False
     return drive.reach(velocity, "rest-resources/velocity-converges", "rest-resources/velocity-range")
 
 

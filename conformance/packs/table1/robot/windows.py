@@ -10,14 +10,13 @@ from statistics import median
 from typing import Final
 
 from conformance.packs.table1.limits import Limits
-from conformance.packs.table1.robot.drive_trace import Turn
+from conformance.packs.table1.robot.drive_trace import ALL, Turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
 
 # So many samples tell: of three, one may be anything.
 SEVERAL: Final = 3
 # Where stamps do not tell: no robot's odometry is slower than this, so that a later reading is another sample, s.
 LONGEST_SAMPLE_S: Final = 0.25
-ALL: Final = slice(None)
 # What is still so far away, of what it was at first, has not come nearer.
 _NO_NEARER: Final = 0.8
 

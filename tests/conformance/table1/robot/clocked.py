@@ -3,11 +3,14 @@
 from types import SimpleNamespace
 from typing import Any, Final
 
+from conformance.observe.clock import SimulatedClock
 from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot import drive
+from conformance.packs.table1.robot.drive_rules import every_outcome
 from conformance.packs.table1.robot.drive_trace import Command, Turn
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
+from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange, Request, Response
 
 WANTED: Final = Velocity(linear_x=0.5)
@@ -15,19 +18,6 @@ SETTLE_S: Final = 1.2
 SAMPLE_S: Final = 0.2
 _LOOK_S = 0.02
 _EXCHANGE = Exchange(Request("GET", "http://robot/"), Response(200, (), b"", 1.0))
-
-
-class Clock:
-    """Stands for the module time."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def monotonic(self) -> float:
-        return self.now
-
-    def sleep(self, seconds: float) -> None:
-        self.now += seconds
 
 
 class Body:
@@ -39,7 +29,7 @@ class Body:
 
     def __init__(
         self,
-        clock: Clock,
+        clock: SimulatedClock,
         takes_s: float,
         hold_s: float,
         *,
@@ -56,10 +46,10 @@ class Body:
         if self.loses:
             self.loses = False
             return
-        if self.told and self.clock.now > self.told[-1] + self.hold_s:
+        if self.told and self.clock.time_s > self.told[-1] + self.hold_s:
             self.told = []
         if self.renews or not self.told:
-            self.told.append(self.clock.now)
+            self.told.append(self.clock.time_s)
 
     def refuse(self, *_: object) -> None:
         """Take no velocity."""
@@ -69,7 +59,7 @@ class Body:
     @property
     def sampled(self) -> float:
         """When the newest odometry was taken."""
-        return self.clock.now // SAMPLE_S * SAMPLE_S
+        return self.clock.time_s // SAMPLE_S * SAMPLE_S
 
     @property
     def velocity(self) -> Velocity:
@@ -78,32 +68,28 @@ class Body:
         return WANTED if moves else STILL
 
 
-class Judge:
-    """Takes down what is judged, by requirement."""
-
-    def __init__(self) -> None:
-        self.judged: dict[str, bool] = {}
-        self.skipped: list[str] = []
-
-    def check(self, requirement: str, holds: bool, *_: object, **__: object) -> bool:  # noqa: FBT001 - as of a judge
-        self.judged[requirement] = self.judged.get(requirement, True) and holds
-        return holds
-
-    def skip(self, requirement: str, _reason: str) -> None:
-        self.skipped.append(requirement)
-
-
 class Drive(drive.Drive):
     """Looks for as long as it is told to, which may be longer than anybody wants."""
 
     def __init__(self, body: Body, looks: dict[int, float], hold_s: float, usual_s: float = 0.001) -> None:
         declared = {"settle_s": SETTLE_S, "hold_s": hold_s, "tolerance_abs": 0.02}
         limits = DeclaredLimits(**declared).resolved()
-        self.judge = Judge()
-        given: dict[str, Any] = {"limits": limits, "judge": self.judge, "settle_s": 1.25 * SETTLE_S + 0.25}
+        given: dict[str, Any] = {"limits": limits, "clock": body.clock, "settle_s": 1.25 * SETTLE_S + 0.25}
         given |= {"sample_s": SAMPLE_S, "usual_s": usual_s, "put_velocity": body.refuse, "put_linear": body.refuse}
         super().__init__(SimpleNamespace(**given))
         self.body, self.looks = body, looks
+
+    @property
+    def judged(self) -> dict[str, bool]:
+        """Whether each requirement holds that the drive was to show."""
+        found: dict[str, bool] = {}
+        shown = {id_ for reach in self.trace.reaches for id_ in reach.shows} | {
+            one.shows for one in self.trace.sightings
+        }
+        for id_, one in every_outcome(self.trace, self.robot.limits, way=False):
+            if isinstance(one, Case) and id_ in shown:
+                found[id_] = found.get(id_, True) and one.holds
+        return found
 
     def command(self, velocity: Velocity, *, integers: bool = False) -> bool:  # noqa: ARG002 - as of a drive
         """Command the one velocity, or rest."""
@@ -112,29 +98,29 @@ class Drive(drive.Drive):
 
     def tell(self, velocity: Velocity = WANTED, *, renewal: bool = False) -> None:
         """The same, without an answer."""
-        sent = self.body.clock.now
+        sent = self.body.clock.time_s
         if velocity == STILL:
             self.body.told = []
         else:
             self.body.tell()
-        self.body.clock.now += self.robot.usual_s
-        self.trace = self.trace.commanded(Command(velocity, sent, self.body.clock.now, _EXCHANGE, renewal=renewal))
+        self.body.clock.time_s += self.robot.usual_s
+        self.trace = self.trace.commanded(Command(velocity, sent, self.body.clock.time_s, _EXCHANGE, renewal=renewal))
 
     def _renew(self) -> None:
         self.tell(renewal=True)
 
     def _glance(self) -> None:
         clock = self.body.clock
-        at = clock.now
-        clock.now += max(_LOOK_S, self.robot.usual_s)
+        at = clock.time_s
+        clock.time_s += max(_LOOK_S, self.robot.usual_s)
         # No stamp tells whether it is another sample than the one before.
         self.trace = self.trace.looked(Turn(None, at, self.body.velocity, _EXCHANGE, None, _EXCHANGE))
 
     def look(self) -> tuple[Velocity | None, Exchange]:
         """Take a sample, after a while."""
         clock = self.body.clock
-        clock.now += self.looks.get(len(self.trace.turns), max(_LOOK_S, self.look_s))
+        clock.time_s += self.looks.get(len(self.trace.turns), max(_LOOK_S, self.look_s))
         seen = self.body.velocity
-        odometry = Odometry(clock.now, clock.now, self.body.sampled, Pose(0.0, 0.0, 0.0), seen, _EXCHANGE)
-        self.trace = self.trace.looked(Turn(odometry, clock.now, seen, _EXCHANGE, None, _EXCHANGE))
+        odometry = Odometry(clock.time_s, clock.time_s, self.body.sampled, Pose(0.0, 0.0, 0.0), seen, _EXCHANGE)
+        self.trace = self.trace.looked(Turn(odometry, clock.time_s, seen, _EXCHANGE, None, _EXCHANGE))
         return seen, _EXCHANGE

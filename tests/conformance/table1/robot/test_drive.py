@@ -1,75 +1,67 @@
 """Whether a velocity is reached in time, also where whoever looks is held up."""
 
 import pytest
-from clocked import SAMPLE_S, SETTLE_S, WANTED, Body, Clock, Drive
+from clocked import SAMPLE_S, SETTLE_S, WANTED, Body, Drive
 
-from conformance.packs.table1.robot import drive
+from conformance.observe.clock import SimulatedClock
 from conformance.packs.table1.robot.robot import STILL
 
 _CONVERGES = "rest-resources/velocity-converges"
 
 
 def _judged(
-    monkeypatch: pytest.MonkeyPatch,
-    takes_s: float,
-    looks: dict[int, float] | None = None,
-    hold_s: float = 10.0,
-    *,
-    loses: bool = False,
+    takes_s: float, looks: dict[int, float] | None = None, hold_s: float = 10.0, *, loses: bool = False
 ) -> bool:
     """Whether a robot that takes so long is said to have reached the velocity."""
-    clock = Clock()
-    monkeypatch.setattr(drive, "time", clock)
+    clock = SimulatedClock()
     driven = Drive(Body(clock, takes_s, hold_s, loses=loses), looks or {}, hold_s)
     driven.tell()
     driven.reach(WANTED, _CONVERGES)
-    return driven.judge.judged[_CONVERGES]
+    return driven.judged[_CONVERGES]
 
 
 @pytest.mark.parametrize("takes_s", [0.5 * SETTLE_S, SETTLE_S - SAMPLE_S, SETTLE_S])
-def test_a_velocity_is_reached_in_its_settle_time_and_seen_with_the_next_odometry(monkeypatch, takes_s):
-    assert _judged(monkeypatch, takes_s)
+def test_a_velocity_is_reached_in_its_settle_time_and_seen_with_the_next_odometry(takes_s):
+    assert _judged(takes_s)
 
 
 @pytest.mark.parametrize("late_s", [0.6, 0.7, 0.8, 1.2, 3.0])
-def test_samples_from_within_the_settle_time_say_nothing_of_a_robot_that_was_looked_at_too_late(monkeypatch, late_s):
+def test_samples_from_within_the_settle_time_say_nothing_of_a_robot_that_was_looked_at_too_late(late_s):
     # Fifty looks while it still had time, then nothing until after the end.
-    assert _judged(monkeypatch, SETTLE_S, {50: late_s})
+    assert _judged(SETTLE_S, {50: late_s})
 
 
-def test_a_velocity_that_ended_because_it_was_renewed_too_late_has_its_settle_time_again(monkeypatch):
-    assert _judged(monkeypatch, SETTLE_S, {5: 1.6}, hold_s=1.0)
+def test_a_velocity_that_ended_because_it_was_renewed_too_late_has_its_settle_time_again():
+    assert _judged(SETTLE_S, {5: 1.6}, hold_s=1.0)
 
 
 @pytest.mark.parametrize("hold_s", [1.65, 10.0])
-def test_a_command_that_was_lost_is_not_made_up_for_by_its_renewal(monkeypatch, hold_s):
-    assert not _judged(monkeypatch, 0.1 * SETTLE_S, hold_s=hold_s, loses=True)
+def test_a_command_that_was_lost_is_not_made_up_for_by_its_renewal(hold_s):
+    assert not _judged(0.1 * SETTLE_S, hold_s=hold_s, loses=True)
 
 
 @pytest.mark.parametrize("looks", [{}, {50: 0.6}, {5: 1.6}, dict.fromkeys(range(100), 0.7)])
 @pytest.mark.parametrize("hold_s", [1.0, 10.0])
-def test_a_robot_that_takes_twice_its_settle_time_is_refuted(monkeypatch, looks, hold_s):
-    assert not _judged(monkeypatch, 3 * SETTLE_S, looks, hold_s)
+def test_a_robot_that_takes_twice_its_settle_time_is_refuted(looks, hold_s):
+    assert not _judged(3 * SETTLE_S, looks, hold_s)
 
 
-def test_rest_that_no_velocity_brings_about_is_waited_for_as_long(monkeypatch):
+def test_rest_that_no_velocity_brings_about_is_waited_for_as_long():
     # A goal was cancelled: there is no command to be renewed.
-    clock = Clock()
-    monkeypatch.setattr(drive, "time", clock)
+    clock = SimulatedClock()
     body = Body(clock, 0.0, 10.0)
     body.tell()
     driven = Drive(body, {}, 1.0)
-    driven.reach(STILL, "safety/cancel", since=clock.now)
-    assert driven.judge.judged == {"safety/cancel": False}
+    driven.reach(STILL, "safety/cancel", since=clock.now())
+    assert driven.judged == {"safety/cancel": False}
     assert driven.trace.commands == ()
 
 
 @pytest.mark.parametrize(("usual_s", "judged"), [(0.3, {_CONVERGES: False}), (0.4, {})])
-def test_what_ends_before_it_can_be_read_is_not_held_against_the_robot(monkeypatch, usual_s, judged):
-    clock = Clock()
-    monkeypatch.setattr(drive, "time", clock)
+def test_what_ends_before_it_can_be_read_is_not_held_against_the_robot(usual_s, judged):
+    clock = SimulatedClock()
     driven = Drive(Body(clock, 20 * SETTLE_S, 1.0), dict.fromkeys(range(100), 3 * usual_s), 1.0, usual_s)
     driven.tell()
     assert not driven.reach(WANTED, _CONVERGES)
-    assert driven.judge.judged == judged
-    assert driven.judge.skipped == ([] if judged else [_CONVERGES])
+    assert driven.judged == judged
+    assert driven.trace.reaches[-1].outlasted is not bool(judged)

@@ -13,10 +13,9 @@ from conformance.packs.table1.robot import windows
 from conformance.packs.table1.robot.drive_trace import Turn
 from conformance.packs.table1.robot.geometry import Pose, wrapped
 from conformance.packs.table1.robot.letting_go import LetGo
-from conformance.packs.table1.robot.path import judge_path
+from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Judge
 
 _EXCHANGE = Exchange(Request("GET", "http://robot/"), Response(200, (), json.dumps({}).encode(), 1.0))
 _NOISE = Noise(position_m=0.005, heading_rad=0.005, linear_m_s=0.01, angular_rad_s=0.02)
@@ -201,10 +200,10 @@ def way(factor: float, seed: int, *, jump: int | None = None, hz: float = 10) ->
             off = pose._replace(x=pose.x + by.gauss(0, 0.003), y=pose.y + by.gauss(0, 0.003))
             told = Odometry(0.02 * step, 0.02 * step, 0.02 * step, off, noisy(velocity, by), _EXCHANGE)
         trace.append(told)
-    judge = Judge({"rest-resources/pose-motion", "rest-resources/pose-rotation"})
-    judge_path(judge, trace, [one.velocity for one in trace], _NOISE)
-    assert all(evidence.cases for evidence in judge.evidence.values())
-    return {id_.split("/")[1] for id_ in judge.refuted()}
+    way, turned = way_and_turn(trace, [one.velocity for one in trace], _NOISE)
+    assert way
+    assert turned
+    return {name for name, case in (("pose-motion", way), ("pose-rotation", turned)) if not case.holds}
 
 
 @few

@@ -13,6 +13,7 @@ import pytest
 
 from conformance.api.soap.service import SoapService
 from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive_rules import judge_drive
 from conformance.packs.table1.robot.goals import make_room
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.state_over_soap import STATES, compare, difference, judge_difference
@@ -45,6 +46,7 @@ def test_pose_and_velocity_in_motion(robot: Robot, subscribers: SoapService) -> 
                     compare(robot, subscribers, name, partial(drive.command, wanted))
         if not suspects:
             break
+    judge_drive(robot.judge, drive.trace, robot.limits)
     for (name, _), seen in suspects.items():
         if seen is not None:
             judge_difference(robot, name, *seen)

@@ -5,7 +5,6 @@ from typing import Final
 
 import pytest
 
-from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.probe.client import Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import SENSORS, STILL, Robot, Velocity
@@ -67,7 +66,6 @@ def test_sensors_are_on_the_graph(robot: Robot, seeing: Probe, judge: Judge) -> 
 @pytest.mark.requirement("equivalence/velocity-message")
 def test_velocity_is_published(robot: Robot, seeing: Probe, judge: Judge, effort: Effort) -> None:
     """A velocity that was accepted comes to the velocity topic; on its way there it may be smoothed."""
-    drive = Drive(robot)
     try:
         seeing.velocities()
         lost = 0
@@ -76,7 +74,7 @@ def test_velocity_is_published(robot: Robot, seeing: Probe, judge: Judge, effort
             lost += not _judge_one(robot, seeing, judge, robot.share_of_limits(share, -share))
             if lost > 1:
                 break
-        drive.command(STILL)
+        robot.put_velocity(STILL)
     except ProbeError as error:
         pytest.skip(str(error))
 

@@ -1,31 +1,29 @@
 """Driving straight ahead and back: hardly at all, and as fast as the robot says that it can."""
 
-import pytest
-
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goals import make_room
 from conformance.packs.table1.robot.robot import Robot, Velocity
 from conformance.packs.table1.robot.velocity_range import direction, fastest, reach, slowest
+from conformance.packs.table1.scenarios.trace import Driven
+from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.stage import Need
 
-pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
 
-
-@pytest.mark.requirement(
-    "rest-resources/velocity-put",
-    "rest-resources/velocity-converges",
-    "rest-resources/velocity-range",
-    "rest-resources/velocity-odometry",
-    "rest-resources/linear-agrees",
-    "rest-resources/pose-motion",
-    "safety/stop",
-    "safety/limits-hold",
-)
-def test_straight_drive(robot: Robot) -> None:
-    """Ahead for less than a second, back where it came from, and a stop."""
+@scenario(needs={Need.REST, Need.MOTION})
+def straight(robot: Robot) -> Driven:
+    """Drive ahead for less than a second, back to where it began, and stop."""
     if not robot.actuated(0):
-        pytest.skip("the statement says that the robot cannot drive straight ahead")
+        raise NotPossibleError("the statement says that the robot cannot drive straight ahead")
     make_room(robot)
     drive = Drive(robot)
+    try:
+        _play(robot, drive)
+    except Exception as error:
+        raise PartialTraceError(Driven(drive.whole)) from error
+    return Driven(drive.whole)
+
+
+def _play(robot: Robot, drive: Drive) -> None:
     drive.look()
     reach(drive, slowest(robot))
     ahead = Velocity(linear_x=direction(robot) * fastest(robot, 0))
@@ -35,4 +33,3 @@ def test_straight_drive(robot: Robot) -> None:
     if reach(drive, back):
         drive.keep(0.2)
         drive.stop(back)
-    drive.judge_motion()

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from conformance.engine import intermittent
-from conformance.engine.intermittent import look_again
+from conformance.engine import resending
+from conformance.engine.resending import look_again
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
@@ -23,14 +23,14 @@ def _run(method="GET", answer=_BAD):
 @pytest.mark.parametrize(("again", "expected"), [([_BAD] * 5, (5, 5)), ([_BAD, _GOOD, _GOOD, _GOOD, _BAD], (2, 5))])
 def test_how_often_it_comes_back(monkeypatch, again, expected):
     run, answers = _run(), iter(again)
-    monkeypatch.setattr(intermittent, "send_again", lambda request, _: Exchange(request, next(answers)))
+    monkeypatch.setattr(resending, "send_again", lambda request, _: Exchange(request, next(answers)))
     look_again(run, Connection())
     evidence = run.judge.evidence["http/head"]
     (finding,) = evidence.findings.values()
     assert finding.again == expected
     verdict = verdict_of(run.contract.ledger["http/head"], evidence, run.claims)
     assert verdict.value == "fail"
-    assert ("intermittent: it came back 2 of 5 times" in verdict.reason) == (expected[0] < 5)
+    assert ("Intermittent: sent again, it failed 2 of 5 times" in verdict.reason) == (expected[0] < 5)
 
 
 def test_an_observer_s_word_counts_more_than_the_status(monkeypatch):
@@ -41,7 +41,7 @@ def test_an_observer_s_word_counts_more_than_the_status(monkeypatch):
         run.judge.check("http/head", next(holds), Exchange(request, _GOOD), "status 200")
         return Exchange(request, _GOOD)
 
-    monkeypatch.setattr(intermittent, "send_again", send)
+    monkeypatch.setattr(resending, "send_again", send)
     look_again(run, Connection())
     assert next(iter(run.judge.evidence["http/head"].findings.values())).again == (1, 5)
 
@@ -49,7 +49,7 @@ def test_an_observer_s_word_counts_more_than_the_status(monkeypatch):
 def _sent_again(monkeypatch, run, answer=_GOOD):
     """What is put down of a finding, and whether the robot was left at rest."""
     stopped = []
-    monkeypatch.setattr(intermittent, "send_again", lambda request, _: Exchange(request, answer))
+    monkeypatch.setattr(resending, "send_again", lambda request, _: Exchange(request, answer))
     device = SimpleNamespace(leave_at_rest=stopped.append)
     look_again(run, Connection(), SimpleNamespace(device=device))
     return next(iter(run.judge.evidence["http/head"].findings.values())).again, bool(stopped)

@@ -1,0 +1,57 @@
+"""``roaas replay --recorded``: the rules judge the traces of a run again, and nothing is sent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from conformance.engine.planning import collected
+from conformance.scenarios.rule import Rule, record
+from conformance.scenarios.stored import TRACES_NAME, read_traces
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conformance.engine.robot_under_test import RobotUnderTest
+    from conformance.scenarios.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Rejudged:
+    """What the rules say of one requirement by the recorded traces.
+
+    Attributes:
+        requirement: its id.
+        cases: how many were judged.
+        failures: what each failure says.
+    """
+
+    requirement: str
+    cases: int
+    failures: tuple[str, ...]
+
+
+def judge_recorded(robot: RobotUnderTest, folder: Path) -> list[Rejudged]:
+    """Judge the traces in a result's folder by the rules of the run's contract; the robot need not be there.
+
+    Raises:
+        TracesError: there are no traces, or they are not well made.
+    """
+    rules: list[tuple[Rule, Scenario]] = []
+    for item in collected(robot):
+        mark = item.get_closest_marker("rule")
+        if mark is not None:
+            rules.append(mark.args)
+    recordings = read_traces(folder / TRACES_NAME, [scenario for _, scenario in rules])
+    run = robot.run
+    known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort}
+    for rule, scenario in rules:
+        recording = recordings.played.get(scenario.name)
+        if recording is not None:
+            record(run.judge, rule.requirement, rule.outcomes(recording.trace, known.__getitem__))
+    judged = ((id_, run.judge.evidence[id_]) for id_ in run.contract.ledger)
+    return [
+        Rejudged(id_, evidence.cases, tuple(one.text for one in evidence.findings.values()))
+        for id_, evidence in judged
+        if evidence.cases
+    ]

@@ -1,0 +1,125 @@
+"""What was done with goals, and what the robot showed, as values that can be judged without a robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from conformance.packs.table1.robot.drive_trace import Trace
+from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.plan import Start
+from conformance.transport.exchange import Exchange
+
+
+@dataclass(frozen=True)
+class NoGoal:
+    """A robot without a goal: it is read, and cancelled all the same.
+
+    Attributes:
+        read, cancelled: the responses.
+    """
+
+    read: Exchange
+    cancelled: Exchange
+
+
+@dataclass(frozen=True)
+class Put:
+    """A goal that was put, and what the robot then showed.
+
+    Attributes:
+        exchange: of the PUT.
+        body: the goal.
+        shown: the goal that the robot showed; None: it showed none.
+        read: of the GET that showed it.
+        differs: in what it differs from the one that was put; empty: in nothing.
+        ended: whether the goal may have ended before it could be read, as the robot was there.
+    """
+
+    exchange: Exchange
+    body: dict[str, Any]
+    shown: Any
+    read: Exchange
+    differs: str
+    ended: bool
+
+
+@dataclass(frozen=True)
+class Cancelled:
+    """A goal that was cancelled.
+
+    Attributes:
+        exchange: of the DELETE.
+        read: of the last GET.
+        gone: whether the robot had no goal in the end.
+        drive: the wait for rest.
+    """
+
+    exchange: Exchange
+    read: Exchange
+    gone: bool
+    drive: Trace
+
+
+@dataclass(frozen=True)
+class GoalLife:
+    """One goal through all that clients do with it, then another in its place, then none.
+
+    Attributes:
+        none: before the first.
+        first: it was put, with all members that may be left out.
+        stamps: its stamp in two readings.
+        repeated: it was put again and again.
+        contradicted: another pose was put under its id.
+        velocity: the response to a velocity meanwhile; None: none was sent.
+        drive: what that velocity did, where it was accepted.
+        second: another goal was put, without an id.
+        renamed: whether the second goal is accepted when it has an id; None: it was accepted without one.
+        cancelled: the last goal was cancelled; None: it had ended.
+    """
+
+    none: tuple[NoGoal, ...] = ()
+    first: Put | None = None
+    stamps: tuple[Any, ...] = ()
+    repeated: tuple[Put, ...] = ()
+    contradicted: tuple[Put, ...] = ()
+    velocity: Exchange | None = None
+    drive: Trace | None = None
+    second: Put | None = None
+    renamed: bool | None = None
+    cancelled: tuple[Cancelled, ...] = ()
+
+
+@dataclass(frozen=True)
+class GoalReached:
+    """A goal that the robot drove to, or did not.
+
+    Attributes:
+        put: of the PUT.
+        there: the goal, in the frame of goals.
+        here: where the robot was in the end.
+        way_m: how far the robot came from where it was at first, m; has_to_m: how far it has to come at least.
+        left_m: how far it still is from the goal, m; reached_m: how near it has to come.
+        drive: all that was read on the way.
+        read: the last GET of the goal.
+        ended: whether there was no goal any more.
+        undecided: whether the robot was still on its way when the time was over.
+        turned: the drive behind it, which shows whether a velocity from before the goal is taken up again; or None.
+        start: where a plan begins behind it; or None.
+        again: of the PUT of the same goal, once it had ended; or None.
+    """
+
+    put: Exchange
+    there: Pose | None = None
+    here: Pose | None = None
+    way_m: float = 0.0
+    has_to_m: float = 0.0
+    left_m: float = 0.0
+    reached_m: float = 0.0
+    drive: Trace | None = None
+    read: Exchange | None = None
+    ended: bool = False
+    undecided: bool = False
+    turned: Trace | None = None
+    start: Start | None = None
+    again: Exchange | None = None

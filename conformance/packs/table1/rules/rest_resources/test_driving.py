@@ -1,0 +1,36 @@
+"""What drives show of velocity and pose: velocities are accepted and reached, and the pose follows them."""
+
+from collections.abc import Callable, Iterator
+
+from conformance.packs.table1.robot.drive_rules import outcomes
+from conformance.packs.table1.scenarios.straight import straight
+from conformance.packs.table1.scenarios.trace import Driven
+from conformance.packs.table1.scenarios.turn import turn
+from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
+from conformance.packs.table1.statement import said_of
+from conformance.scenarios.rule import Outcome, Rule, rule
+from conformance.scenarios.scenario import Scenario
+from conformance.verdict.run import Run
+
+
+def _shown(name: str, *scenarios: Scenario) -> Rule:
+    """Return the rule that judges a requirement by all that drives show of it."""
+    requirement = f"rest-resources/{name}"
+
+    def judge(trace: Driven, run: Run) -> Iterator[Outcome]:
+        return outcomes(requirement, trace.drive, said_of(run).limits)
+
+    made: Callable[[Callable[..., Iterator[Outcome]]], Rule] = rule(requirement, on=scenarios)
+    return made(judge)
+
+
+velocity_put = _shown("velocity-put", straight, velocity_walk)
+velocity_integers = _shown("velocity-integers", turn)
+velocity_converges = _shown("velocity-converges", straight, turn, velocity_walk)
+velocity_range = _shown("velocity-range", straight, turn)
+velocity_odometry = _shown("velocity-odometry", straight, turn, velocity_walk)
+linear_put = _shown("linear-put", turn, velocity_walk)
+linear_keeps_angular = _shown("linear-keeps-angular", turn, velocity_walk)
+linear_agrees = _shown("linear-agrees", straight, turn, velocity_walk)
+pose_motion = _shown("pose-motion", straight, turn, velocity_walk)
+pose_rotation = _shown("pose-rotation", turn, velocity_walk)

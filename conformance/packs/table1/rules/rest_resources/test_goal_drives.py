@@ -1,0 +1,70 @@
+"""What a drive to a goal shows."""
+
+from collections.abc import Iterator
+
+from conformance.packs.table1.robot.drive_rules import outcomes
+from conformance.packs.table1.robot.goal import NEW
+from conformance.packs.table1.robot.goal_trace import GoalReached
+from conformance.packs.table1.scenarios.goal_reached import goal_reached
+from conformance.packs.table1.statement import said_of
+from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.verdict.run import Run
+
+
+@rule("rest-resources/goal-put", on=(goal_reached,))
+def goal_put(trace: GoalReached) -> Iterator[Outcome]:
+    """Judge that a new goal is accepted."""
+    yield Case(trace.put.response.status in NEW, trace.put, "201 or 202 for a new goal")
+
+
+@rule("rest-resources/goal-drives", on=(goal_reached,))
+def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
+    """Judge that the robot drove, and where it is."""
+    if trace.there is None or trace.read is None or trace.undecided:
+        return  # refused, or slow but on its way: nothing to be said against it
+    far = trace.way_m > trace.has_to_m
+    yield Case(
+        trace.left_m < trace.reached_m and far,
+        trace.read,
+        f"the robot at ({trace.there.x:.2f}, {trace.there.y:.2f}), where its goal was",
+        f"the robot {trace.left_m:.2f} m away from it, having moved {trace.way_m:.2f} m",
+        "not reached" if far else "not driven",
+    )
+
+
+@rule("rest-resources/goal-ended", on=(goal_reached,))
+def goal_ended(trace: GoalReached) -> Iterator[Outcome]:
+    """Judge that a goal ends where it is reached."""
+    if trace.read is not None and not trace.undecided:
+        holds = trace.ended and trace.read.response.status == 404
+        observed = "" if trace.ended else "a goal that is still active"
+        yield Case(holds, trace.read, "404 when the goal has been reached", observed)
+
+
+@rule("rest-resources/goal-id-again", on=(goal_reached,))
+def goal_id_again(trace: GoalReached) -> Iterator[Outcome]:
+    """Judge that the id of a goal that has ended can be used again."""
+    if trace.again is not None:
+        holds = trace.again.response.status in NEW
+        yield Case(holds, trace.again, "201 or 202 for a goal whose id has ended before")
+
+
+@rule("rest-resources/plan-start", on=(goal_reached,))
+def plan_start(trace: GoalReached) -> Iterator[Outcome]:
+    """Judge that a plan begins where the robot is, away from where it was at first."""
+    if trace.start is not None:
+        yield trace.start.case
+
+
+@rule("rest-resources/velocity-odometry", on=(goal_reached,))
+def velocity_odometry(trace: GoalReached, run: Run) -> Iterator[Outcome]:
+    """Judge that velocity and odometry agree on the way."""
+    if trace.drive is not None:
+        yield from outcomes("rest-resources/velocity-odometry", trace.drive, said_of(run).limits)
+
+
+@rule("rest-resources/pose-motion", on=(goal_reached,))
+def pose_motion(trace: GoalReached, run: Run) -> Iterator[Outcome]:
+    """Judge that the pose follows the velocity on the way."""
+    if trace.drive is not None:
+        yield from outcomes("rest-resources/pose-motion", trace.drive, said_of(run).limits)

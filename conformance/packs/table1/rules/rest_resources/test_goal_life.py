@@ -1,0 +1,151 @@
+"""What the life of a goal shows: each requirement on goals is judged by the scenario's trace."""
+
+from collections.abc import Iterator
+
+from conformance.packs.table1.robot.drive_rules import outcomes
+from conformance.packs.table1.robot.goal import CANCELLED, NEW, REPEATED, status_fault
+from conformance.packs.table1.robot.goal_trace import GoalLife, Put
+from conformance.packs.table1.scenarios.goal_life import ID, goal_life
+from conformance.packs.table1.statement import said_of
+from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.verdict.run import Run
+
+
+def _puts(life: GoalLife) -> Iterator[Put]:
+    """Yield the goals that were new."""
+    yield from (one for one in (life.first, life.second if life.renamed is None else None) if one is not None)
+
+
+def _read(life: GoalLife) -> Iterator[Put]:
+    """Yield the goals that were new and accepted, and could be read before they ended."""
+    yield from (one for one in _puts(life) if one.exchange.response.status in NEW | REPEATED and not one.ended)
+
+
+def _shown(put: Put) -> Case:
+    return Case(not put.differs, put.read, "the goal that was put", put.differs)
+
+
+@rule("rest-resources/goal-none", on=(goal_life,))
+def no_goal(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that there is no goal at first."""
+    for one in trace.none:
+        yield Case(one.read.response.status == 404, one.read, "404 without an active goal")
+
+
+@rule("rest-resources/goal-delete-none", on=(goal_life,))
+def cancelled_without_goal(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge the response to a DELETE where there is no goal."""
+    for one in trace.none:
+        yield Case(one.cancelled.response.status == 404, one.cancelled, "404 for a DELETE without an active goal")
+
+
+@rule("rest-resources/goal-delete-none-success", on=(goal_life,))
+def cancelled_without_goal_or_success(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge the same more mildly."""
+    for one in trace.none:
+        yield Case(one.cancelled.response.status in {404, 200, 204}, one.cancelled, "404 or 204 without a goal")
+
+
+@rule("rest-resources/goal-put", on=(goal_life,))
+def goal_put(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that a new goal is accepted."""
+    for one in _puts(trace):
+        yield Case(one.exchange.response.status in NEW, one.exchange, "201 or 202 for a new goal")
+
+
+@rule("rest-resources/goal-get", on=(goal_life,))
+def goal_get(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that the active goal is the one that was put."""
+    return map(_shown, _read(trace))
+
+
+@rule("rest-resources/goal-id", on=(goal_life,))
+def goal_id(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that a goal comes back under its id."""
+    return (_shown(one) for one in _read(trace) if one is trace.first)
+
+
+@rule("rest-resources/goal-status", on=(goal_life,))
+def goal_status(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge the status of an active goal."""
+    for one in _read(trace):
+        if one.shown is not None:
+            wrong = status_fault(one.shown)
+            yield Case(not wrong, one.read, "a status {code, text} with code 1, 2 or 3", wrong)
+
+
+@rule("rest-resources/goal-repeat", on=(goal_life,))
+def goal_repeat(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that a repeated goal changes nothing, neither what was put nor its stamp."""
+    for one in trace.repeated:
+        accepted, changed = one.exchange.response.status in REPEATED, one.differs
+        # A robot that shows one stamp in two readings shows another one for another goal.
+        stamps = trace.stamps if trace.first is not None and one.body == trace.first.body else ()
+        if not changed and len(stamps) > 1 and stamps[0] == stamps[1] != one.shown["goal_id"]["stamp"]:
+            changed = f"goal_id.stamp {one.shown['goal_id']['stamp']} for {stamps[0]}"
+        yield Case(
+            accepted and not changed,
+            one.read if accepted else one.exchange,
+            "200, 202 or 204 for the goal that is active already, which stays as it is",
+            changed if accepted else one.exchange.came,
+        )
+
+
+@rule("rest-resources/goal-conflict", on=(goal_life,))
+def goal_conflict(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that another pose under the active goal's id is refused."""
+    for one in trace.contradicted:
+        refused = one.exchange.response.status == 409
+        yield Case(
+            refused and not one.differs,
+            one.read if refused else one.exchange,
+            "409 for another pose under the active goal's id, and the goal as it was",
+            one.differs if refused else one.exchange.came,
+        )
+
+
+@rule("rest-resources/goal-preempt", on=(goal_life,))
+def goal_preempt(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that another goal takes the active one's place."""
+    if trace.second is not None and trace.renamed is False:
+        yield Case(False, trace.second.exchange, "201 or 202 for another goal")
+    yield from (_shown(one) for one in _read(trace) if one is trace.second)
+
+
+@rule("rest-resources/goal-fills-in", on=(goal_life,))
+def goal_fills_in(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that the robot fills in what a goal leaves out."""
+    second = trace.second
+    if second is None:
+        return
+    if trace.renamed is not None:
+        if trace.renamed:
+            yield Case(False, second.exchange, "201 or 202 for a goal without an id")
+    elif not second.ended:
+        id_ = None if second.shown is None else second.shown["goal_id"]["id"]
+        found = "no active goal" if id_ is None else f"goal_id.id {id_!r}"
+        expected = "the active goal with a header and a goal_id of the robot's own"
+        yield Case(id_ not in {None, "", ID}, second.read, expected, found)
+
+
+@rule("rest-resources/velocity-goal", on=(goal_life,))
+def velocity_goal(trace: GoalLife, run: Run) -> Iterator[Outcome]:
+    """Judge that a velocity while a goal is active is driven, or refused with 409."""
+    answer = trace.velocity
+    if answer is not None:
+        yield Case(answer.response.status in {200, 204, 409}, answer, "200, 204 or 409 while a goal is active")
+    if trace.drive is not None:
+        yield from outcomes("rest-resources/velocity-goal", trace.drive, said_of(run).limits)
+
+
+@rule("rest-resources/goal-delete", on=(goal_life,))
+def goal_delete(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that a cancelled goal is gone."""
+    for one in trace.cancelled:
+        accepted = one.exchange.response.status in CANCELLED
+        yield Case(
+            accepted and one.gone,
+            one.read if accepted else one.exchange,
+            "204, then 404 for GET",
+            f"{one.read.came} for GET" if accepted else "",
+        )

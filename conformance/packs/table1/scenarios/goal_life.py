@@ -1,0 +1,216 @@
+"""The life of a goal: put, read, repeated, contradicted, displaced by another one, and cancelled."""
+
+from dataclasses import dataclass, field, replace
+from http import HTTPStatus
+from typing import Any, Final
+
+from conformance.observe.polling import poll_for
+from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.goal import (
+    NEW,
+    RATHER_XML,
+    REPEATED,
+    arrived,
+    await_goal,
+    await_none,
+    difference,
+    goal_body,
+    put_goal,
+)
+from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, NoGoal, Put
+from conformance.packs.table1.robot.goals import choose_goals, meanwhile
+from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+from conformance.packs.table1.robot.standstill import Standstill
+from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+
+ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
+_CANCELING: Final = 3
+# Where a look takes longer, a velocity may have ended before it is read, s.
+_LOOK_S: Final = 0.1
+# For so long after a cancelled goal the robot has to stay where it is: longer than second thoughts take, s.
+_STAYS_S: Final = 1.3
+_STEP_S: Final = 0.02
+_TIMES: Final = 3
+
+
+@scenario(needs={Need.REST, Need.MOTION}, leaves=Leaves.AT_REST, stage=Stage.STANDSTILL)
+def goal_life(robot: Robot, standstill: Standstill) -> GoalLife:
+    """Do all that clients do with a goal, put another in its place, and cancel that."""
+    player = _Player(robot)
+    try:
+        player.play(standstill)
+    except Exception as error:
+        raise PartialTraceError(player.life) from error
+    return player.life
+
+
+@dataclass
+class _Player:
+    """One play of the scenario."""
+
+    robot: Robot
+    life: GoalLife = field(default_factory=GoalLife)
+
+    def play(self, standstill: Standstill) -> None:
+        """Play it."""
+        robot = self.robot
+        self._no_goal()
+        there, back = choose_goals(robot, 1.5, 2)
+        frame = robot.statement.motion.frame
+        # With all that may be left out; the second goal leaves it out.
+        first = goal_body(there, frame, ID)
+        first["header"] = {"stamp": {"sec": 12, "nanosec": 34}, "frame_id": frame}
+        first["goal_id"]["stamp"] = {"sec": 56, "nanosec": 78}
+        # A velocity from before a goal is not taken up again when the goal is cancelled.
+        robot.put_velocity(slow_turn(robot))
+        put = self._put(first, there)
+        self.life = replace(self.life, first=put)
+        if put.exchange.response.status not in NEW or (put.differs and not put.ended):
+            return
+        stamps = tuple(goal["goal_id"]["stamp"] for goal in (robot.goal()[0], robot.goal()[0]) if goal is not None)
+        self.life = replace(self.life, stamps=stamps)
+        if not self._repeat(first, there):
+            meanwhile(robot, ID, lambda body, pose, _: self._repeat(body, pose))
+        if not self._contradict(first, goal_body(back, frame, ID), there):
+            meanwhile(robot, ID, lambda body, pose, other: self._contradict(body, other, pose))
+        self._velocity_meanwhile()
+        if robot.goal()[0] is None:
+            put_goal(robot, first)  # a robot may end a goal when it takes a velocity
+        second = goal_body(back, frame)
+        second["goal"]["target_pose"]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
+        self._displace(second, back)
+        await_motion(robot)
+        if not self._cancel(back):
+            meanwhile(robot, ID, lambda _, pose, __: self._cancel(pose))
+        standstill.tried(
+            "safety/cancel-stays",
+            "rest, and no goal, after the goal was cancelled",
+            lambda: _cancel_again(robot, second),
+            seconds=_STAYS_S * robot.watchfulness,
+            goal=True,
+        )
+
+    def _no_goal(self) -> None:
+        """Read and cancel where there is no goal."""
+        for _ in range(_TIMES):
+            none = NoGoal(await_none(self.robot), self.robot.delete_goal())
+            self.life = replace(self.life, none=(*self.life.none, none))
+
+    def _put(self, body: dict[str, Any], pose: Pose) -> Put:
+        """Put a goal that is new, and wait until the robot shows it."""
+        exchange = put_goal(self.robot, body)
+        if exchange.response.status not in NEW | REPEATED:
+            return Put(exchange, body, None, exchange, "", ended=False)
+        goal, problem, read = await_goal(self.robot, body)
+        return Put(exchange, body, goal, read, problem, ended=goal is None and arrived(self.robot, pose))
+
+    def _put_beside(self, body: dict[str, Any], active: dict[str, Any]) -> tuple[Put, bool]:
+        """Put a goal under the active one's id; return that, and whether no goal is shown any more."""
+        exchange = put_goal(self.robot, body)
+        goal, read = self.robot.goal()
+        differs = read.came if goal is None else difference(goal, active)
+        return Put(exchange, body, goal, read, differs, ended=False), goal is None
+
+    def _repeat(self, body: dict[str, Any], there: Pose) -> bool:
+        """Put the active goal again; return whether it was active: it may have ended ``there`` before."""
+        for turn in range(_TIMES):
+            put, none = self._put_beside(body, body)
+            if none and arrived(self.robot, there):
+                return turn > 0
+            self.life = replace(self.life, repeated=(*self.life.repeated, put))
+        return True
+
+    def _contradict(self, body: dict[str, Any], other: dict[str, Any], there: Pose) -> bool:
+        """Put another pose under the active goal's id; return whether the goal was active: it may have ended."""
+        put, none = self._put_beside(other, body)
+        if (put.exchange.response.status != HTTPStatus.CONFLICT or none) and arrived(self.robot, there):
+            return False
+        self.life = replace(self.life, contradicted=(*self.life.contradicted, put))
+        return True
+
+    def _velocity_meanwhile(self) -> None:
+        """Command a velocity while a goal is active."""
+        robot, drive = self.robot, Drive(self.robot)
+        slow, sent = slow_turn(robot), robot.clock.now()
+        exchange = robot.put_velocity(slow)
+        if exchange.response.ok and drive.look_s < _LOOK_S:
+            drive.commanded(slow, sent, exchange)
+            drive.reach(slow, "rest-resources/velocity-goal")
+        self.life = replace(self.life, velocity=exchange, drive=drive.trace)
+
+    def _displace(self, body: dict[str, Any], pose: Pose) -> None:
+        """Put another goal, without an id, while one is active."""
+        second = self._put(body, pose)
+        renamed = None
+        if second.exchange.response.status not in NEW | REPEATED:
+            # Is it the missing id that is refused, or another goal?
+            named = put_goal(self.robot, body | {"goal_id": {"id": "another"}})
+            renamed = named.response.status in NEW | REPEATED
+        self.life = replace(self.life, second=second, renamed=renamed)
+
+    def _cancel(self, pose: Pose) -> bool:
+        """Cancel the active goal; return whether there was one: it may have ended at its ``pose``."""
+        cancelled = cancel(self.robot)
+        if cancelled.exchange.response.status == HTTPStatus.NOT_FOUND and arrived(self.robot, pose):
+            return False
+        self.life = replace(self.life, cancelled=(*self.life.cancelled, cancelled))
+        return True
+
+
+def cancel(robot: Robot) -> Cancelled:
+    """Cancel the active goal, and wait until there is none and the robot stands still."""
+    drive = Drive(robot)
+    exchange = robot.delete_goal(RATHER_XML)
+    answered = robot.clock.now()
+    if exchange.response.status == HTTPStatus.NOT_FOUND:
+        return Cancelled(exchange, exchange, gone=True, drive=drive.trace)
+    goal, read = robot.goal()
+    # 202 says that it will be done; and status.code has a word for a goal that is being cancelled.
+    accepted = exchange.response.status == HTTPStatus.ACCEPTED
+    gone = goal is None or accepted or goal.get("status", {}).get("code") == _CANCELING
+    if gone:
+        read = await_none(robot)
+        gone = read.response.status == HTTPStatus.NOT_FOUND
+    drive.reach(STILL, "safety/cancel", since=answered)
+    return Cancelled(exchange, read, gone, drive.trace)
+
+
+def _cancel_again(robot: Robot, body: dict[str, Any]) -> None:
+    """Command a velocity, put a goal in its place, cancel it, and watch what follows."""
+    robot.put_velocity(slow_turn(robot))
+    put_goal(robot, body)
+    await_motion(robot)
+    cancel(robot)
+    _judge_rest(robot)
+
+
+def _judge_rest(robot: Robot) -> None:
+    """Judge that no motion and no goal come back."""
+    drive = Drive(robot)
+    for _ in poll_for(robot.clock, 0.0, _STAYS_S * robot.watchfulness):
+        stays, seen = drive.sees(STILL, 2)
+        goal, shown = robot.goal()
+        moves = stays is False
+        robot.judge.check(
+            "safety/cancel-stays",
+            not moves and goal is None,
+            drive.trace.turns[-1].velocity_exchange if moves else shown,
+            "rest, and no goal, after the goal was cancelled",
+            found=f"velocity {seen}" if moves else "a goal is active again",
+            cause="does not stay",
+        )
+
+
+def slow_turn(robot: Robot) -> Velocity:
+    """Return a slow turn; zero where the robot cannot turn."""
+    return Velocity(angular_z=0.1 * robot.limits.angular_rad_s if robot.actuated(5) else 0.0)
+
+
+def await_motion(robot: Robot) -> None:
+    """Wait a little until the robot moves, so that there is something to cancel."""
+    for _ in poll_for(robot.clock, _STEP_S, min(1.0, robot.settle_s)):
+        velocity, _ = robot.velocity()
+        if velocity is None or not robot.near(velocity, STILL, 3):
+            return

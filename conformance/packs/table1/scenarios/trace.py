@@ -1,0 +1,23 @@
+"""What the scenarios that drive a robot record."""
+
+from dataclasses import dataclass
+
+from conformance.packs.table1.robot.drive_trace import Trace
+from conformance.packs.table1.robot.letting_go import LetGo
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A drive, and the velocities in it that were not renewed.
+
+    Attributes:
+        drive: all commands and readings.
+        let_go: for each velocity that was left to itself, every try to see how long it holds.
+        ends_s: within so long a velocity that is not renewed has to end, s.
+        not_tested: why a requirement could not be tested, by its id.
+    """
+
+    drive: Trace
+    let_go: tuple[tuple[LetGo, ...], ...] = ()
+    not_tested: tuple[tuple[str, str], ...] = ()
+    ends_s: float = 0.0

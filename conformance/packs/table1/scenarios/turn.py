@@ -1,0 +1,177 @@
+"""Turning: as fast as the robot can, renewed whatever is refused, bent into an arc, and at last left to itself."""
+
+import math
+import random
+from dataclasses import dataclass, field
+from typing import Final
+
+from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
+from conformance.packs.table1.robot.goals import make_room
+from conformance.packs.table1.robot.letting_go import LetGo, ends_by
+from conformance.packs.table1.robot.robot import FARTHEST, STILL, Robot, Velocity
+from conformance.packs.table1.robot.undisturbed import arc, renewed
+from conformance.packs.table1.robot.velocity_range import direction, fastest, reach
+from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
+from conformance.packs.table1.scenarios.trace import Driven
+from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.stage import Need
+from conformance.verdict.run import Run
+
+# Of the hold time: so long after a command it is given again, and holds from then on.
+_AGAIN: Final = 0.25
+# How often it is tried to see how long a velocity holds.
+_ATTEMPTS: Final = 3
+# The only whole number of rad/s below the limits of most robots.
+_WHOLE: Final = 1.0
+# In this time several samples come, from any robot, s.
+_SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def turn(robot: Robot, run: Run) -> Driven:
+    """Turn for about four seconds, in several ways, and let the last velocity end by itself."""
+    if not robot.actuated(5):
+        raise NotPossibleError("the statement says that the robot cannot turn on the spot")
+    make_room(robot)
+    turning = _Turning(robot, Drive(robot))
+    try:
+        turning.play()
+        for velocity in _further(robot, run):
+            turning.let_go(velocity)
+    except Exception as error:
+        raise PartialTraceError(turning.recorded) from error
+    return turning.recorded
+
+
+def _further(robot: Robot, run: Run) -> list[Velocity]:
+    """Return velocities at the ends of the range, which hold as long as others: one of them, by the seed, or both."""
+    limits = robot.limits
+    if limits.hold_s is None:
+        return []
+    told_from_rest = 4 * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
+    slow = Velocity(angular_z=min(max(0.2 * limits.angular_rad_s, told_from_rest), 0.6 * limits.angular_rad_s))
+    choices = [slow, _fast_left(robot)]
+    number = {"quick": 0, "standard": 1}.get(run.effort.name, len(choices))
+    return random.Random(f"{run.seed}/let go").sample(choices, number)  # noqa: S311 - no secret
+
+
+def _fast_left(robot: Robot) -> Velocity:
+    """Return the fastest turn to the left: also ahead, or back where there is no room, where the limits say so."""
+    ahead = 0.0
+    if robot.actuated(0) and robot.limit_declared(0) and robot.limit_declared(5):
+        ahead = direction(robot) * fastest(robot, 0)
+    return Velocity(linear_x=ahead, angular_z=fastest(robot, 5))
+
+
+@dataclass
+class _Turning:
+    """One play of the scenario."""
+
+    robot: Robot
+    drive: Drive
+    tries: list[tuple[LetGo, ...]] = field(default_factory=list)
+    not_tested: list[tuple[str, str]] = field(default_factory=list)
+
+    @property
+    def _ends_s(self) -> float:
+        return ends_by(self.robot.limits, self.robot.settle_s)
+
+    @property
+    def recorded(self) -> Driven:
+        """What was recorded so far."""
+        return Driven(self.drive.whole, tuple(self.tries), tuple(self.not_tested), self._ends_s)
+
+    def play(self) -> None:
+        """Turn left by whole numbers, as fast as the robot can, renewed, along an arc, and straight on."""
+        robot, drive, limit = self.robot, self.drive, self.robot.limits.angular_rad_s
+        drive.look()
+        left = Velocity(angular_z=_WHOLE if limit > 1.1 * _WHOLE else 0.0)
+        if drive.command(left, integers=True):
+            drive.reach(left, "rest-resources/velocity-integers", "rest-resources/velocity-converges")
+        if not left.angular_z:
+            left = Velocity(angular_z=0.6 * limit)
+            drive.command(left)
+            drive.reach(left, "rest-resources/velocity-converges")
+        fast = self._fast()
+        if fast is None:
+            drive.refresh(left)
+        if not renewed(robot, drive, fast or left):
+            reason = "responses came too late to renew a velocity within its hold time"
+            self.not_tested.append(("safety/renewal", reason))
+        bent = Velocity(angular_z=-left.angular_z)
+        if robot.actuated(0):
+            # A small circle: either part has to end. The linear part is commanded last, and ends as well.
+            bent = bent._replace(linear_x=-0.3 * robot.limits.linear_m_s)
+            arc(robot, drive, bent)
+        self.let_go(bent)
+        if robot.actuated(0):
+            self._ahead_from_rest()
+
+    def _fast(self) -> Velocity | None:
+        """Turn left, and right on the spot, both as fast as the robot can; return the latter where it is reached."""
+        right = Velocity(angular_z=-fastest(self.robot, 5))
+        return right if reach(self.drive, _fast_left(self.robot)) and reach(self.drive, right) else None
+
+    def _ahead_from_rest(self) -> None:
+        """Command a linear part after the angular one has ended by itself: that one is zero, and stays so."""
+        drive, ahead = self.drive, Velocity(linear_x=0.3 * self.robot.limits.linear_m_s)
+        if not drive.command_linear(ahead):
+            return
+        drive.reach(ahead, "rest-resources/linear-put", part=LINEAR_PART)
+        keeps, seen = drive.sees(ahead, 1.5, part=ANGULAR_PART)
+        self.robot.put_velocity(STILL)
+        expected = f"no angular part beside {ahead}: the one before it had ended"
+        drive.saw("rest-resources/linear-keeps-angular", expected, seen, "came back", holds=keeps)
+
+    def let_go(self, turning: Velocity) -> None:
+        """Renew a velocity no more, and watch how it ends.
+
+        What looks like a failure is tried again: a late response, or a busy machine, is no failure of the robot.
+        """
+        limits, tries = self.robot.limits, []
+        for _ in range(_ATTEMPTS if limits.hold_s else 1):
+            let_go = self._watch(turning)
+            if let_go is None:
+                break
+            tries.append(let_go)
+            rests = let_go.rests(limits)
+            if not rests:
+                self.robot.put_velocity(STILL)
+            if rests and let_go.early(limits) is None and let_go.late(limits) is None:
+                break
+        if tries:
+            self.tries.append(tuple(tries))
+
+    def _watch(self, turning: Velocity) -> LetGo | None:
+        """Command a velocity, and look until the robot rests, or has to; return None where it is not taken.
+
+        Where the hold time is declared the robot is not read around its end: a velocity is ended by time, not by a
+        request, and a refused one does not renew it.
+        """
+        robot, drive, clock, limits = self.robot, self.drive, self.drive.clock, self.robot.limits
+        last = drive.trace.last_full
+        if last is None or last.velocity != turning or clock.now() > drive.holds_until:
+            drive.refresh(turning)
+        if limits.hold_s is not None:
+            # So long that a robot which takes the next command for a repetition of this one ends it clearly too early.
+            drive.keep(drive.trace.full_sent + _AGAIN * limits.hold_s - clock.now())
+        if not drive.command(turning):
+            return None
+        full = drive.trace.sent
+        if turning.linear_x and limits.hold_s is not None:
+            drive.command_linear(turning)
+        answered = drive.trace.answered
+        first, resumed = len(drive.trace.turns), None
+        ends = answered + self._ends_s
+        silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
+        while True:
+            drive.look()
+            let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed)
+            if let_go.rests(limits) or drive.trace.turns[-1].at > ends:
+                return let_go
+            if resumed is None and clock.now() > silent_from:
+                robot.put_velocity(Velocity(angular_z=1e4))
+                clock.sleep(answered + let_go.longest(limits) - clock.now())
+                resumed = len(let_go.turns)
+                ends = max(ends, clock.now() + _SAMPLES_S)

@@ -1,0 +1,27 @@
+"""Velocities in any order, where the turns before have made room for them."""
+
+from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.goals import make_room
+from conformance.packs.table1.robot.robot import Robot, Velocity
+from conformance.packs.table1.robot.velocity_walk import VelocityMachine, room_for
+from conformance.packs.table1.robot.walk import Walk
+from conformance.packs.table1.scenarios.trace import Driven
+from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.stage import Need
+from conformance.verdict.effort import Effort
+from conformance.verdict.explorer import Explorer
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def velocity_walk(robot: Robot, effort: Effort, explore: Explorer) -> Driven:
+    """Command velocities in any order: the robot does the last one, and its pose follows."""
+    make_room(robot, room_for(robot.limits))
+    # Zero is not a value that can be refused, however it is signed.
+    zero = Drive(robot)
+    zero.command(Velocity(-0.0, -0.0, -0.0, -0.0, -0.0, -0.0))
+    walk = Walk(robot, 0.8 * effort.budget_s, zero.trace)
+    explore.machine(lambda: VelocityMachine(walk), cases=10, steps=effort.cases(12))
+    explore.left_out(walk.left_out)
+    if walk.unreachable:
+        raise PartialTraceError(Driven(walk.drive.whole)) from walk.unreachable
+    return Driven(walk.drive.whole)

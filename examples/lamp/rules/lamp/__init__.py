@@ -1,0 +1,1 @@
+"""The lamp's own checks."""

@@ -1,0 +1,88 @@
+"""Whether the lamp shows what it was sent."""
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from conformance.api.rest.interface import RestInterface
+from conformance.observe.clock import WALL_CLOCK
+from conformance.observe.polling import poll_for
+from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.scenarios.scenario import scenario
+from conformance.scenarios.stage import Need
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
+
+JSON = (("Content-Type", "application/json"),)
+FADES_S = 0.5
+Trace = list[tuple[float, float, Exchange]]
+
+
+def shown(exchange: Exchange) -> dict[str, float]:
+    """Return the lamp's state, or an empty object where the response shows none."""
+    try:
+        state = json.loads(exchange.response.body)
+        return {name: float(state[name]) for name in ("brightness", "target")}
+    except (ValueError, TypeError, KeyError):
+        return {}
+
+
+def put(api: RestInterface, brightness: float) -> Exchange:
+    """Send a brightness."""
+    return api.client.send("PUT", "/lamp", headers=JSON, body=json.dumps({"brightness": brightness}).encode())
+
+
+@pytest.mark.requirement("lamp/state")
+def test_state(api: RestInterface, judge: Judge) -> None:
+    """The lamp can be read."""
+    exchange = api.client.send("GET", "/lamp")
+    state = shown(exchange)
+    holds = exchange.response.status == 200 and bool(state) and all(0 <= one <= 1 for one in state.values())
+    judge.check("lamp/state", holds, exchange, "200 with a brightness and a target from 0 to 1")
+
+
+@pytest.mark.motion
+@pytest.mark.requirement("lamp/out-of-range")
+def test_out_of_range(api: RestInterface, judge: Judge) -> None:
+    """The lamp refuses what it cannot do, and stays as it is."""
+    put(api, 0.25)
+    for wrong in (1.01, -0.01, 1e308):
+        refusal, after = put(api, wrong), shown(api.client.send("GET", "/lamp"))
+        kept = after.get("target") == 0.25
+        holds = refusal.response.status == 422 and kept
+        judge.check("lamp/out-of-range", holds, refusal, f"422 for {wrong}, and the target 0.25 afterwards")
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def fading(api: RestInterface) -> Trace:
+    """Fade from 0 to 0.8, and read the lamp all the while."""
+    put(api, 0.0)
+    WALL_CLOCK.sleep(FADES_S)
+    begun, trace = WALL_CLOCK.now(), []
+    put(api, 0.8)
+    for _ in poll_for(WALL_CLOCK, 0.02, FADES_S):
+        exchange = api.client.send("GET", "/lamp")
+        trace.append((WALL_CLOCK.now() - begun, shown(exchange).get("brightness", -1.0), exchange))
+    return trace
+
+
+@rule("lamp/target", on=(fading,))
+def target(trace: Trace) -> Iterator[Outcome]:
+    """Judge the target that the lamp names."""
+    for _, _, exchange in trace:
+        yield Case(shown(exchange).get("target") == 0.8, exchange, "the target 0.8 that was sent")
+
+
+@rule("lamp/fades", on=(fading,))
+def fades(trace: Trace) -> Iterator[Outcome]:
+    """Judge the brightness at the end."""
+    at, brightness, exchange = trace[-1]
+    yield Case(abs(brightness - 0.8) < 0.01, exchange, f"0.8 after {FADES_S} s", f"{brightness:.2f} after {at:.2f} s")
+
+
+@rule("lamp/in-between", on=(fading,))
+def in_between(trace: Trace) -> Iterator[Outcome]:
+    """Judge each brightness on the way."""
+    for at, brightness, exchange in trace:
+        yield Case(0 <= brightness <= 0.8, exchange, "a brightness from 0 to 0.8", f"{brightness:.2f} after {at:.2f} s")
