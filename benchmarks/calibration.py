@@ -24,7 +24,7 @@ from conformance.packs.table1.files import CONTRACT_DIR
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import SHORT_BLOCK_S, Load, Plan
 from loadtests.statistics.between_runs import IDLE_MACHINE
-from loadtests.statistics.figures import aa_interval, comparison
+from loadtests.statistics.comparisons import aa_interval, comparison
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
 

@@ -24,6 +24,7 @@ from loadtests.settings.settings import Settings
 from loadtests.statistics import end_to_end, figures, modes, over_time, steps, threshold, verdict
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.between_runs import between_runs
+from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
 from loadtests.statistics.headline import Found, headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
@@ -51,13 +52,13 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     pacing = executor.pacing if executor else ""
     machine, spoilt = conditions(outcome.before, Moment.now())
     deviation = between_runs(machine, os.cpu_count() or 1, len(measured.plans))
-    comparisons = figures.comparisons(measured, deviation)
+    comparisons = soap_over_rest(measured, deviation)
     reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing, spoilt)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
     undecided = [] if aborted or reasons else verdict.failures(generator) + verdict.says_nothing(comparisons)
     workers, losses = process_figures(executor.members if executor else [])
     judged = [] if aborted else threshold.judge(measured, settings.thresholds)
-    controls = figures.aa_controls(measured)
+    controls = aa_controls(measured)
     compared = _against(outcome, measured, controls)
     outcomes = [entry["outcome"] for entry in judged]
     code = _code(outcome, aborted, Reasons(reasons, undecided), outcomes, compared)
@@ -87,7 +88,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "comparisons": comparisons,
         "heat_map": modes.heat_map(measured),
         "noise_floor": controls,
-        "further_interfaces": figures.further_interfaces(measured),
+        "further_interfaces": further_interfaces(measured),
         **_end_to_end(outcome),
         **({"against": compared} if compared else {}),
         "time_series": over_time.time_series(measured),
@@ -139,7 +140,7 @@ def _endings(outcome: Outcome, plan: Plan) -> list[str]:
     return found
 
 
-def _against(outcome: Outcome, measured: Measured, controls: list[figures.AaControl]) -> Against | None:
+def _against(outcome: Outcome, measured: Measured, controls: list[AaControl]) -> Against | None:
     """Return the comparison with another robot, where there is one."""
     settings = outcome.settings.against
     if settings is None:

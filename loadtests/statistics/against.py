@@ -18,7 +18,8 @@ import msgspec
 
 from conformance.commandline.exit_codes import ExitCode
 from loadtests.schedule.plan import SeriesName
-from loadtests.statistics.figures import AaControl, Ratio, compared, named, plain_quantiles, rounded_interval
+from loadtests.statistics.comparisons import AaControl, Ratio, compared
+from loadtests.statistics.figures import named, plain_quantiles, rounded_interval
 from loadtests.statistics.intervals import figure_interval_ms
 from loadtests.statistics.measured import Measured, Side
 

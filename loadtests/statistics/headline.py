@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.against import DECIDING, NOT_SLOWER, SLOWER, UNCLEAR, Against, Change
-from loadtests.statistics.figures import AaControl, Series, SoapOverRest
+from loadtests.statistics.comparisons import AaControl, SoapOverRest
+from loadtests.statistics.figures import Series
 
 _ORDER = {"delivery": 0, "pose": 1, "coffee": 2}
 _TAIL = "p99"

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import msgspec
 
 from loadtests.schedule.plan import Plan
-from loadtests.statistics.figures import Figures, SoapOverRest, plain_quantiles, rounded
+from loadtests.statistics.comparisons import SoapOverRest
+from loadtests.statistics.figures import Figures, plain_quantiles, rounded
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Cell

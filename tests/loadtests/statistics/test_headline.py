@@ -6,7 +6,8 @@ import pytest
 
 from loadtests.schedule.plan import Load, Plan
 from loadtests.statistics.against import Against, Change
-from loadtests.statistics.figures import Series, SoapOverRest
+from loadtests.statistics.comparisons import SoapOverRest
+from loadtests.statistics.figures import Series
 from loadtests.statistics.headline import Found, headline
 
 PLAN = Plan(("delivery",), ("rest", "soap"), ("wire",), Load(200.0, None, 20.0, 2.0, "constant", 1), 10.0, 1, 32)
