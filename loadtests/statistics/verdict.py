@@ -165,4 +165,4 @@ def says_nothing(comparisons: Sequence[SoapOverRest]) -> list[str]:
     if not medians or any(entry.judgement != "none" for entry in medians):
         return []
     reasons = dict.fromkeys(str(entry.judgement_reason) for entry in medians)
-    return [f"the duel of SOAP and REST is inconclusive: {'; '.join(reasons)}"]
+    return [f"SOAP and REST cannot be compared: {'; '.join(reasons)}"]
