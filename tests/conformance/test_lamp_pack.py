@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from conformance.contract.freeze import freeze
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME
 from roaas import main
 
@@ -45,15 +47,17 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lamps")
     keys = folder / "keys"
     roaas("keygen", keys)
+    pack = shutil.copytree(LAMP, folder / "pack")
+    freeze("1.0", pack)
     done = {}
     for name, fault in (("good", None), ("broken", _BROKEN)):
         out = folder / name
         out.mkdir()
         with lamp(out, fault) as url:
-            options = ["--contract", LAMP, "--rest", url, "--allow-motion", "--effort", "quick", "--out", out]
+            options = ["--contract", pack, "--rest", url, "--allow-motion", "--effort", "quick", "--out", out]
             done[name] = roaas("certify", *options, "--sign", keys / PRIVATE_NAME)
             if fault:
-                done["replay"] = roaas("replay", out, "lamp/target", "--allow-motion", "--contract", LAMP)
+                done["replay"] = roaas("replay", out, "lamp/target", "--allow-motion", "--contract", pack)
     return folder, done
 
 
@@ -89,10 +93,17 @@ def test_pages_and_ci_formats_are_written(results):
 def test_a_signed_certificate_is_verified_and_registered(results):
     folder, _ = results
     key = folder / "keys" / PUBLIC_NAME
-    done = roaas("verify", folder / "good" / "certificate.intoto.json", "--key", key, "--result", folder / "good")
-    assert "lamp" in done.output.lower(), done.output
-    site = roaas("registry", "--help")
-    assert site.exit_code == 0
+    policy = folder / "policy.toml"
+    policy.write_text('efforts = ["quick"]\nrequirement_sets = ["1.0"]\n', encoding="utf-8")
+    options = ["--policy", policy, "--contract", folder / "pack"]
+    envelope = folder / "good" / "certificate.intoto.json"
+    done = roaas("verify", envelope, "--key", key, "--result", folder / "good", *options)
+    assert done.exit_code == 0, done.output
+    keys = folder / "trusted"
+    keys.mkdir()
+    (keys / PUBLIC_NAME).write_bytes(key.read_bytes())
+    site = roaas("registry", "build", envelope, "--keys", keys, "--out", folder / "site", *options)
+    assert (site.exit_code, (folder / "site" / "index.html").exists()) == (0, True), site.output
 
 
 def test_recorded_traces_are_judged_again_without_the_device(results):
