@@ -151,8 +151,9 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
             if time.monotonic() > until:
                 break
             moves |= exchange.request.method not in SAFE_METHODS
+            cases = run.judge.cases(finding.requirement)
             came_back = sum(_fails_again(run, finding, exchange, connection) for _ in range(_TIMES))
-            finding.again = Again(came_back, _TIMES)
+            finding.again = Again(came_back, _TIMES, judged=run.judge.cases(finding.requirement) > cases)
     finally:
         if moves and rest is not None:
             rest.device.leave_at_rest(rest)

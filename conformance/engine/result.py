@@ -152,7 +152,7 @@ def _failure(finding: Finding) -> dict[str, Any]:
         "seen": finding.seen,
         "request": _request(finding.exchange) if finding.exchange else None,
         "response": _response(finding.exchange) if finding.exchange else None,
-        **({"again": finding.again._asdict()} if finding.again else {}),
+        **({"again": {"came_back": finding.again.came_back, "sent": finding.again.sent}} if finding.again else {}),
         "sequence": written(finding.sequence),
     }
 

@@ -39,10 +39,17 @@ class Sent(NamedTuple):
 
 
 class Again(NamedTuple):
-    """How often a failure came back when its request was sent again."""
+    """How often a failure came back when its request was sent again.
+
+    Attributes:
+        came_back: how often the response failed, or was of the same kind.
+        sent: how often the request was sent.
+        judged: whether an observer judged each response; else only their kind was compared.
+    """
 
     came_back: int
     sent: int
+    judged: bool = True
 
 
 @dataclass
@@ -97,11 +104,11 @@ class Finding:
         if self.seen > 1:
             parts.append(f"Seen {self.seen} times.")
         if self.again is not None:
-            came_back, sent = self.again
-            if came_back == sent:
-                parts.append(f"Sent again, it failed {sent} of {sent} times.")
-            else:
-                parts.append(f"Intermittent: sent again, it failed {came_back} of {sent} times.")
+            came_back, sent, judged = self.again
+            what = "it failed" if judged else "it had the same kind of response"
+            parts.append(
+                f"{'Sent' if came_back == sent else 'Intermittent: sent'} again, {what} {came_back} of {sent} times."
+            )
         return " ".join(parts)
 
     @property

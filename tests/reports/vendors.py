@@ -9,7 +9,7 @@ class Door:
     """The front door of an installation with this suite."""
 
     @staticmethod
-    def known() -> dict[str, Any]:
+    def known(_pack=None) -> dict[str, Any]:
         """Return what the suite knows."""
         return {"suite": SUITE, "requirement_sets": {"1.1": SET}, "profiles": {"full": ("http", "safety")}}
 

@@ -78,7 +78,7 @@ def test_a_key_that_cannot_sign_is_told_before_the_run(tmp_path, closed_port):
     generate(tmp_path / "keys")
     done, result = _certify(tmp_path, "--rest", closed_port, "--sign", str(tmp_path / "keys" / PUBLIC_NAME))
     assert done.returncode == 2
-    assert "no private key" in done.stderr
+    assert "not a private key" in done.stderr
     assert result is None
 
 

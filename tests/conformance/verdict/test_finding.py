@@ -53,6 +53,8 @@ def test_how_often_a_failure_was_seen_and_came_back_is_in_the_text():
     assert finding.text.endswith("Sent again, it failed 5 of 5 times.")
     finding.again = Again(1, 5)
     assert finding.text.endswith("Intermittent: sent again, it failed 1 of 5 times.")
+    finding.again = Again(5, 5, judged=False)
+    assert finding.text.endswith("Sent again, it had the same kind of response 5 of 5 times.")
 
 
 def test_what_is_special_in_a_request_is_shown():
