@@ -78,7 +78,7 @@ class Expectation:
     def header(self, name: str) -> bool:
         """Judge that the response has a header field."""
         there = isinstance(self.attempt, Exchange) and self.attempt.response.header(name) is not None
-        return self.that(there, f"a {name} header field", f"no {name} header field")
+        return self.that(there, f"the header field {name}", f"no header field {name}")
 
 
 def expect(judge: Judge, requirement: str, attempt: Attempt | None) -> Expectation:

@@ -118,5 +118,5 @@ def _judge_negotiation(api: RestInterface, exchange: Exchange, answer: Response,
     if len(operation.formats) > 1 and not context.is_head:
         vary = (answer.header("vary") or "").lower()
         names_accept = "*" in vary or "accept" in [name.strip() for name in vary.split(",")]
-        found = f"Vary: {answer.header('vary')}" if vary else "no Vary header field"
+        found = f"Vary: {answer.header('vary')}" if vary else "no header field Vary"
         expect(api.run.judge, "rest-formats/vary", exchange).that(names_accept, "Vary: Accept", found)

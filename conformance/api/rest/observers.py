@@ -58,7 +58,7 @@ class Observer(Listener):
             expect(api.run.judge, "rest-formats/charset", exchange).that(not wrong, expected, wrong)
         if answer.status >= HTTPStatus.BAD_REQUEST:
             inside = inside_shown(answer.body)
-            expected, found = "an error that shows nothing of the program", f"a response that shows {inside!r}"
+            expected, found = "an error that shows nothing of the program", f"{inside!r} in the response"
             expect(api.run.judge, "http/no-traceback", exchange).that(not inside, expected, found, cause="traceback")
             problem.judge(api, exchange, answer, context)
         if context.operation is not None:
@@ -94,7 +94,7 @@ class Observer(Listener):
         # RFC 9110 6.6.1 leaves 5xx free.
         if answer.status < HTTPStatus.INTERNAL_SERVER_ERROR and context.request.raw is None:
             date = answer.header("date")
-            found = "no Date header field" if date is None else f"Date: {date}"
+            found = "no header field Date" if date is None else f"Date: {date}"
             expect(judge, "http/date", exchange).that(_is_date(date), "Date with the time of the response", found)
 
     def _judge_json(self, exchange: Exchange, answer: Response) -> None:

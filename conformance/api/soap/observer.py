@@ -78,7 +78,7 @@ class SoapObserver(Listener):
         rules.judge("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, "HTTP/1.1 or HTTP/1.0")
         inside = inside_shown(response.body)
         expected = "a response that shows nothing of the program"
-        rules.judge("fault-no-traceback", not inside, expected, lambda: f"a response that shows {inside!r}")
+        rules.judge("fault-no-traceback", not inside, expected, lambda: f"{inside!r} in the response")
         if response.body:
             _judge_document(rules, response, self._endpoints[request.url])
 
@@ -105,7 +105,6 @@ class _Rules:
 def _judge_document(rules: _Rules, response: Response, answers: Collection[str]) -> None:
     is_text_xml = response.media_type == "text/xml"
     encoding = _encoding(response)
-    came = rules.exchange.came
     try:
         root = parse(response.body, doctype=True)
     except NotXmlError as error:
@@ -113,15 +112,11 @@ def _judge_document(rules: _Rules, response: Response, answers: Collection[str])
         if is_text_xml:
             rules.judge("R1012", encoding in _ENCODINGS, _UTF, lambda: f"the encoding {encoding!r}")
         is_other = not (response.ok or is_text_xml)
-        rules.judge(
-            "content-type", is_other, "a SOAP message as text/xml", lambda: f"{came} with a body that is {problem}"
-        )
+        rules.judge("content-type", is_other, "a SOAP message as text/xml", lambda: f"a body that is {problem}")
         return
     if local(str(root.tag)) != "Envelope":
         # An HTML page or a problem document with 4xx is no SOAP response, and none is required there.
-        rules.judge(
-            "content-type", not response.ok, "a SOAP message", lambda: f"{came} with the root element {root.tag}"
-        )
+        rules.judge("content-type", not response.ok, "a SOAP message", lambda: f"the root element {root.tag}")
         return
     _judge_message(rules, response, root, answers, encoding)
 

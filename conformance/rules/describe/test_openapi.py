@@ -29,7 +29,7 @@ def _document(rest: HttpClient) -> tuple[Any, Exchange, str]:
     if answer.status != 200:
         return None, exchange, exchange.came
     if "json" not in answer.media_type:
-        return None, exchange, f"Content-Type: {answer.media_type or '(none)'}"
+        return None, exchange, "another media type than JSON"
     value, fault = _read(answer.body)
     return value, exchange, fault
 

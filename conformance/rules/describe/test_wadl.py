@@ -38,7 +38,7 @@ def _read(rest: HttpClient) -> tuple[list[Described], Exchange, str]:
     if answer.status != 200:
         return [], exchange, exchange.came
     if answer.media_type not in _MEDIA_TYPES:
-        return [], exchange, f"Content-Type: {answer.media_type or '(none)'}"
+        return [], exchange, "another media type than that of WADL or XML"
     try:
         return described_by_wadl(answer.body, rest.base_url), exchange, ""
     except UnreadableError as error:

@@ -66,7 +66,7 @@ def _served(service: SoapService) -> _Served:
     if answer.status != 200:
         return _Served(exchange, None, exchange.came)
     if "xml" not in answer.media_type:
-        return _Served(exchange, None, f"{exchange.came} instead of XML")
+        return _Served(exchange, None, "a document that is not XML")
     try:
         description = describe(answer.body, source, service.fetch)
     except DescriptionError as error:

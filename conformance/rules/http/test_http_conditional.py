@@ -48,6 +48,6 @@ def test_a_part(api: RestInterface, judge: Judge) -> None:
         several = answer.media_type == "multipart/byteranges"
         expect(judge, _RANGE, exchange).that(
             answer.status != _PARTIAL or fits or several,
-            "another status than 206, or a Content-Range header field that fits the content",
+            "another status than 206, or the header field Content-Range that fits the content",
             f"status 206 with {len(answer.body)} octets and Content-Range: {answer.header('content-range')}",
         )

@@ -69,7 +69,7 @@ def test_header_fields_and_media_types(judge):
     assert expect(judge, _ID, exchange).header("allow")
     assert expect(judge, _ID, exchange).media_type("application/json", "text/plain")
     assert not expect(judge, _ID, exchange).header("Date")
-    assert "no Date header field" in _finding(judge).observed
+    assert "no header field Date" in _finding(judge).observed
 
 
 def test_a_finding_on_soap_describes_the_message(judge):
