@@ -42,7 +42,7 @@ _SUMMARIES = {
     "sign": "Sign a result, so that others can check who vouches for it.",
     "verify": "Check a signed certificate, and whether it meets your policy.",
     "registry": "Make a static site from signed certificates: which robot passed which classes.",
-    "selftest": "Show that the suite catches faulty robots and blames no good one.",
+    "selftest": "Test the suite: it must kill mutants, and must not fail a good device.",
     "contract": "Show the requirements, export the contract's files.",
 }
 _EXTRAS = {"robot": "robot", "load": "load"}

@@ -15,7 +15,8 @@ from conformance.contract.ledger import Requirement
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 
-_CONTRACT = click.option(
+#: ``--contract``, as the parameter ``pack``.
+contract_option = click.option(
     "--contract",
     "pack",
     metavar="PACK",
@@ -25,7 +26,7 @@ _CONTRACT = click.option(
 )
 
 
-def _loaded(pack: str) -> Contract:
+def loaded(pack: str) -> Contract:
     """Return a pack.
 
     Raises:
@@ -43,13 +44,13 @@ def contract() -> None:
 
 
 @contract.command(name="list")
-@_CONTRACT
+@contract_option
 @click.option("--class", "class_", metavar="NAME", help="Only those of one conformance class.")
 @click.option("--level", type=click.Choice([str(level) for level in Level]), help="Only those of one level.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, for other programs.")
 def list_(pack: str, class_: str | None, level: str | None, *, as_json: bool) -> None:
     """List the requirements: id, level, text, source and origin."""
-    contract = _loaded(pack)
+    contract = loaded(pack)
     if class_ not in {None, *contract.classes}:
         raise click.UsageError(f"--class {class_!r}: {contract.name} has {', '.join(contract.classes)}")
     found = [item for item in contract.ledger.values() if class_ in {None, item.class_} and level in {None, item.level}]
@@ -69,11 +70,11 @@ def _as_json(requirement: Requirement) -> dict[str, Any]:
 
 @contract.command()
 @click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
-@_CONTRACT
+@contract_option
 @click.option("--force", is_flag=True, help="Overwrite files that are there.")
 def export(directory: Path, pack: str, *, force: bool) -> None:
     """Write the contract's files to DIR: its text, OpenAPI, WSDLs and XSDs, WADL and the ledger."""
-    contract = _loaded(pack)
+    contract = loaded(pack)
     there = [path.name for path in contract.files if (directory / path.name).exists()]
     if there and not force:
         raise click.UsageError(f"{directory / there[0]} exists already; --force overwrites it")
@@ -87,22 +88,27 @@ def export(directory: Path, pack: str, *, force: bool) -> None:
 
 
 @contract.command()
+@contract_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the page there.  [default: stdout]")
-def coverage(out: Path | None) -> None:
-    """Show which check and which faulty robot bind each requirement.
+def coverage(pack: str, out: Path | None) -> None:
+    """Show which checks and which mutants bind each requirement.
 
-    Exit code 1 when ledger, checks and faults disagree.
+    Exit code 1 when ledger, checks and mutants disagree.
     """
+    contract = loaded(pack)
     # Imported here: it imports every check, and with them Schemathesis.
     from conformance.selftest.coverage import disagreements, page  # noqa: PLC0415
 
+    try:
+        text, problems = page(contract), disagreements(contract)
+    except ContractError as error:
+        raise click.UsageError(str(error)) from error
     if out is None:
-        click.echo(page(), nl=False)
+        click.echo(text, nl=False)
     else:
         out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(page(), encoding="utf-8")
+        out.write_text(text, encoding="utf-8")
         click.echo(f"wrote {out}")
-    problems = disagreements()
     for problem in problems:
         click.echo(problem, err=True)
     sys.exit(ExitCode.FAILED if problems else ExitCode.PASSED)

@@ -1,4 +1,4 @@
-"""``roaas selftest``: shows that the suite catches faulty robots (mutants) and blames no good one."""
+"""``roaas selftest``: shows that the suite kills mutants (faulty devices) and has no false positives on good ones."""
 
 from __future__ import annotations
 
@@ -10,65 +10,54 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from conformance.cli.contract import contract_option, loaded
 from conformance.commandline.exit_codes import ExitCode
+from conformance.contract.locating import ContractError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from conformance.contract.pack import Contract
     from conformance.mutation.mutant import Mutant
+    from conformance.mutation.self_test import GoodDevice, SelfTest
     from conformance.selftest.comparison import SchemathesisResult
-    from conformance.selftest.controls import Case, ControlResult
+    from conformance.selftest.controls import ControlResult
     from conformance.selftest.mutant_run import MutantResult
     from conformance.selftest.report import Report
 
-# A dozen and some different ones, for a check in less than a minute; the longest first.
-_SHORT = (
-    "safety-unactuated-ignored",
-    "pose-without-child-frame",
-    "sensors-twice",
-    "plan-jumps",
-    "format-no-vary",
-    "http-405-without-allow",
-    "http-nan",
-    "delivery-text-is-zero",
-    "soap-response-namespace",
-    "bp-fault-200",
-    "input-last-wins",
-    "input-soap-missing-is-zero",
-    "same-pose",
-    "wsdl-float",
-    "openapi-without-path",
-)
+# How many mutants `--short` judges where the pack does not name them.
+_SHORT = 15
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@contract_option
 @click.option(
-    "--faults", "patterns", multiple=True, metavar="PATTERN", help="Only faults whose names match (repeatable)."
+    "--faults", "patterns", multiple=True, metavar="PATTERN", help="Only mutants whose names match (repeatable)."
 )
 @click.option(
     "--target",
-    type=click.Choice(["reference", "plain", "baroque"]),
-    default="reference",
-    show_default=True,
-    help="The good robot behind the faults; independent robots need no ROS.",
+    metavar="NAME",
+    default="",
+    help="The good device behind the mutants, by its name in the pack.  [default: the pack's first; with --generated, "
+    "the one that starts fastest]",
 )
-@click.option("--seeds", type=click.IntRange(min=0), default=20, show_default=True, help="Seeds for each good robot.")
-@click.option("--short", is_flag=True, help="A dozen faults and one seed, in less than a minute.")
-@click.option("--controls-only", is_flag=True, help="Only the good robots, and no faults.")
+@click.option("--seeds", type=click.IntRange(min=0), default=20, show_default=True, help="Seeds for each good device.")
+@click.option("--short", is_flag=True, help="A dozen mutants and one seed, in less than a minute.")
+@click.option("--controls-only", is_flag=True, help="Only the good devices (A/A controls), and no mutants.")
 @click.option(
     "--effort",
     type=click.Choice(["quick", "standard"]),
     default="quick",
     show_default=True,
-    help="Of the first run of each; a fault that is missed is tried again at standard.",
+    help="Of the first run of each; a mutant that survives is judged again at standard.",
 )
 @click.option(
-    "--compare/--no-compare", default=True, help="Run the plain Schemathesis command line against the REST faults too."
+    "--compare/--no-compare", default=True, help="Run the plain Schemathesis command line against REST mutants too."
 )
 @click.option(
     "--variants/--no-variants",
     default=True,
-    help="Try good robots behind TLS, a prefix, a token and the like, behind nginx and on other web servers.",
+    help="Judge good devices behind TLS, a prefix, a token and the like, and behind and on web servers.",
 )
 @click.option("--parallel", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at once.")
 @click.option(
@@ -78,10 +67,10 @@ _SHORT = (
     "--generated",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Judge N faults made by rule, in place of those that people thought of; the target is then baroque.",
+    help="Judge N mutants made by rule from the pack's descriptions, in place of those made by hand.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the sample of faults by rule.")
-@click.option("--list", "listed", is_flag=True, help="List the faults, and run nothing.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the sample of mutants by rule.")
+@click.option("--list", "listed", is_flag=True, help="List the mutants, and run nothing.")
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
@@ -91,58 +80,92 @@ _SHORT = (
 )
 @click.pass_context
 def selftest(context: click.Context, /, **options: Any) -> None:
-    """Show that the suite catches faulty robots and blames no good one.
+    """Show that the suite kills mutants (faulty devices) and has no false positives on good ones.
 
-    Each faulty robot is a good one behind a proxy with one named change. Exit code: 0 all caught and nobody blamed;
-    1 otherwise; 2 usage; 3 a robot does not start; 130 interrupted.
+    Each mutant is a good device behind a proxy with one named change. Exit code: 0 all killed and no false positive;
+    1 otherwise; 2 usage; 3 a device does not start; 130 interrupted.
     """
+    contract = loaded(options["pack"])
+    try:
+        if options["generated"]:
+            _by_rule(context, contract, options)
+        else:
+            _by_hand(contract, options)
+    except ContractError as error:
+        raise click.UsageError(str(error)) from error
+
+
+def _by_hand(contract: Contract, options: dict[str, Any]) -> None:
+    """Mutants made by hand, and the A/A controls."""
     # lxml and the like cost what --help need not pay.
-    from conformance.packs.table1.mutants import MUTANTS  # noqa: PLC0415
+    from conformance.mutation.self_test import self_test_of  # noqa: PLC0415
     from conformance.selftest.report import Report  # noqa: PLC0415
 
-    if options["generated"]:
-        _generated(context, options)
-        return
     if options["short"]:
         options.update(seeds=min(options["seeds"], 1), compare=False, variants=False)
-    patterns = options["patterns"] or (_SHORT if options["short"] else ("*",))
-    chosen = [mutant for mutant in MUTANTS if any(fnmatch.fnmatch(mutant.name, pattern) for pattern in patterns)]
-    if options["short"] and not options["patterns"]:
-        # The longest first, so that it does not keep the others waiting in the end.
-        chosen.sort(key=lambda mutant: _SHORT.index(mutant.name))
-    if not chosen:
-        raise click.UsageError(f"no fault has a name like {', '.join(patterns)}; --list shows them")
-    if options["controls_only"]:
-        chosen = []
+    chosen = _chosen(self_test_of(contract), options)
     if options["listed"]:
         for mutant in chosen:
             click.echo(f"{mutant.name:34} {mutant.says} [{', '.join(mutant.catches)}]")
         return
-    report = Report(options["target"])
+    report = Report(contract, _target(contract, options["target"]).name)
     _finish(report, lambda: _run(report, chosen, options), options)
 
 
-def _generated(context: click.Context, options: dict[str, Any]) -> None:
-    """Faults by rule: a robot that starts in a moment, and Schemathesis only where it is asked for."""
-    from conformance.cli.selftest_generated import chosen_mutants, run_generated  # noqa: PLC0415 - see selftest()
-    from conformance.selftest.report import Report  # noqa: PLC0415 - see selftest()
+def _target(contract: Contract, name: str) -> GoodDevice:
+    """Return the good device of a name; the pack's first, where it is empty.
 
-    chosen = chosen_mutants(options)
+    Raises:
+        click.UsageError: the pack has none of that name, or none at all.
+    """
+    from conformance.selftest.robots import RobotError, target_of  # noqa: PLC0415 - see _by_hand()
+
+    try:
+        return target_of(contract, name)
+    except RobotError as error:
+        raise click.UsageError(str(error)) from error
+
+
+def _chosen(needs: SelfTest, options: dict[str, Any]) -> list[Mutant]:
+    """Return the mutants that the options ask for; none, where the pack has none.
+
+    Raises:
+        click.UsageError: no mutant has such a name.
+    """
+    if options["controls_only"] or not (needs.mutants or options["patterns"]):
+        return []
+    short = needs.short or tuple(mutant.name for mutant in needs.mutants[:_SHORT])
+    patterns = options["patterns"] or (short if options["short"] else ("*",))
+    found = [mutant for mutant in needs.mutants if any(fnmatch.fnmatch(mutant.name, one) for one in patterns)]
+    if not found:
+        raise click.UsageError(f"no mutant has a name like {', '.join(patterns)}; --list shows them")
+    if options["short"] and not options["patterns"]:
+        # The slowest first: the others need not wait for it in the end.
+        found.sort(key=lambda mutant: short.index(mutant.name))
+    return found
+
+
+def _by_rule(context: click.Context, contract: Contract, options: dict[str, Any]) -> None:
+    """Mutants by rule: before a device that starts in a moment, and Schemathesis only where it is asked for."""
+    from conformance.cli.selftest_generated import chosen_mutants, run_generated  # noqa: PLC0415 - see _by_hand()
+    from conformance.mutation.self_test import self_test_of  # noqa: PLC0415 - see _by_hand()
+    from conformance.selftest.report import Report  # noqa: PLC0415 - see _by_hand()
+
+    chosen = chosen_mutants(contract, options)
     if options["listed"]:
         for mutant in chosen:
             click.echo(f"{mutant.name} {mutant.says}")
         return
     given = {name for name in options if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE}
-    if "target" not in given:
-        options["target"] = "baroque"
     compared = options["compare"] and "compare" in given
-    report = Report(options["target"], seed=options["seed"])
+    target = _target(contract, options["target"] or self_test_of(contract).quick)
+    report = Report(contract, target.name, seed=options["seed"])
     _finish(report, lambda: run_generated(report, chosen, options, compared=compared), options)
 
 
 def _finish(report: Report, run: Callable[[], None], options: dict[str, Any]) -> None:
     """Run, write the results, also those of a run that was interrupted, and end with the exit code."""
-    from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see _by_hand()
 
     started, interrupted = time.monotonic(), False
     try:
@@ -161,11 +184,12 @@ def _finish(report: Report, run: Callable[[], None], options: dict[str, Any]) ->
 
 
 def _run(report: Report, chosen: list[Mutant], options: dict[str, Any]) -> None:
-    from conformance.selftest.mutant_run import RobotPool, run_mutants, run_unchanged  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.mutant_run import RobotPool, run_mutants, run_unchanged  # noqa: PLC0415 - see _by_hand()
 
     progress = _Progress(report, len(chosen))
     if chosen:
-        with RobotPool(options["target"], options["parallel"], options["domain_id"]) as pool:
+        target = _target(report.contract, report.target)
+        with RobotPool(report.contract, target, options["parallel"], options["domain_id"]) as pool:
             already: frozenset[str] = frozenset()
             if not options["short"]:
                 already = frozenset(run_unchanged(pool, options["effort"]).caught())
@@ -179,7 +203,7 @@ def _run(report: Report, chosen: list[Mutant], options: dict[str, Any]) -> None:
 
 
 def _compare(report: Report, pool: Any, chosen: list[Mutant], progress: _Progress) -> None:
-    from conformance.selftest import comparison  # noqa: PLC0415 - see selftest()
+    from conformance.selftest import comparison  # noqa: PLC0415 - see _by_hand()
 
     if comparison.command() is None:
         report.notes.append("Schemathesis' command line is not installed, so that nothing was compared with it.")
@@ -188,32 +212,19 @@ def _compare(report: Report, pool: Any, chosen: list[Mutant], progress: _Progres
     report.good = tuple(sorted(f"{operation} {code}" for operation, code in good))
     report.notes.append(
         f"Schemathesis ran with --max-examples {comparison.EXAMPLES}, phases examples, coverage, fuzzing, and at most "
-        f"{comparison.LIMIT_S:g} s for each fault; findings that it has of the good robot as well do not count."
+        f"{comparison.LIMIT_S:g} s for each mutant; findings that it has of the good device as well do not count."
     )
 
 
 def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) -> None:
-    from conformance.selftest import robots  # noqa: PLC0415 - see selftest()
-    from conformance.selftest.controls import Case, run_controls  # noqa: PLC0415 - see selftest()
-    from conformance.selftest.servers.fronts import FRONTS  # noqa: PLC0415 - see selftest()
-    from conformance.selftest.variants import VARIANTS  # noqa: PLC0415 - see selftest()
+    from conformance.selftest.controls import controls_of, run_controls  # noqa: PLC0415 - see _by_hand()
 
-    kinds = list(robots.INDEPENDENT_ROBOTS)
-    try:
-        robots.check_available(robots.REFERENCE)
-        kinds += (robots.REFERENCE,) if options["short"] else robots.ON_ROS
-    except robots.RobotError as error:
-        report.notes.append(f"Not among the good robots: {error}")
-    cases: list[Case] = []
-    if options["variants"]:
-        # The slow one first, so that it does not keep all others waiting in the end.
-        cases += [Case(variant.robot, variant, 0) for variant in VARIANTS]
-        cases += [Case(front.robot, front, 0) for front in FRONTS if front.robot in kinds]
-        cases += [Case(kind, None, 0) for kind in robots.ON_SERVERS]
-    cases += [Case(kind, None, seed) for seed in range(options["seeds"]) for kind in kinds]
-    progress.total = len(cases)
+    controls = controls_of(report.contract, options["seeds"], short=options["short"], variants=options["variants"])
+    report.notes += [f"Not among the good devices: {why}" for why in controls.missing]
+    progress.total = len(controls.cases)
     report.control_results = run_controls(
-        cases,
+        report.contract,
+        controls.cases,
         effort=options["effort"],
         parallel=options["parallel"],
         domain_id=options["domain_id"],
@@ -222,7 +233,7 @@ def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) 
 
 
 class _Progress:
-    """Tells of progress on stderr, and keeps each result in case that no more come."""
+    """Reports progress on stderr, and keeps each result in case that the run is interrupted."""
 
     def __init__(self, report: Report, total: int) -> None:
         self.total = total
@@ -232,28 +243,30 @@ class _Progress:
         self._controls = 0
 
     def mutant(self, result: MutantResult) -> None:
-        """A mutant has been tried."""
+        """Report a mutant that has been tried."""
         self._report.mutant_results.append(result)
         self._done += 1
         said = result.not_tried or (
-            f"MISSED by {', '.join(result.missed)}" if result.missed else f"caught by {_few(result)}"
+            f"SURVIVED {', '.join(result.missed)}" if result.missed else f"killed by {_few(result)}"
         )
         click.echo(f"[{self._done}/{self.total}] {result.mutant.name}: {said} ({result.seconds:.1f} s)", err=True)
 
     def compared(self, result: SchemathesisResult) -> None:
-        """Schemathesis has tried a mutant."""
+        """Report a mutant that Schemathesis has tried."""
         self._report.compared.append(result)
         self._compared += 1
-        said = f"caught: {result.findings[0]}" if result.caught else "not caught"
+        said = f"killed: {result.findings[0]}" if result.killed else "survived"
         click.echo(f"[{self._compared}] Schemathesis, {result.mutant}: {said}", err=True)
 
     def control(self, result: ControlResult) -> None:
-        """A good robot has been judged."""
+        """Report a good device that has been judged."""
         self._report.control_results.append(result)
         self._controls += 1
         name = f"{result.robot} {result.variant}".strip()
         said = result.not_tried or (
-            "conformant" if result.conformant else f"BLAMED: {result.blamed or result.unjudged or 'given up'}"
+            "conformant"
+            if result.conformant
+            else f"FALSE POSITIVE: {result.false_positives or result.unjudged or 'given up'}"
         )
         click.echo(f"[{self._controls}/{self.total}] {name}, seed {result.seed}: {said}"[:400], err=True)
 

@@ -33,7 +33,6 @@ def pytest_options() -> list[str]:
 
 def collected(robot: RobotUnderTest, plugin: ChecksPlugin | None = None) -> list[pytest.Item]:
     """Return the checks of a run on a robot, which need not be connected, in the order of their turns."""
-    plugin = plugin or ChecksPlugin(lambda: robot, lambda: robot.run.contract)
     seen: list[pytest.Item] = []
 
     class _Collected:
@@ -43,12 +42,17 @@ def collected(robot: RobotUnderTest, plugin: ChecksPlugin | None = None) -> list
             """Take them down."""
             seen.extend(item for item in session.items if is_check(item))
 
+    collect(robot, plugin or ChecksPlugin(lambda: robot, lambda: robot.run.contract), _Collected())
+    return seen
+
+
+def collect(robot: RobotUnderTest, *plugins: object) -> None:
+    """Have pytest collect the checks of a run on a robot, as the run does, with plugins that look on."""
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
         environment.delenv("PYTEST_ADDOPTS", raising=False)
         folders = map(str, robot.run.contract.rules)
-        pytest.main([*folders, *pytest_options(), "--collect-only"], plugins=[plugin, _Collected()])
-    return seen
+        pytest.main([*folders, *pytest_options(), "--collect-only"], plugins=list(plugins))
 
 
 def plan_of(robot: RobotUnderTest) -> list[str]:

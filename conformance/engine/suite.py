@@ -12,8 +12,6 @@ from conformance.contract.requirement_sets import load_set, names
 
 _PACKAGE = Path(__file__).parents[1]
 # The rooms that decide what is asked and what is said of it.
-# The folders of a pack that only its self-test uses.
-_SELFTEST = {"mutants", "faulty_bodies", "independent_robots"}
 JUDGING = (
     "contract",
     "statement",
@@ -26,6 +24,8 @@ JUDGING = (
     "rules",
     "engine",
 )
+# What of a pack only its self-test uses: folders, and the module that names them.
+_SELFTEST = {"mutants", "faulty_bodies", "independent_robots", "selftest.py"}
 
 
 def installed(name: str) -> str:

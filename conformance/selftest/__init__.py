@@ -1,1 +1,1 @@
-"""Proof of the suite's quality: it catches mutants (faulty robots) and blames no conforming one."""
+"""The self-test shows that the suite kills mutants (faulty devices) and has no false positives on good devices."""

@@ -7,7 +7,7 @@ import os
 import signal
 import tempfile
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection as Pipe
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,8 @@ from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.packs.table1.statement import load_robot_statement
+from conformance.selftest.robots import Robot
+from conformance.statement.statement import Statement, empty_statement, load_statement
 from conformance.transport.exchange import Attempt
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -26,6 +27,8 @@ from conformance.verdict.run import Run
 
 # What every run imports: loaded once, and inherited by the processes that are forked from there.
 _PRELOADED = ["conformance.selftest.preloaded"]
+#: Names the folder of the pack that is loaded there as well.
+PACK_VARIABLE = "ROAAS_SELFTEST_PACK"
 
 
 @dataclass(frozen=True)
@@ -33,8 +36,9 @@ class Job:
     """What is judged, and how.
 
     Attributes:
-        statement: file of the robot's statement.
-        rest: REST's base URL; publishers and subscribers: their WSDLs.
+        pack: folder of the contract pack.
+        statement: file of the robot's statement; None: nothing is declared.
+        rest: REST's base URL; publishers and subscribers: their WSDLs; each may be empty.
         classes: classes to claim, in place of the statement's; empty: those of the statement.
         requirements: ids to judge, so that only their checks run; empty: all of the classes.
         effort: quick, standard or deep.
@@ -47,10 +51,11 @@ class Job:
         out: folder in which result.json is kept, or None.
     """
 
-    statement: Path
+    pack: Path
+    statement: Path | None
     rest: str
-    publishers: str
-    subscribers: str
+    publishers: str = ""
+    subscribers: str = ""
     classes: tuple[str, ...] = ()
     requirements: tuple[str, ...] = ()
     effort: str = "quick"
@@ -93,14 +98,20 @@ class Outcome:
         return tuple(id_ for id_, verdict in self.verdicts.items() if verdict in {"fail", "warn"} or id_ in self.met)
 
 
+def job_at(robot: Robot, **more: Any) -> Job:
+    """Return a job that judges a device at its addresses."""
+    return Job(robot.pack, robot.device.statement, robot.rest, robot.publishers, robot.subscribers, **more)
+
+
 def run_job(job: Job) -> Outcome:
     """Run a certification and wait for it; a run that takes too long is given up, and has caught nothing."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOADED)
+    os.environ.setdefault(PACK_VARIABLE, str(job.pack))
     ours, theirs = context.Pipe(duplex=False)
     started = time.monotonic()
     process = context.Process(target=_run, args=(job, theirs), daemon=True)
-    # Ctrl-C is for whoever waits here: the server that this may start, and what it forks, hear nothing of it.
+    # Ctrl-C is handled here: the server that this may start, and what it forks, must not receive it.
     heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         process.start()
@@ -142,21 +153,22 @@ def _run(job: Job, pipe: Pipe) -> None:
         )
 
 
+def statement_of(job: Job, contract: Contract) -> Statement:
+    """Return the robot's statement with the addresses and the classes that a job names."""
+    statement = load_statement(job.statement, contract) if job.statement else empty_statement(contract)
+    wsdls = {"publishers_wsdl": job.publishers or None, "subscribers_wsdl": job.subscribers or None}
+    where = msgspec.structs.replace(statement.endpoints, rest=job.rest or None, **wsdls, **job.endpoints)
+    statement = msgspec.structs.replace(statement, endpoints=where, claims=job.classes or statement.claims)
+    return statement if job.domain_id is None else statement.on_domain(job.domain_id)
+
+
 def robot_of(job: Job, folder: Path) -> RobotUnderTest:
-    """The robot and the run that a job describes; ``folder`` is for its token."""
-    statement = load_robot_statement(job.statement)
-    given = dict(job.endpoints)
+    """Return the robot and the run that a job describes; ``folder`` is for its token."""
     if job.token:
         (folder / "token").write_text(job.token, encoding="utf-8")
-        given["token_file"] = str(folder / "token")
-    where = msgspec.structs.replace(
-        statement.endpoints, rest=job.rest, publishers_wsdl=job.publishers, subscribers_wsdl=job.subscribers, **given
-    )
-    claims = job.classes or statement.claims
-    statement = msgspec.structs.replace(statement, endpoints=where, claims=claims)
-    if job.domain_id is not None:
-        statement = statement.on_domain(job.domain_id)
-    contract = Contract.load(only=job.requirements)
+        job = replace(job, endpoints={**job.endpoints, "token_file": str(folder / "token")})
+    contract = Contract.load(job.pack, only=job.requirements)
+    statement = statement_of(job, contract)
     run = Run(
         statement=statement,
         contract=contract,
@@ -167,7 +179,7 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
     )
     if job.enough:
         run.judge = _EnoughKnown(run, job.enough)
-    return RobotUnderTest(run, connection_of(where))
+    return RobotUnderTest(run, connection_of(statement.endpoints))
 
 
 class _EnoughKnown(Judge):

@@ -1,7 +1,7 @@
-"""What the plain Schemathesis command line catches of the REST mutants, with the same OpenAPI file.
+"""Which REST mutants the plain Schemathesis command line kills, with the same OpenAPI file.
 
-It is bounded in time, as our runs are. A mutant counts as caught when Schemathesis reports something that it does not
-report of the good robot behind the same proxy: what it says of a good robot is no catch.
+It is bounded in time, as our runs are. Schemathesis kills a mutant when it reports something that it does not report of
+the good device behind the same proxy.
 """
 
 import re
@@ -15,11 +15,9 @@ from pathlib import Path
 
 from lxml import etree
 
-from conformance.mutation.messages import unchanged
 from conformance.mutation.mutant import Mutant
-from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.selftest.at_once import each_at_once
-from conformance.selftest.mutant_run import RobotPool
+from conformance.selftest.mutant_run import RobotPool, become
 from conformance.selftest.proxy import Proxy
 
 EXAMPLES, LIMIT_S = 3, 40.0
@@ -34,17 +32,17 @@ class SchemathesisResult:
 
     Attributes:
         mutant: its name.
-        caught: whether it reports something beyond what it reports of the good robot.
+        killed: whether it reports something beyond what it reports of the good device.
         findings: what is beyond, as "OPERATION CODE".
     """
 
     mutant: str
-    caught: bool
+    killed: bool
     findings: tuple[str, ...]
 
 
 def command() -> str | None:
-    """The Schemathesis command of this environment, or None."""
+    """Return the Schemathesis command of this environment, or None."""
     beside = Path(sys.executable).with_name("st")
     return str(beside) if beside.exists() else shutil.which("st")
 
@@ -52,21 +50,22 @@ def command() -> str | None:
 def compare(
     pool: RobotPool, mutants: Iterable[Mutant], *, tell: Callable[[SchemathesisResult], None]
 ) -> tuple[Findings, list[SchemathesisResult]]:
-    """Run Schemathesis against the good robot, and then against every REST mutant that no ROS probe is needed for."""
+    """Run Schemathesis against the good device, and then against every REST mutant that needs no ROS probe."""
+    description = pool.contract.openapi_path
+    if description is None:
+        return frozenset(), []
     robot, proxy = pool.take()
     try:
-        good = _findings(proxy)
+        good = _findings(description, proxy)
     finally:
         pool.give(robot, proxy)
 
     def one(mutant: Mutant) -> SchemathesisResult:
         robot, proxy = pool.take()
         try:
-            proxy.change, proxy.serial = mutant.make(), mutant.serial
-            proxy.incomplete_request = mutant.incomplete_request() if mutant.incomplete_request else None
-            beyond = _findings(proxy, mutant.token) - good
+            become(proxy, mutant)
+            beyond = _findings(description, proxy, mutant.token) - good
         finally:
-            proxy.change = unchanged
             pool.give(robot, proxy)
         return SchemathesisResult(
             mutant.name, bool(beyond), tuple(sorted(f"{operation} {code}" for operation, code in beyond))
@@ -76,14 +75,14 @@ def compare(
     return good, each_at_once(one, tried, pool.size, tell)
 
 
-def _findings(proxy: Proxy, token: str = "") -> Findings:
-    """What Schemathesis reports, by its JUnit file."""
+def _findings(description: Path, proxy: Proxy, token: str = "") -> Findings:
+    """Return what Schemathesis reports, by its JUnit file."""
     schemathesis = command()
     if schemathesis is None:
         return frozenset()
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "junit.xml"
-        words = [schemathesis, "run", str(CONTRACT_DIR / "openapi.yaml"), "--url", proxy.rest, "--seed", "1"]
+        words = [schemathesis, "run", str(description), "--url", proxy.rest, "--seed", "1"]
         words += ["--max-examples", str(EXAMPLES), "--phases", "examples,coverage,fuzzing", "--continue-on-failure"]
         words += ["--request-timeout", "5", "--generation-database", "none", "--no-color"]
         words += ["--report", "junit", "--report-junit-path", str(report)]

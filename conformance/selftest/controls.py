@@ -1,32 +1,45 @@
-"""False alarms: good robots, over many seeds and in many circumstances, none of which may be blamed."""
+"""A/A controls: good devices, over many seeds and in many circumstances. Each failure is a false positive."""
+
+from __future__ import annotations
 
 import contextlib
 import tempfile
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from conformance.contract.pack import Contract
+from conformance.mutation.programs import NotInstalledError
+from conformance.mutation.self_test import GoodDevice, self_test_of
 from conformance.selftest.at_once import each_at_once
-from conformance.selftest.certifying import Job, Outcome, run_job
+from conformance.selftest.certifying import Outcome, job_at, run_job
 from conformance.selftest.link import linked
 from conformance.selftest.proxy import Proxy
-from conformance.selftest.robots import Robot, running, statement_of
-from conformance.selftest.servers.fronts import Front, behind
-from conformance.selftest.servers.programs import NotInstalledError
-from conformance.selftest.variants import CertificateError, Variant, certificate
+from conformance.selftest.robots import Robot, RobotError, check_available, running
+from conformance.selftest.servers.fronts import FRONTS, Front, behind
+from conformance.selftest.variants import CertificateError, Variant, certificate, variants_of
 from conformance.verdict.verdicts import NOT_SEEN
 
-# A robot that takes 300 ms for everything needs its time.
+# A device that takes 300 ms for everything needs its time.
 _TIMEOUT_S = 900.0
 
 
 @dataclass(frozen=True)
+class Case:
+    """One device to judge: in which circumstances or behind which server, with which seed."""
+
+    device: GoodDevice
+    variant: Variant | Front | None = None
+    seed: int = 0
+
+
+@dataclass(frozen=True)
 class ControlResult:
-    """What was said of a good robot.
+    """What came of a good device.
 
     Attributes:
-        robot: which; variant: in which circumstances, or empty.
+        robot: its name; variant: in which circumstances, or empty.
         seed: of the run.
         outcome: what came of it, or None when it was not tried.
         not_tried: why it was not tried, or empty.
@@ -39,15 +52,15 @@ class ControlResult:
     not_tried: str = ""
 
     @property
-    def blamed(self) -> dict[str, str]:
-        """MUST requirements that a good robot was said to fail, with what was said."""
+    def false_positives(self) -> dict[str, str]:
+        """MUST requirements that the good device failed, with the reasons."""
         if self.outcome is None:
             return {}
         return {id_: self.outcome.reasons[id_] for id_, value in self.outcome.verdicts.items() if value == "fail"}
 
     @property
     def unjudged(self) -> dict[str, str]:
-        """Requirements that could not be judged although they are claimed, with the reason."""
+        """Requirements that could not be judged although they are claimed, with the reasons."""
         if self.outcome is None:
             return {}
         reasons = self.outcome.reasons
@@ -56,29 +69,66 @@ class ControlResult:
 
     @property
     def conformant(self) -> bool:
-        """Whether the robot was found conformant (or was not tried)."""
-        return self.outcome is None or (self.outcome.exit_code == 0 and not self.blamed)
+        """Whether the device was found conformant (or was not tried)."""
+        return self.outcome is None or (self.outcome.exit_code == 0 and not self.false_positives)
 
 
-@dataclass(frozen=True)
-class Case:
-    """One robot to try: in which circumstances or behind which server, with which seed."""
+@dataclass
+class Controls:
+    """The controls of one self-test.
 
-    robot: str
-    variant: Variant | Front | None
-    seed: int
+    Attributes:
+        cases: which devices, in which circumstances.
+        missing: why devices of the pack are not among them.
+    """
+
+    cases: list[Case] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+
+
+def controls_of(contract: Contract, seeds: int, *, short: bool, variants: bool) -> Controls:
+    """Return the controls for a pack.
+
+    Args:
+        contract: the pack.
+        seeds: how many seeds for each device.
+        short: whether one device on ROS will do.
+        variants: whether to judge devices in variants, behind web servers, and those that are judged once.
+    """
+    needs, found = self_test_of(contract), Controls()
+    there: list[GoodDevice] = []
+    for device in needs.devices:
+        try:
+            check_available(contract, device)
+        except RobotError as error:
+            found.missing.append(str(error))
+        else:
+            there.append(device)
+    if variants and there:
+        # The slow one first: the others need not wait for it in the end.
+        found.cases += [Case(needs.device_in(variant.name), variant) for variant in variants_of(contract)]
+        found.cases += [Case(needs.device_in(front.name), front) for front in FRONTS]
+        found.cases += [Case(device) for device in there if device.once]
+    # Those on ROS take longest, and come last.
+    seeded = sorted((device for device in there if not device.once), key=lambda device: device.on_ros)
+    on_ros = [device for device in seeded if device.on_ros]
+    kept = [device for device in seeded if not (short and device in on_ros[1:])]
+    found.cases = [case for case in found.cases if case.device in there]
+    found.cases += [Case(device, None, seed) for seed in range(seeds) for device in kept]
+    return found
 
 
 def run_controls(
-    cases: list[Case],
+    contract: Contract,
+    cases: Iterable[Case],
     *,
-    effort: str,
-    parallel: int,
-    domain_id: int,
+    effort: str = "quick",
+    parallel: int = 1,
+    domain_id: int = 0,
     tell: Callable[[ControlResult], None],
     requirements: tuple[str, ...] = (),
 ) -> list[ControlResult]:
-    """Judge good robots, each case on a robot of its own, by all requirements or these; tell each when it is done."""
+    """Judge good devices, each case a process of its own, by all requirements or these; tell each when it is done."""
     lock = threading.Lock()
     domains = list(range(domain_id, domain_id + parallel))
 
@@ -86,7 +136,9 @@ def run_controls(
         with lock:
             domain = domains.pop()
         try:
-            return _try(case, effort, domain, requirements)
+            name = case.variant.name if case.variant else ""
+            outcome, not_tried = _judge(contract, case, effort, domain, requirements)
+            return ControlResult(case.device.name, name, case.seed, outcome, not_tried)
         finally:
             with lock:
                 domains.append(domain)
@@ -94,61 +146,44 @@ def run_controls(
     return each_at_once(one, cases, parallel, tell)
 
 
-def _try(case: Case, effort: str, domain: int, requirements: tuple[str, ...]) -> ControlResult:
-    """Judge one robot; what its circumstances need and this machine lacks is said."""
-    name = case.variant.name if case.variant else ""
+def _judge(
+    contract: Contract, case: Case, effort: str, domain: int, requirements: tuple[str, ...]
+) -> tuple[Outcome | None, str]:
+    """Judge one device; where this machine lacks what its circumstances need, return None and what is missing."""
+    more = {"requirements": requirements, "effort": effort, "seed": case.seed, "timeout_s": _TIMEOUT_S}
     try:
         with contextlib.ExitStack() as stack:
-            robot = stack.enter_context(running(case.robot, domain, case.seed))
+            robot = stack.enter_context(running(contract, case.device, domain, case.seed))
             if isinstance(case.variant, Front):
                 robot = stack.enter_context(behind(case.variant, robot))
-            job = Job(
-                statement_of(case.robot),
-                robot.rest,
-                robot.soap,
-                robot.soap.replace("publisher", "subscriber"),
-                requirements=requirements,
-                effort=effort,
-                seed=case.seed,
-                timeout_s=_TIMEOUT_S,
-                domain_id=robot.domain_id,
-            )
             if isinstance(case.variant, Variant):
-                return _vary(case, case.variant, robot, job, Path(stack.enter_context(tempfile.TemporaryDirectory())))
-            return ControlResult(case.robot, name, case.seed, run_job(job))
-    except NotInstalledError as error:
-        return ControlResult(case.robot, name, case.seed, None, str(error))
+                robot, varied = _varied(stack, case.variant, robot, case.seed)
+                more |= varied
+            return run_job(job_at(robot, domain_id=robot.domain_id, **more)), ""
+    except (NotInstalledError, CertificateError) as error:
+        return None, str(error)
 
 
-def _vary(case: Case, variant: Variant, robot: Robot, job: Job, folder: Path) -> ControlResult:
-    endpoints = dict(variant.endpoints)
-    tls = None
+def _varied(stack: contextlib.ExitStack, variant: Variant, robot: Robot, seed: int) -> tuple[Robot, dict[str, object]]:
+    """Put a device into its circumstances; return it as clients reach it then, and what its job says of that.
+
+    Raises:
+        NotInstalledError, CertificateError: this machine lacks something.
+    """
+    endpoints, tls = dict(variant.endpoints), None
     if variant.tls:
-        try:
-            tls, ca_file = certificate(folder)
-        except CertificateError as error:
-            return ControlResult(case.robot, variant.name, case.seed, None, str(error))
+        tls, ca_file = certificate(Path(stack.enter_context(tempfile.TemporaryDirectory())))
         endpoints["ca_file"] = str(ca_file)
+    soap = robot.publishers or robot.subscribers
     try:
-        proxy = Proxy(robot.rest, robot.soap, host=variant.host, tls=tls, prefix=variant.prefix)
+        proxy = Proxy(robot.rest, soap, host=variant.host, tls=tls, prefix=variant.prefix)
     except OSError as error:
-        return ControlResult(
-            case.robot, variant.name, case.seed, None, f"{variant.host} cannot be listened on: {error}"
+        raise NotInstalledError(f"{variant.host} cannot be listened on: {error}") from error
+    stack.callback(proxy.close)
+    if variant.link is not None:
+        addresses = stack.enter_context(linked(variant.link, seed, *proxy.listens.values()))
+        proxy.seen_at(
+            **{side: f"http://{host}:{port}" for side, (host, port) in zip(proxy.listens, addresses, strict=True)}
         )
-    with contextlib.ExitStack() as stack:
-        stack.callback(proxy.close)
-        if variant.link is not None:
-            addresses = stack.enter_context(linked(variant.link, case.seed, *proxy.listens.values()))
-            proxy.seen_at(
-                **{side: f"http://{host}:{port}" for side, (host, port) in zip(proxy.listens, addresses, strict=True)}
-            )
-        proxy.change = variant.make()
-        varied = replace(
-            job,
-            rest=proxy.rest,
-            publishers=proxy.wsdl("publisher"),
-            subscribers=proxy.wsdl("subscriber"),
-            token=variant.token,
-            endpoints=endpoints,
-        )
-        return ControlResult(case.robot, variant.name, case.seed, run_job(varied))
+    proxy.change = variant.make()
+    return proxy.before(robot), {"token": variant.token, "endpoints": endpoints}

@@ -1,4 +1,4 @@
-"""Each mutant is judged, and each requirement that must catch it has to say so."""
+"""Each mutant is judged, and each requirement that must kill it has to fail or warn."""
 
 import queue
 from collections.abc import Callable, Iterable
@@ -6,12 +6,14 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any, Self
 
+from conformance.contract.pack import Contract
 from conformance.mutation.messages import unchanged
 from conformance.mutation.mutant import Mutant
+from conformance.mutation.self_test import GoodDevice
 from conformance.selftest.at_once import each_at_once
-from conformance.selftest.certifying import Job, Outcome, run_job
+from conformance.selftest.certifying import Job, Outcome, job_at, run_job
 from conformance.selftest.proxy import Proxy
-from conformance.selftest.robots import REFERENCE, Robot, running, statement_of
+from conformance.selftest.robots import Robot, running
 
 # How long one run may take, s, by effort.
 _TIMEOUTS = {"quick": 90.0, "standard": 240.0, "deep": 900.0}
@@ -42,26 +44,27 @@ class MutantResult:
 
 
 class RobotPool:
-    """Robots with a proxy before each, for as many runs at once.
+    """Good devices with a proxy before each, for as many runs at once.
 
     Args:
-        kind: the good robot behind the proxies.
+        contract: the pack.
+        device: which device is behind the proxies.
         size: how many.
         domain_id: ROS domain of the first; the next ones take the next.
 
     Raises:
-        RobotError: a robot does not start.
+        RobotError: a device does not start.
     """
 
-    def __init__(self, kind: str, size: int, domain_id: int) -> None:
-        self.kind = kind
+    def __init__(self, contract: Contract, device: GoodDevice, size: int, domain_id: int = 0) -> None:
+        self.contract, self.kind = contract, device.name
         self._stack = ExitStack()
         self._free: queue.Queue[tuple[Robot, Proxy]] = queue.Queue()
         self.size = size
         try:
             for number in range(size):
-                robot = self._stack.enter_context(running(kind, domain_id + number))
-                proxy = Proxy(robot.rest, robot.soap)
+                robot = self._stack.enter_context(running(contract, device, domain_id + number))
+                proxy = Proxy(robot.rest, robot.publishers or robot.subscribers)
                 self._stack.callback(proxy.close)
                 self._free.put((robot, proxy))
         except BaseException:
@@ -75,33 +78,31 @@ class RobotPool:
         self._stack.close()
 
     def take(self) -> tuple[Robot, Proxy]:
-        """A robot that is free, and its proxy."""
+        """Return a robot that is free, and its proxy."""
         return self._free.get()
 
     def give(self, robot: Robot, proxy: Proxy) -> None:
-        """Give them back, as they were."""
+        """Take them back, and undo what was done to the proxy."""
         proxy.change, proxy.incomplete_request = unchanged, None
         proxy.serial = proxy.backwards = proxy.forgetful = False
         proxy.broken = []
         self._free.put((robot, proxy))
 
 
+def become(proxy: Proxy, mutant: Mutant) -> None:
+    """Make a mutant of the robot behind a proxy, for one run."""
+    proxy.change = mutant.make()
+    proxy.incomplete_request = mutant.incomplete_request() if mutant.incomplete_request else None
+    proxy.serial, proxy.backwards, proxy.forgetful = mutant.serial, mutant.backwards, mutant.forgetful
+
+
 def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, **more: Any) -> Job:
-    """A job that judges a robot through its proxy."""
-    return Job(
-        statement=statement_of(robot.kind),
-        rest=proxy.rest,
-        publishers=proxy.wsdl("publisher"),
-        subscribers=proxy.wsdl("subscriber"),
-        effort=effort,
-        seed=seed,
-        timeout_s=_TIMEOUTS[effort],
-        **more,
-    )
+    """Return a job that judges a robot through its proxy."""
+    return job_at(proxy.before(robot), effort=effort, seed=seed, timeout_s=_TIMEOUTS[effort], **more)
 
 
 def run_unchanged(pool: RobotPool, effort: str = "quick", seed: int = 0) -> Outcome:
-    """What is said of the good robot behind a proxy that changes nothing."""
+    """Return the outcome of the good robot behind a proxy that changes nothing: the A/A control."""
     robot, proxy = pool.take()
     try:
         return run_job(job_for(robot, proxy, effort, seed, domain_id=robot.domain_id))
@@ -139,45 +140,35 @@ def run_mutants(
     return each_at_once(one, mutants, pool.size, tell)
 
 
+def _obstacle(mutant: Mutant, robot: Robot, already: frozenset[str]) -> str:
+    """Return why a mutant of this robot cannot be tried, or an empty text."""
+    if shared := already.intersection(mutant.catches):
+        return f"{robot.kind} itself does not pass {min(shared)}"
+    if mutant.probe and not robot.device.on_ros:
+        return "only a ROS probe can see it, and there is no ROS"
+    if mutant.observer and not (robot.device.on_ros or robot.device.shows_effects):
+        return f"{robot.kind} does not show what reached it, and there is no ROS"
+    return ""
+
+
 def _try(mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, already: frozenset[str]) -> MutantResult:
-    result = MutantResult(mutant)
-    if already.intersection(mutant.catches):
-        result.not_tried = (
-            f"{robot.kind} itself is blamed for {min(already.intersection(mutant.catches))}, as it may be"
-        )
-        return result
-    if robot.kind != REFERENCE and mutant.probe:
-        result.not_tried = "only a ROS probe can see it, and there is no ROS"
-        return result
-    if robot.kind not in {REFERENCE, "baroque"} and mutant.observer:
-        result.not_tried = "the robot has no list of deliveries, and there is no ROS"
+    result = MutantResult(mutant, not_tried=_obstacle(mutant, robot, already))
+    if result.not_tried:
         return result
     classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in mutant.catches))
+    domain_id = robot.domain_id if mutant.probe else None
     seen: dict[str, None] = {}
     # The checks that judge the requirements alone; then the whole classes; then those with more cases.
-    attempts = [(effort, mutant.catches), (effort, ()), ("standard", ())]
-    for chosen, requirements in attempts:
-        proxy.change = mutant.make()
-        proxy.incomplete_request = mutant.incomplete_request() if mutant.incomplete_request else None
-        proxy.serial, proxy.backwards, proxy.forgetful = mutant.serial, mutant.backwards, mutant.forgetful
-        outcome = run_job(
-            job_for(
-                robot,
-                proxy,
-                chosen,
-                seed,
-                classes=classes,
-                requirements=requirements,
-                domain_id=robot.domain_id if mutant.probe else None,
-                token=mutant.token,
-            )
-        )
+    for chosen, requirements in ((effort, mutant.catches), (effort, ()), ("standard", ())):
+        become(proxy, mutant)
+        more = {"classes": classes, "requirements": requirements, "domain_id": domain_id, "token": mutant.token}
+        outcome = run_job(job_for(robot, proxy, chosen, seed, **more))
         seen.update(dict.fromkeys(outcome.caught()))
         _note(result, outcome, tuple(seen), chosen)
         if proxy.broken:
             # What such a mutant does is not what it says: nothing that it shows counts.
             result.missed = mutant.catches
-            result.reasons = dict.fromkeys(mutant.catches, f"the fault itself is broken: {proxy.broken[0]}")
+            result.reasons = dict.fromkeys(mutant.catches, f"the mutant itself is broken: {proxy.broken[0]}")
             break
         if not result.missed:
             break

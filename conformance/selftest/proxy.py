@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 from conformance.mutation.messages import Change, Forward, HangUpError, IncompleteRequest, Request, Response, unchanged
 from conformance.mutation.wire import ClientConnection, IncompleteMessageError, RobotConnection
 from conformance.selftest.addresses import Addresses
+from conformance.selftest.robots import Robot
 
 _IDLE_S = 60.0
 
@@ -20,7 +21,7 @@ class Proxy:
 
     Args:
         rest: the robot's REST base URL.
-        soap: URL of one of the robot's SOAP services.
+        soap: URL of one of the robot's SOAP services; empty: it has none.
         host: where to listen.
         tls: context to serve TLS with, or None.
         prefix: path before everything on the REST side, as "/r2d2/api".
@@ -36,7 +37,7 @@ class Proxy:
     """
 
     def __init__(
-        self, rest: str, soap: str, *, host: str = "127.0.0.1", tls: ssl.SSLContext | None = None, prefix: str = ""
+        self, rest: str, soap: str = "", *, host: str = "127.0.0.1", tls: ssl.SSLContext | None = None, prefix: str = ""
     ) -> None:
         self.change: Change = unchanged
         self.incomplete_request: IncompleteRequest | None = None
@@ -46,7 +47,7 @@ class Proxy:
         self.requests = 0
         self.broken: list[str] = []
         self._tls = tls
-        robot = {"rest": urlsplit(rest), "soap": urlsplit(soap)}
+        robot = {side: urlsplit(url) for side, url in (("rest", rest), ("soap", soap)) if url}
         self._robot = {side: (url.hostname or "127.0.0.1", url.port or 80) for side, url in robot.items()}
         self._listeners = {side: _listen(host) for side in robot}
         scheme, name = "https" if tls else "http", f"[{host}]" if ":" in host else host
@@ -66,9 +67,15 @@ class Proxy:
         """REST's base URL at the proxy."""
         return self._addresses.public("rest")
 
-    def wsdl(self, service: str) -> str:
-        """A WSDL's URL at the proxy: ``publisher`` or ``subscriber``."""
-        return f"{self._addresses.public('soap')}/turtlesim_{service}_ws?wsdl"
+    def wsdl(self, url: str) -> str:
+        """Return the URL at the proxy of a WSDL of the robot; empty where that is empty."""
+        where = urlsplit(url)
+        return f"{self._addresses.public('soap')}{where.path}?{where.query}" if url else ""
+
+    def before(self, robot: Robot) -> Robot:
+        """Return the robot as clients of the proxy reach it."""
+        publishers, subscribers = self.wsdl(robot.publishers), self.wsdl(robot.subscribers)
+        return replace(robot, rest=self.rest, publishers=publishers, subscribers=subscribers)
 
     @property
     def listens(self) -> dict[str, tuple[str, int]]:

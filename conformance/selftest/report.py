@@ -1,14 +1,15 @@
-"""What a self-test says in the end: selftest.json, and a summary for people."""
+"""What a self-test says in the end: selftest.json, selftest.md, and a summary for people."""
 
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from conformance.contract.pack import Contract
 from conformance.selftest.comparison import SchemathesisResult
 from conformance.selftest.controls import ControlResult
 from conformance.selftest.generated import report as by_rule
-from conformance.selftest.generated.judging import CAUGHT, NOT_REACHED, GeneratedResult
+from conformance.selftest.generated.judging import KILLED, NOT_REACHED, GeneratedResult
 from conformance.selftest.mutant_run import MutantResult
 
 
@@ -17,14 +18,16 @@ class Report:
     """Everything that a self-test has found.
 
     Attributes:
-        target: the good robot behind the mutants.
+        contract: the pack.
+        target: the good device behind the mutants.
         mutant_results: by mutant.
-        control_results: by good robot.
-        compared: what Schemathesis caught; good: what it reports of the good robot.
+        control_results: by good device.
+        compared: what Schemathesis killed; good: what it reports of the good device.
         notes: remarks.
         generated_results: of mutants by rule; seed: of their sample.
     """
 
+    contract: Contract
     target: str
     mutant_results: list[MutantResult] = field(default_factory=list)
     control_results: list[ControlResult] = field(default_factory=list)
@@ -37,28 +40,28 @@ class Report:
 
     @property
     def tried(self) -> list[MutantResult]:
-        """Faults that were tried."""
+        """Mutants that were tried."""
         return [result for result in self.mutant_results if not result.not_tried]
 
     @property
-    def missed(self) -> list[MutantResult]:
-        """Faults that a requirement missed which has to catch them."""
+    def survived(self) -> list[MutantResult]:
+        """Mutants that survived a requirement which has to kill them."""
         return [result for result in self.tried if result.missed]
 
     @property
-    def blamed(self) -> list[ControlResult]:
-        """Good robots that were not found conformant."""
+    def false_positives(self) -> list[ControlResult]:
+        """Controls of good devices that were not found conformant."""
         return [result for result in self.control_results if not result.conformant]
 
     @property
     def holds(self) -> bool:
-        """Whether all is caught and nobody is blamed, and something was tried."""
+        """Whether all mutants are killed, no control is a false positive, and something was tried."""
         tried = bool(self.tried or self.control_results or self.generated_results)
-        escaped = any(result.outcome not in {CAUGHT, NOT_REACHED} for result in self.generated_results)
-        return tried and not self.missed and not self.blamed and not escaped
+        escaped = any(result.outcome not in {KILLED, NOT_REACHED} for result in self.generated_results)
+        return tried and not self.survived and not self.false_positives and not escaped
 
     def document(self) -> dict[str, Any]:
-        """selftest.json."""
+        """Return selftest.json; its keys are those of roaas-selftest/1."""
         return {
             "format": "roaas-selftest/1",
             "holds": self.holds,
@@ -89,7 +92,7 @@ class Report:
                     "acquitted": result.conformant,
                     "not_tried": result.not_tried,
                     "exit_code": result.outcome.exit_code if result.outcome else None,
-                    "blamed": result.blamed,
+                    "blamed": result.false_positives,
                     "unjudged": result.unjudged,
                     "requests": result.outcome.requests if result.outcome else 0,
                     "seconds": round(result.outcome.seconds, 2) if result.outcome else 0.0,
@@ -99,11 +102,15 @@ class Report:
             "schemathesis": {
                 "of_the_good_robot": list(self.good),
                 "faults": [
-                    {"name": seen.mutant, "caught": seen.caught, "findings": list(seen.findings)}
+                    {"name": seen.mutant, "caught": seen.killed, "findings": list(seen.findings)}
                     for seen in self.compared
                 ],
             },
-            **({"generated": by_rule.document(self.generated_results, self.seed)} if self.generated_results else {}),
+            **(
+                {"generated": by_rule.document(self.contract, self.generated_results, self.seed)}
+                if self.generated_results
+                else {}
+            ),
         }
 
     def write(self, out: Path) -> Path:
@@ -119,17 +126,17 @@ class Report:
         return path
 
     def matrix(self) -> str:
-        """The matrix, as a table: each mutant, and the requirements that caught it; of those by rule, the rates."""
+        """Return a table: each mutant with the requirements that killed it; of mutants by rule, the rates."""
         if self.generated_results:
-            theirs = {seen.mutant: seen.caught for seen in self.compared}
-            return by_rule.rates_page(self.generated_results, self.target, self.seed, theirs, self.notes)
-        compared = {seen.mutant: "caught" if seen.caught else "not caught" for seen in self.compared}
+            theirs = {seen.mutant: seen.killed for seen in self.compared}
+            return by_rule.rates_page(self.contract, self.generated_results, self.target, self.seed, theirs, self.notes)
+        compared = {seen.mutant: "killed" if seen.killed else "survived" for seen in self.compared}
         lines = [
-            "# Faulty robots, and what caught them",
+            "# Mutants, and what killed them",
             "",
             f"Target behind the proxy: {self.target}. {self.summary().splitlines()[0]}",
             "",
-            "| faulty robot | what is wrong with it | caught by | missed by | plain Schemathesis |",
+            "| mutant | what is wrong with it | killed by | survived | plain Schemathesis |",
             "|---|---|---|---|---|",
         ]
         for result in self.mutant_results:
@@ -143,43 +150,43 @@ class Report:
         return "\n".join(lines) + "\n"
 
     def summary(self) -> str:
-        """What a person wants to know, in a few lines."""
-        tried, missed = len(self.tried), len(self.missed)
+        """Return what a person wants to know, in a few lines."""
+        tried, missed = len(self.tried), len(self.survived)
         lines = []
         if tried:
             requirements = {id_ for result in self.tried for id_ in result.mutant.catches if id_ not in result.missed}
             lines.append(
-                f"{tried - missed} of {tried} faulty robots caught ({100 * (tried - missed) / tried:.1f} %), "
+                f"{tried - missed} of {tried} mutants killed ({100 * (tried - missed) / tried:.1f} %), "
                 f"by {len(requirements)} requirements"
             )
         not_tried = [result for result in self.mutant_results if result.not_tried]
         if not_tried:
             lines.append(f"{len(not_tried)} not tried, first {not_tried[0].mutant.name}: {not_tried[0].not_tried}")
-        for result in self.missed:
+        for result in self.survived:
             said = "; ".join(f"{id_} said {result.reasons.get(id_, 'nothing')[:200]}" for id_ in result.missed)
-            lines.append(f"MISSED {result.mutant.name} ({result.mutant.says}) {said}")
+            lines.append(f"SURVIVED {result.mutant.name} ({result.mutant.says}) {said}")
         if self.control_results:
             good = [one for one in self.control_results if one.outcome is not None]
             lines.append(
-                f"{len(good) - len(self.blamed)} of {len(good)} certifications of good robots found them conformant"
+                f"{len(good) - len(self.false_positives)} of {len(good)} A/A controls (good devices) found conformant"
             )
         lines += [
             f"not tried: {one.robot} ({one.variant}): {one.not_tried}" for one in self.control_results if one.not_tried
         ]
-        for one in self.blamed:
+        for one in self.false_positives:
             where = f" ({one.variant})" if one.variant else ""
-            said = "; ".join(f"{id_}: {why[:200]}" for id_, why in {**one.blamed, **one.unjudged}.items())
+            said = "; ".join(f"{id_}: {why[:200]}" for id_, why in {**one.false_positives, **one.unjudged}.items())
             code = one.outcome.exit_code if one.outcome else "none"
-            lines.append(f"BLAMED {one.robot}{where}, seed {one.seed}, exit code {code}: {said}")
+            lines.append(f"FALSE POSITIVE {one.robot}{where}, seed {one.seed}, exit code {code}: {said}")
         if self.generated_results:
-            lines.append(by_rule.summary(self.generated_results))
+            lines.append(by_rule.summary(self.contract, self.generated_results))
         if self.compared:
-            theirs = {seen.mutant for seen in self.compared if seen.caught}
+            theirs = {seen.mutant for seen in self.compared if seen.killed}
             ours = {result.mutant.name for result in self.tried if not result.missed}
-            ours |= {result.mutant.name for result in self.generated_results if result.outcome == CAUGHT}
+            ours |= {result.mutant.name for result in self.generated_results if result.outcome == KILLED}
             ours &= {seen.mutant for seen in self.compared}
             lines.append(
-                f"Of {len(self.compared)} faults of REST, the plain Schemathesis command line caught {len(theirs)}, "
-                f"this suite {len(ours)}; of the good robot it reports {len(self.good)} findings"
+                f"Of {len(self.compared)} mutants of REST, the plain Schemathesis command line killed {len(theirs)}, "
+                f"this suite {len(ours)}; of the good device it reports {len(self.good)} findings"
             )
         return "\n".join([*lines, *self.notes])

@@ -1,11 +1,12 @@
-"""The good robots of a self-test: started as processes of their own, and stopped again."""
+"""The good devices of a self-test: started as processes of their own, and stopped again."""
+
+from __future__ import annotations
 
 import contextlib
 import os
 import re
 import selectors
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -14,87 +15,96 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO
 
-from conformance.selftest.servers.programs import built, check_installed, program
+from conformance.contract.pack import Contract
+from conformance.mutation.self_test import GoodDevice, Start, self_test_of
 
-_HERE = Path(__file__).parent
-_PACK = _HERE.parent / "packs" / "table1"
-_READY = re.compile(r"ready rest=(\S+) soap=(\S*)")
+_READY = re.compile(r"ready rest=(\S+)(?: soap=(\S*))?")
 _START_S, _STOP_S = 90.0, 10.0
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
 _DOMAINS = 102
-INDEPENDENT_ROBOTS = ("plain", "baroque", "legacy")
-# Those whose web server answers much by itself; of most there are fewer resources.
-_FRAMEWORKS = {"flask": ("flask", "gunicorn"), "aiohttp": ("aiohttp",), "hypercorn": ("hypercorn", "starlette")}
-ON_SERVERS = ("node", "golang", *_FRAMEWORKS)
-REFERENCE = "reference"
-#: The reference robot with odometry, wheels and delays like those of a real one; each seed is another robot.
-REALISTIC = "realistic"
-ON_ROS = (REFERENCE, REALISTIC)
 
 
 class RobotError(Exception):
-    """A robot that does not start; the message says what to do."""
+    """A device that does not start; the message says what to do."""
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot that runs.
+    """A good device that runs, at the addresses by which clients reach it.
 
     Attributes:
-        kind: "reference", "realistic" or an independent robot's name.
+        pack: folder of its contract pack.
+        device: which.
         rest: REST's base URL.
-        soap: the publishers' WSDL, or empty.
+        publishers: URL of the publishers' WSDL, or empty; likewise subscribers.
         domain_id: its ROS domain, or None.
     """
 
-    kind: str
+    pack: Path
+    device: GoodDevice
     rest: str
-    soap: str
+    publishers: str = ""
+    subscribers: str = ""
     domain_id: int | None = None
 
-
-def statement_of(kind: str) -> Path:
-    """The implementation conformance statement of a robot."""
-    if kind == REALISTIC:
-        return _HERE.parents[1] / "reference_robot" / "realistic.toml"
-    return _HERE / "reference.toml" if kind == REFERENCE else _PACK / "independent_robots" / kind / f"{kind}.toml"
+    @property
+    def kind(self) -> str:
+        """The device's name."""
+        return self.device.name
 
 
-def check_available(kind: str) -> None:
-    """See whether a robot can be started here.
+def target_of(contract: Contract, name: str) -> GoodDevice:
+    """Return a pack's good device of this name; the first one where the name is empty.
+
+    Raises:
+        RobotError: the pack has no such device.
+    """
+    devices = {device.name: device for device in self_test_of(contract).devices}
+    if not devices:
+        raise RobotError(
+            f"the contract pack {contract.name!r} does not say how a good device is started: it needs a selftest.py "
+            "(conformance/mutation/self_test.py describes it)"
+        )
+    if name and name not in devices:
+        raise RobotError(f"the contract pack {contract.name!r} has no good device {name!r}: {', '.join(devices)}")
+    return devices[name] if name else next(iter(devices.values()))
+
+
+def check_available(contract: Contract, device: GoodDevice) -> None:
+    """See whether a device can be started here.
 
     Raises:
         RobotError: it cannot.
     """
-    if kind in ON_ROS and find_spec("rclpy") is None:
-        raise RobotError(
-            "the reference robot needs ROS 2 (pip install 'roaas[robot,ros]', or source /opt/ros/jazzy/setup.bash); "
-            "without it, take an independent robot in its place: roaas selftest --target baroque"
-        )
+    if not device.on_ros or find_spec("rclpy") is not None:
+        return
+    needs = "needs ROS 2 (pip install 'roaas[robot,ros]', or source /opt/ros/jazzy/setup.bash)"
+    other = self_test_of(contract).device_in("")
+    instead = "" if other.on_ros else f"; without it, take another one: roaas selftest --target {other.name}"
+    raise RobotError(f"the device {device.name!r} {needs}{instead}")
 
 
 @contextlib.contextmanager
-def running(kind: str, domain_id: int = 0, seed: int = 0, fault: str = "") -> Iterator[Robot]:
-    """Start a robot on free ports, and stop it in the end.
+def running(contract: Contract, device: GoodDevice, domain_id: int = 0, seed: int = 0) -> Iterator[Robot]:
+    """Start a good device on free ports, and stop it in the end.
 
     Args:
-        kind: "reference", "realistic" or an independent robot's name.
-        domain_id: first ROS domain to try for a robot on ROS.
-        seed: which realistic robot.
-        fault: which fault in the body of the robot "baroque".
+        contract: its pack.
+        device: which.
+        domain_id: first ROS domain to try, for a device on ROS.
+        seed: of everything random in it.
 
     Raises:
         RobotError: it does not start.
-        NotInstalledError: what it runs on is not there.
+        NotInstalledError: what it runs on is not installed.
     """
-    check_available(kind)
-    if kind in ON_ROS:
-        with _own_domain(domain_id) as own, _started(kind, own, _command(kind, own, seed)) as robot:
-            yield robot
-    else:
-        faulty = ["--fault", fault] if fault else []
-        with _started(kind, None, [*_command(kind, domain_id, seed), *faulty]) as robot:
-            yield robot
+    check_available(contract, device)
+    with contextlib.ExitStack() as stack:
+        own = stack.enter_context(_own_domain(domain_id)) if device.on_ros else None
+        process = stack.enter_context(_started(device.command(Start(own or 0, seed))))
+        rest, soap = _ready(process, device.name)
+        wsdls = self_test_of(contract).wsdls(soap) if soap else ("", "")
+        yield Robot(contract.directory, device, rest, *wsdls, domain_id=own)
 
 
 @contextlib.contextmanager
@@ -119,15 +129,14 @@ def _own_domain(first: int) -> Iterator[int]:
 
 
 @contextlib.contextmanager
-def _started(kind: str, domain_id: int | None, command: list[str]) -> Iterator[Robot]:
+def _started(command: list[str]) -> Iterator[subprocess.Popen[str]]:
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    # The command is this interpreter with arguments made above.
+    # The command is the pack's.
     process = subprocess.Popen(  # noqa: S603
         command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment
     )
     try:
-        rest, soap = _ready(process, kind)
-        yield Robot(kind, rest, soap, domain_id)
+        yield process
     finally:
         process.terminate()
         try:
@@ -139,27 +148,8 @@ def _started(kind: str, domain_id: int | None, command: list[str]) -> Iterator[R
             process.stdout.close()
 
 
-def _command(kind: str, domain_id: int, seed: int) -> list[str]:
-    """What starts a robot on free ports.
-
-    Raises:
-        NotInstalledError: what it runs on is not there.
-    """
-    ports = ["--rest-port", "0", "--soap-port", "0"]
-    if kind in ON_ROS:
-        realistic = ["--realistic", "--seed", str(seed)] if kind == REALISTIC else []
-        return [sys.executable, "-m", "roaas", "robot", *ports, "--domain-id", str(domain_id), *realistic]
-    folder = _PACK / "independent_robots" / kind
-    if kind == "node":
-        return [program("node", "nodejs"), str(folder / "robot.js")]
-    if kind == "golang":
-        return [str(built(*sorted(folder.glob("*.go")))), str(_PACK)]
-    check_installed(*_FRAMEWORKS.get(kind, ()))
-    return [sys.executable, "-m", "conformance.packs.table1.independent_robots", kind, *ports]
-
-
-def _ready(process: subprocess.Popen[str], kind: str) -> tuple[str, str]:
-    """The two addresses in the line that a robot prints when it is ready."""
+def _ready(process: subprocess.Popen[str], name: str) -> tuple[str, str]:
+    """Return the two addresses in the line that a device prints when it is ready; the second may be empty."""
     until = time.monotonic() + _START_S
     output: IO[str] | None = process.stdout
     with selectors.DefaultSelector() as selector:
@@ -170,8 +160,8 @@ def _ready(process: subprocess.Popen[str], kind: str) -> tuple[str, str]:
                 break
             found = _READY.search(output.readline())
             if found:
-                return found[1], found[2]
+                return found[1], found[2] or ""
     why = (
         f"it ended with exit code {process.poll()}" if process.poll() is not None else f"not ready after {_START_S:g} s"
     )
-    raise RobotError(f"the robot {kind!r} does not start: {why}")
+    raise RobotError(f"the device {name!r} does not start: {why}")

@@ -1,30 +1,27 @@
-"""Circumstances in which a good robot stays a good one: what stands between it and its clients in the field."""
+"""Circumstances in which a good device stays one: what stands between it and its clients in the field."""
 
-import contextlib
 import json
 import shutil
 import ssl
 import subprocess
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
-from copy import deepcopy
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from conformance.mutation.changes import JSON, parsed, problem, soap
+from conformance.contract.pack import Contract
+from conformance.mutation.changes import JSON, parsed, problem
 from conformance.mutation.messages import Change, Forward, Request, Response, unchanged
-from conformance.mutation.wire import IncompleteMessageError
+from conformance.mutation.self_test import self_test_of
 from conformance.selftest.link import LINKS, Link
 
 _PREFIX = "/r2d2/api"
 _TOKEN = "open-sesame"  # noqa: S105 - of a robot that lives for seconds, on loopback
 _DELAY_S = 0.3
 _CEILING = 100.0
-_MESSAGE_S, _FORGOTTEN_S = 0.05, 2.0
 
 
 @dataclass(frozen=True)
@@ -33,7 +30,6 @@ class Variant:
 
     Attributes:
         name: its name; says: what it is, in a few words.
-        robot: the good robot in it.
         make: makes the change.
         host: where the proxy listens; prefix: its path; tls: whether it speaks TLS.
         token: bearer token to send.
@@ -49,7 +45,6 @@ class Variant:
     tls: bool = False
     token: str = ""
     endpoints: dict[str, Any] = field(default_factory=dict)
-    robot: str = "baroque"
     link: Link | None = None
 
 
@@ -58,7 +53,7 @@ class CertificateError(Exception):
 
 
 def certificate(folder: Path) -> tuple[ssl.SSLContext, Path]:
-    """A context that serves with a certificate of its own making, and the file by which to trust it.
+    """Return a context that serves with a self-signed certificate, and the file by which to trust it.
 
     Raises:
         CertificateError: there is no openssl, or it fails.
@@ -84,7 +79,7 @@ def _slow(request: Request, forward: Forward) -> Response:
 
 
 def _prefixed(request: Request, forward: Forward) -> Response:
-    """Descriptions say under which path everything is."""
+    """Name the path under which everything is in the description."""
     response = forward(request)
     if request.side == "rest" and request.path.endswith("/openapi.json"):
         value = parsed(response.body)
@@ -101,14 +96,14 @@ def _closing(request: Request, forward: Forward) -> Response:
 
 
 def _guarded(request: Request, forward: Forward) -> Response:
-    """A token is wanted for everything that is HTTP; without it, 401 as RFC 9110 has it."""
+    """Respond 401 to every request without the token (RFC 9110 15.5.2)."""
     if request.raw is None and request.field("Authorization") != f"Bearer {_TOKEN}":
-        return problem(401, "a bearer token is wanted", ("WWW-Authenticate", 'Bearer realm="robot"'))(request)
+        return problem(401, "a bearer token is required", ("WWW-Authenticate", 'Bearer realm="robot"'))(request)
     return forward(request)
 
 
 class _Ceiling:
-    """More requests than the ceiling allows within a second are answered 429."""
+    """Responds 429 to more requests than the ceiling allows within a second."""
 
     def __init__(self) -> None:
         self._times: list[float] = []
@@ -125,34 +120,8 @@ class _Ceiling:
         return forward(request)
 
 
-class _Behind:
-    """SOAP speaks of pose and velocity as they were some messages ago, as a process of its own may."""
-
-    def __init__(self) -> None:
-        self._states = soap("GetPose", "GetVelocity")
-        self._known: dict[bytes, deque[Response]] = {}
-        self._asked = 0.0
-
-    def __call__(self, request: Request, forward: Forward) -> Response:
-        if not self._states(request) or request.media_type != "text/xml":
-            return forward(request)
-        self._asked = time.monotonic()
-        if request.body not in self._known:
-            self._known[request.body] = deque([forward(request)], maxlen=2)
-            threading.Thread(target=self._follow, args=(request, forward), daemon=True).start()
-        return deepcopy(self._known[request.body][0])
-
-    def _follow(self, request: Request, forward: Forward) -> None:
-        """Read the state again and again, as long as somebody asks for it."""
-        with contextlib.suppress(OSError, IncompleteMessageError):
-            while time.monotonic() - self._asked < _FORGOTTEN_S:
-                time.sleep(_MESSAGE_S)
-                self._known[request.body].append(forward(request))
-        del self._known[request.body]
-
-
 def _uptime(request: Request, forward: Forward) -> Response:
-    """Every JSON object tells for how many seconds the robot has been up."""
+    """Add to every JSON object for how many seconds the robot has been up."""
     response = forward(request)
     if request.side != "rest" or response.status != HTTPStatus.OK or response.media_type != JSON:
         return response
@@ -164,16 +133,21 @@ def _uptime(request: Request, forward: Forward) -> Response:
     return response
 
 
+#: Variants for every pack.
 VARIANTS = (
     *(Variant(link.name, link.says, link=link) for link in LINKS),
-    # Whose velocities hold long enough to be read at such a pace.
-    Variant("slow", "every answer takes 300 ms more", lambda: _slow, robot="plain"),
+    Variant("slow", "every response takes 300 ms more", lambda: _slow),
     Variant("prefix", f"everything is under {_PREFIX}", lambda: _prefixed, prefix=_PREFIX),
     Variant("close", "HTTP/1.0, and every connection is closed", lambda: _closing),
     Variant("tls", "HTTPS with a certificate of the robot's own", tls=True),
-    Variant("token", "a bearer token is wanted", lambda: _guarded, token=_TOKEN),
+    Variant("token", "a bearer token is required", lambda: _guarded, token=_TOKEN),
     Variant("ipv6", "the robot is at [::1]", host="::1"),
-    Variant("behind", "SOAP is a message or two behind REST", _Behind),
     Variant("uptime", "JSON objects have an uptime that ticks", lambda: _uptime),
     Variant("ceiling", "100 requests a second, and no more", _Ceiling, endpoints={"request_rate": _CEILING * 0.8}),
 )
+
+
+def variants_of(contract: Contract) -> tuple[Variant, ...]:
+    """Return the variants for a pack: those for every pack, and its own."""
+    own = self_test_of(contract).variants
+    return (*VARIANTS, *(Variant(change.name, change.says, change.make) for change in own))

@@ -1,11 +1,13 @@
-"""All mutants by rule, in an order that stays the same as long as the contract's files do."""
+"""All mutants by rule of a contract pack, in an order that stays the same as long as the pack's descriptions do."""
 
+from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
 
+from conformance.contract.pack import Contract
 from conformance.selftest.generated import bodies, heads, lenience
 from conformance.selftest.generated.mutant import MODES, GeneratedMutant, classes_of_answers, of_answer, of_request
-from conformance.selftest.generated.open_places import reason_for
+from conformance.selftest.generated.open_places import open_place
 from conformance.selftest.generated.operators import OPERATORS, Operator
 from conformance.selftest.generated.places import Exchange, Place, exchanges, places
 
@@ -15,20 +17,24 @@ _WHOLE = {"crossed": bodies.crossed, "failing": bodies.failing, "cut": bodies.cu
 
 
 @cache
-def every_change() -> tuple[GeneratedMutant, ...]:
-    """All changes that the rules make, those that break no clause included."""
-    found = [*_of_fields(), *_of_exchanges()]
+def every_change(contract: Contract) -> tuple[GeneratedMutant, ...]:
+    """Return all changes that the rules make, those that break no clause included."""
+    found = [*_of_fields(contract), *_of_exchanges(contract)]
     return tuple({mutant.name: mutant for mutant in found}.values())
 
 
 @cache
-def generated_mutants() -> tuple[GeneratedMutant, ...]:
-    """The mutants by rule: changes that break a clause."""
-    return tuple(mutant for mutant in every_change() if not reason_for(mutant.name))
+def generated_mutants(contract: Contract) -> tuple[GeneratedMutant, ...]:
+    """Return the mutants by rule: changes that break a clause."""
+    return tuple(change for change in every_change(contract) if open_place(contract, change) is None)
 
 
-def _of_fields() -> Iterator[GeneratedMutant]:
-    for place in places():
+def _of_fields(contract: Contract) -> Iterator[GeneratedMutant]:
+    there = places(contract)
+    members: dict[tuple[object, ...], set[str]] = defaultdict(set)
+    for place in there:
+        members[place.exchange, place.part, place.medium, place.steps[:-1]].add(place.steps[-1])
+    for place in there:
         for operator in OPERATORS:
             if operator.fits(place):
                 yield _at(operator, place)
@@ -36,7 +42,8 @@ def _of_fields() -> Iterator[GeneratedMutant]:
             for mode in MODES:
                 yield _at(_NULL, place, mode)
         if place.part == "request" and place.medium == "json":
-            yield from lenience.of_lenience(place)
+            known = members[place.exchange, place.part, place.medium, place.steps]
+            yield from lenience.of_lenience(place, frozenset(known))
 
 
 def _at(operator: Operator, place: Place, mode: str = "") -> GeneratedMutant:
@@ -53,20 +60,19 @@ def _at(operator: Operator, place: Place, mode: str = "") -> GeneratedMutant:
 
 
 def _classes(place: Place) -> tuple[str, ...]:
-    """Classes that can see a field, the likeliest first."""
-    exchange = place.exchange
-    moves = ("safety",) if "elocity" in exchange.name or "Goal" in exchange.name else ()
+    """Return the classes that can see a field, the likeliest first."""
+    own = place.exchange.classes
     if place.medium == "xml":
         return ("rest-formats", "strict-input") if place.part == "request" else ("rest-formats", "http")
     if place.part == "request":
-        return (exchange.class_, "strict-input", "equivalence", *moves)
+        return (*own, "strict-input")
     if place.medium == "soap":
-        return (exchange.class_, "equivalence", "soap-basic-profile")
-    return (exchange.class_, "rest-formats", "equivalence", *moves, "http")
+        return (*own, "soap-basic-profile")
+    return (*own, "rest-formats", "http")
 
 
-def _of_exchanges() -> Iterator[GeneratedMutant]:
-    for exchange in exchanges():
+def _of_exchanges(contract: Contract) -> Iterator[GeneratedMutant]:
+    for exchange in exchanges(contract):
         yield from heads.of_statuses(exchange)
         yield from heads.of_headers(exchange)
         yield from bodies.of_bodies(exchange)

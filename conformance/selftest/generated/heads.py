@@ -27,8 +27,7 @@ def neighbours(exchange: Exchange, status: int) -> tuple[int, ...]:
 
 def of_statuses(exchange: Exchange) -> Iterator[GeneratedMutant]:
     """Each declared status becomes each of its neighbours."""
-    declared = (*exchange.statuses, 204) if exchange.class_ == "rest-delivery" else exchange.statuses
-    for status in dict.fromkeys((*declared, *((500,) if exchange.side == "soap" else (405, 415)))):
+    for status in dict.fromkeys((*exchange.statuses, *((500,) if exchange.side == "soap" else (405, 415)))):
         for other in neighbours(exchange, status):
             yield GeneratedMutant(
                 f"status:{exchange.name}:{status}-{other}",

@@ -11,15 +11,14 @@ from typing import Final
 from conformance.contract.classes import Level
 from conformance.contract.pack import Contract
 from conformance.mutation.messages import unchanged
-from conformance.packs.table1.statement import load_robot_statement
 from conformance.selftest.at_once import each_at_once
-from conformance.selftest.certifying import Outcome, run_job
+from conformance.selftest.certifying import Outcome, run_job, statement_of
 from conformance.selftest.generated.mutant import GeneratedMutant, Tally
 from conformance.selftest.mutant_run import RobotPool, job_for
 from conformance.selftest.proxy import Proxy
-from conformance.selftest.robots import Robot, statement_of
+from conformance.selftest.robots import Robot
 
-CAUGHT: Final = "caught"
+KILLED: Final = "killed"
 SURVIVED: Final = "survived"
 NOT_REACHED: Final = "not reached"
 # A run took too long or broke off, so that nothing is known.
@@ -37,10 +36,10 @@ class GeneratedResult:
 
     Attributes:
         mutant: which.
-        outcome: caught, survived, not reached (nothing was altered in any run), given up, broken.
-        by: requirements that said fail (MUST) or warn (SHOULD) and do not of the good robot.
-        fails: whether one of them said fail, so that the robot is not conformant.
-        effort: the effort at which it was caught, else the last one tried.
+        outcome: killed, survived, not reached (nothing was altered in any run), given up, broken.
+        by: requirements that said fail (MUST) or warn (SHOULD) of it, and not of the good device.
+        fails: whether one of them said fail, so that the device is not conformant.
+        effort: the effort at which it was killed, else the last one tried.
         altered: how often it altered something.
         runs: how many runs; seconds: how long they took.
         reason: the first requirement's, or what was broken.
@@ -68,27 +67,26 @@ def judge(
     """Judge mutants, several at once.
 
     Args:
-        pool: good robots with a proxy before each.
+        pool: good devices with a proxy before each.
         mutants: which.
-        efforts: those to try, until it is caught.
+        efforts: those to try, until it is killed.
         seed: of everything random.
         tell: called as each is done.
     """
-    claimed = load_robot_statement(statement_of(pool.kind)).claimed(Contract.load())
-    blamed = _Blamed(seed)
+    control = _Control(seed)
 
     def one(mutant: GeneratedMutant) -> GeneratedResult:
         robot, proxy = pool.take()
         try:
-            return _judge(mutant, robot, proxy, efforts, seed, claimed, blamed)
+            return _judge(pool.contract, mutant, robot, proxy, efforts, seed, control)
         finally:
             pool.give(robot, proxy)
 
     return each_at_once(one, mutants, pool.size, tell)
 
 
-class _Blamed:
-    """What is said of the good robot itself: nothing can be shown by that."""
+class _Control:
+    """The A/A control: which requirements the good device itself does not pass. They can kill no mutant."""
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
@@ -96,11 +94,11 @@ class _Blamed:
         self._lock = threading.Lock()
 
     def known(self, effort: str) -> frozenset[str]:
-        """Requirements that are known to blame the good robot."""
-        return frozenset(id_ for id_, blames in self._known.get(effort, {}).items() if blames)
+        """Return the requirements that the good device is known not to pass."""
+        return frozenset(id_ for id_, refuted in self._known.get(effort, {}).items() if refuted)
 
     def without(self, caught: tuple[str, ...], robot: Robot, proxy: Proxy, effort: str) -> tuple[str, ...]:
-        """Those of some requirements that blame a mutant and do not blame the good robot, which is tried for each."""
+        """Return those of some requirements that the good device passes; it is judged by each once."""
         with self._lock:
             known = self._known.setdefault(effort, {})
             if new := tuple(id_ for id_ in caught if id_ not in known):
@@ -108,30 +106,30 @@ class _Blamed:
                 classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in new))
                 outcome = run_job(job_for(robot, proxy, effort, self._seed, classes=classes, requirements=new))
                 if outcome.exit_code < 0:
-                    # Nothing is known of the good robot, so nothing is shown of the mutant.
+                    # Nothing is known of the good device, so nothing is shown of the mutant.
                     return ()
                 known |= {id_: id_ in outcome.caught() for id_ in new}
         return tuple(id_ for id_ in caught if not known[id_])
 
 
 def _judge(
+    contract: Contract,
     mutant: GeneratedMutant,
     robot: Robot,
     proxy: Proxy,
     efforts: tuple[str, ...],
     seed: int,
-    claimed: tuple[str, ...],
-    blamed: _Blamed,
+    control: _Control,
 ) -> GeneratedResult:
     result = GeneratedResult(mutant)
     tally = Tally()
-    ledger = Contract.load().ledger
-    musts = frozenset(id_ for id_, requirement in ledger.items() if requirement.level is Level.MUST)
+    musts = frozenset(id_ for id_, requirement in contract.ledger.items() if requirement.level is Level.MUST)
     given_up = False
-    waiting = [(effort, attempt) for effort in efforts for attempt in _attempts(mutant, claimed)]
+    claimed = statement_of(job_for(robot, proxy, efforts[0], seed), contract).claimed(contract)
+    waiting = [(effort, attempt) for effort in efforts for attempt in _attempts(contract, mutant, claimed)]
     while waiting:
         effort, (classes, requirements) = waiting[0]
-        known = blamed.known(effort)
+        known = control.known(effort)
         proxy.change = mutant.make(tally)
         more = {"classes": classes, "requirements": requirements, "enough": musts - known}
         outcome = run_job(job_for(robot, proxy, effort, seed, **more))
@@ -142,10 +140,10 @@ def _judge(
         if proxy.broken:
             result.outcome, result.reason = BROKEN, proxy.broken[0]
             return result
-        if shown := blamed.without(outcome.caught(), robot, proxy, effort):
+        if shown := control.without(outcome.caught(), robot, proxy, effort):
             _note(result, outcome, shown)
             return result
-        # What ended the run blames the good robot as well, which is known by now: once more, to its end.
+        # The good device does not pass what ended the run, which is known by now: once more, to its end.
         if not (outcome.fails & musts) - known:
             waiting.pop(0)
     result.outcome = GIVEN_UP if given_up else SURVIVED if tally.altered else NOT_REACHED
@@ -153,21 +151,23 @@ def _judge(
 
 
 def _note(result: GeneratedResult, outcome: Outcome, by: tuple[str, ...]) -> None:
-    result.outcome, result.by = CAUGHT, by
+    result.outcome, result.by = KILLED, by
     result.fails = not outcome.fails.isdisjoint(by)
     result.reason = outcome.reasons.get(by[0], "")
 
 
-def _attempts(mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Attempt]:
-    """Classes and requirements to judge, one after the other: those about the operation, then whole classes."""
+def _attempts(contract: Contract, mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Attempt]:
+    """Yield classes and requirements to judge, one after the other: those about the operation, then whole classes."""
     classes = tuple(class_ for class_ in mutant.classes if class_ in claimed)
+    if not classes or classes[0] != mutant.classes[0]:
+        # The class that should see it is not judged: any other may.
+        classes = (*classes, *(class_ for class_ in claimed if class_ not in classes))
     words = {word.lower() for word in _WORD.findall(mutant.exchange.name)}
-    ids = Contract.load().ledger
-    first = tuple(id_ for id_ in ids if id_.split("/")[0] == classes[0]) if classes else ()
+    first = tuple(id_ for id_ in contract.ledger if id_.split("/")[0] == classes[0])
     near = tuple(id_ for id_ in first if id_.split("/")[1].split("-")[0] in words)
     types = tuple(id_ for id_ in near if id_.endswith("-type"))
     for requirements in dict.fromkeys((types, near)):
         if requirements and len(requirements) < len(first):
             yield classes[:1], requirements
     # What is watched over a whole run is in classes of its own, so that in the end all are judged at once.
-    yield from dict.fromkeys((tuple(classes[:number]), ()) for number in (1, len(classes)) if classes)
+    yield from dict.fromkeys((tuple(classes[:number]), ()) for number in (1, len(classes)))

@@ -1,4 +1,4 @@
-"""Robots that take what they should refuse: a field that is missing, misspelt, or next to strange ones."""
+"""Devices that take what they should refuse: a field that is missing or misspelt, or unknown fields beside it."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -6,7 +6,7 @@ from typing import Any
 
 from conformance.mutation.messages import Change, Forward, Request, Response
 from conformance.selftest.generated.mutant import GeneratedMutant, Tally
-from conformance.selftest.generated.places import ITEM, Place, places
+from conformance.selftest.generated.places import ITEM, Place
 
 _SUCCESS = range(200, 300)
 
@@ -43,16 +43,21 @@ def _rewritten(place: Place, edit: Callable[[dict[str, Any], str], bool]) -> Cal
     return make
 
 
-_DEFAULTS: dict[str, Any] = {"number": 0.0, "integer": 0, "string": "map"}
+_DEFAULTS: dict[str, Any] = {"number": 0.0, "integer": 0, "boolean": False}
 
 
-def of_lenience(place: Place) -> Iterator[GeneratedMutant]:
-    """A JSON field that a robot fills in where it is missing, takes without regard to case, or next to strange ones."""
+def of_lenience(place: Place, known: frozenset[str]) -> Iterator[GeneratedMutant]:
+    """Yield mutants that fill in a missing JSON field, take its name in any case, or drop unknown fields in it.
+
+    Args:
+        place: the field.
+        known: the names of the fields in it.
+    """
 
     def fill(item: dict[str, Any], name: str) -> bool:
         if name in item:
             return False
-        item[name] = _DEFAULTS[place.kind]
+        item[name] = _DEFAULTS.get(place.kind, place.example or "")
         return True
 
     def fold(item: dict[str, Any], name: str) -> bool:
@@ -71,25 +76,15 @@ def of_lenience(place: Place) -> Iterator[GeneratedMutant]:
             del inside[key]
         return bool(strange)
 
-    known = _members(place)
     edits = {"strip": strip} if place.kind == "object" else {"fill": fill, "fold": fold}
     if place.kind == "array" or not place.required or ITEM in place.steps:
         return
     for operator, edit in edits.items():
         yield GeneratedMutant(
             f"{operator}:{place.exchange.name}:{place.label}:json",
-            f"{place.exchange.name} takes a {place.label} that it should refuse ({operator}).",
+            f"{place.exchange.name} takes a {place.label} that it must refuse ({operator}).",
             operator,
             place.exchange,
             ("strict-input",),
             _rewritten(place, edit),
         )
-
-
-def _members(place: Place) -> frozenset[str]:
-    return frozenset(
-        other.steps[-1]
-        for other in places()
-        if (other.exchange, other.part, other.medium) == (place.exchange, place.part, place.medium)
-        and other.steps[:-1] == place.steps
-    )

@@ -177,8 +177,7 @@ def answers(exchange: Exchange, when: Callable[[Response], bool], edit: Callable
 
 
 def classes_of_answers(exchange: Exchange) -> tuple[str, ...]:
-    """Classes that can see an operation's answers as messages."""
+    """Return the classes that can see an operation's responses as messages, the likeliest first."""
     if exchange.side == "soap":
-        return (exchange.class_, "soap-basic-profile", "strict-input", "equivalence", "xml-security")
-    more = ("safety",) if "elocity" in exchange.name or "Goal" in exchange.name else ()
-    return (exchange.class_, "http", "rest-formats", "strict-input", "equivalence", *more)
+        return (*exchange.classes, "soap-basic-profile", "strict-input", "xml-security")
+    return (*exchange.classes, "http", "rest-formats", "strict-input")

@@ -11,7 +11,7 @@ from conformance.selftest.generated.slots import Edit, Slot, same
 
 _SCALE, _CLAMP = 1.5, 0.05
 _NUMERIC = frozenset({"number", "integer"})
-_SCALAR = _NUMERIC | {"string"}
+_SCALAR = _NUMERIC | {"string", "boolean"}
 _ALL = _SCALAR | {"object", "array"}
 
 

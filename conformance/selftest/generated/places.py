@@ -1,4 +1,4 @@
-"""Where a mutant can be: the fields of what is asked and answered, enumerated from the contract's files."""
+"""Where a mutant can be: the fields of requests and responses, enumerated from a contract pack's descriptions."""
 
 import re
 from collections.abc import Iterator
@@ -8,13 +8,17 @@ from typing import Any
 
 from lxml import etree
 
+from conformance.contract.generic import generic_classes
+from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
 from conformance.documents import wsdl
 from conformance.documents.json_schema import Schema, kind_of
-from conformance.documents.openapi import PARAMETER, Operation, operations_of
+from conformance.documents.openapi import PARAMETER, Body, Operation, is_json, is_xml, operations_of
+from conformance.documents.representation import flat
 from conformance.documents.xsd_shapes import Complex, Element
 from conformance.mutation.changes import soap
 from conformance.mutation.messages import Request
+from conformance.mutation.self_test import self_test_of
 
 ITEM = "[]"
 _NUMBERS = {"double", "float", "decimal"}
@@ -23,27 +27,32 @@ _INTEGERS = {"int", "unsignedInt", "integer", "long", "short"}
 
 @dataclass(frozen=True)
 class Exchange:
-    """One operation of the robot, over one interface.
+    """One operation of the device, over one interface.
 
     Attributes:
         name: operationId, or the name in the WSDL.
         side: "rest" or "soap".
         method: of HTTP.
-        path: matches its path, and names the parameters in it; empty for SOAP.
-        service: "publishers" or "subscribers" for SOAP, else empty.
-        class_: the conformance class that it belongs to.
+        path: matches its path, with a group for each parameter; empty for SOAP.
+        parameters: the names of the parameters in its path.
+        classes: the pack's conformance classes that can see a change in it, the one that it belongs to first.
         statuses: what the description declares.
-        formats: media types of a successful answer.
+        formats: media types of a successful response.
     """
 
     name: str
     side: str
     method: str
     path: str
-    service: str
-    class_: str
+    parameters: tuple[str, ...]
+    classes: tuple[str, ...]
     statuses: tuple[int, ...]
     formats: tuple[str, ...]
+
+    @property
+    def class_(self) -> str:
+        """The conformance class that it belongs to."""
+        return self.classes[0]
 
     def concerns(self, request: Request) -> bool:
         """Whether a request is for this operation."""
@@ -62,12 +71,13 @@ class Place:
 
     Attributes:
         exchange: the operation.
-        part: "answer" or "request".
+        part: "answer" (of a response) or "request".
         medium: how it is written: json, xml, soap, path or query.
         steps: names from the top, ``[]`` for the items of a list.
-        kind: number, integer, string, object or array.
+        kind: number, integer, boolean, string, object or array.
         siblings: names of the fields beside it that have the same kind, itself left out.
         required: whether it has to be there.
+        example: the description's example of it, or None.
     """
 
     exchange: Exchange
@@ -77,80 +87,120 @@ class Place:
     kind: str
     siblings: tuple[str, ...] = ()
     required: bool = True
+    example: str | float | bool | None = None
 
     @property
     def label(self) -> str:
-        """Its name in that of a mutant, as ``answer.pose.pose.position.x``."""
+        """Its name in that of a mutant, as ``answer.position.x``."""
         return ".".join((self.part, *self.steps)).replace("." + ITEM, ITEM)
 
 
+def classes_of(contract: Contract, operation: str, interface: Interface) -> tuple[str, ...]:
+    """Return the classes that can see a change in an operation, the one that it belongs to first.
+
+    A pack may say it (SelfTest.classes). Otherwise they are the classes of its own that judge the interface, and what
+    judges the description; for a pack without classes of its own, all that judge the interface.
+    """
+    if said := self_test_of(contract).classes_of(operation):
+        return said
+    there = [name for name, class_ in contract.classes.items() if interface in class_.interfaces]
+    own = [name for name in there if name not in generic_classes()]
+    return (*own, *(name for name in there if name == "describe")) if own else tuple(there) or tuple(contract.classes)
+
+
 @cache
-def exchanges() -> tuple[Exchange, ...]:
-    """Every operation of the contract, REST's first."""
-    contract = Contract.load()
-    found = [_rest(operation) for operation in operations_of(contract)]
-    for service, path in (("publishers", contract.publishers_path), ("subscribers", contract.subscribers_path)):
-        if path is not None:
-            class_ = "soap-delivery" if service == "publishers" else "soap-subscribers"
-            found += [
-                Exchange(operation.name, "soap", "POST", "", service, class_, (200,), ("text/xml",))
-                for operation in wsdl.read_file(path).operations
-            ]
+def exchanges(contract: Contract) -> tuple[Exchange, ...]:
+    """Return every operation of a contract, REST's first."""
+    found = [_rest(contract, operation) for operation in operations_of(contract)]
+    for interface, description in _services(contract):
+        for operation in description.operations:
+            classes = classes_of(contract, operation.name, interface)
+            found.append(Exchange(operation.name, "soap", "POST", "", (), classes, (200,), ("text/xml",)))
     return tuple(found)
 
 
-def _rest(operation: Operation) -> Exchange:
+def _services(contract: Contract) -> Iterator[tuple[Interface, wsdl.Description]]:
+    for interface, path in (
+        (Interface.PUBLISHERS, contract.publishers_path),
+        (Interface.SUBSCRIBERS, contract.subscribers_path),
+    ):
+        if path is not None:
+            yield interface, wsdl.read_file(path)
+
+
+def _rest(contract: Contract, operation: Operation) -> Exchange:
     parts = PARAMETER.split(operation.template)
-    pattern = "".join(re.escape(part) if i % 2 == 0 else f"(?P<{part}>[^/]*)" for i, part in enumerate(parts))
-    statuses = [200 if key == "2XX" else int(key) for key in operation.responses if key.isdigit() or key == "2XX"]
-    class_ = "rest-delivery" if "elivery" in operation.template and "app" in operation.template else "rest-resources"
+    pattern = "".join(re.escape(part) if i % 2 == 0 else "([^/]*)" for i, part in enumerate(parts))
+    statuses = [
+        status
+        for key in operation.responses
+        for status in ((200, 204) if key.upper() == "2XX" else (int(key),) if key.isdigit() else ())
+    ]
     return Exchange(
-        operation.id, "rest", operation.method, pattern, "", class_, tuple(statuses), tuple(operation.formats)
+        operation.id,
+        "rest",
+        operation.method,
+        pattern,
+        tuple(parts[1::2]),
+        classes_of(contract, operation.id, Interface.REST),
+        tuple(statuses),
+        tuple(operation.formats),
     )
 
 
 @cache
-def places() -> tuple[Place, ...]:
-    """Every field of every operation, in every form in which the contract has it."""
-    contract = Contract.load()
-    by_name = {exchange.name: exchange for exchange in exchanges()}
+def places(contract: Contract) -> tuple[Place, ...]:
+    """Return every field of every operation, in every form that the contract describes."""
+    by_name = {exchange.name: exchange for exchange in exchanges(contract)}
     found: list[Place] = []
     for operation in operations_of(contract):
         exchange = by_name[operation.id]
-        if operation.shape is not None:
-            found += _of_schema(exchange, "answer", "json", operation.shape)
-            found += _of_schema(exchange, "answer", "xml", operation.shape)
-        body = operation.bodies.get("application/json")
-        if body is not None:
-            found += _of_schema(exchange, "request", "json", body.schema)
-            found += _of_schema(exchange, "request", "xml", body.schema)
+        body = next((body for name, body in operation.bodies.items() if is_json(name)), None)
+        for medium, is_medium in (("json", is_json), ("xml", is_xml)):
+            if operation.shape is not None and any(map(is_medium, operation.formats)):
+                found += _of_schema(exchange, "answer", medium, operation.shape)
+        for medium, is_medium in (("json", is_json), ("xml", is_xml)):
+            if body is not None and any(map(is_medium, operation.bodies)):
+                found += _of_schema(exchange, "request", medium, body.schema, _example(body))
         for where in ("path", "query"):
-            group = operation.parameter(where)
-            for parameter in group:
-                kind = kind_of(parameter.schema)
-                beside = [item for item in group if item is not parameter and kind_of(item.schema) == kind]
-                names = tuple(item.name for item in beside)
-                found.append(Place(exchange, "request", where, (parameter.name,), kind, names, parameter.required))
-    for path in (contract.publishers_path, contract.subscribers_path):
-        if path is not None:
-            found += _of_wsdl(wsdl.read_file(path), by_name)
+            found += _of_parameters(exchange, operation, where)
+    for _, description in _services(contract):
+        found += _of_wsdl(description, by_name)
     return tuple(found)
 
 
-def _of_schema(exchange: Exchange, part: str, medium: str, schema: Schema) -> Iterator[Place]:
+def _example(body: Body) -> Any:
+    return next((example for example in body.examples if not isinstance(example, str)), None)
+
+
+def _of_parameters(exchange: Exchange, operation: Operation, where: str) -> Iterator[Place]:
+    group = operation.parameter(where)
+    for parameter in group:
+        kind = kind_of(parameter.schema)
+        beside = [item for item in group if item is not parameter and kind_of(item.schema) == kind]
+        names = tuple(item.name for item in beside)
+        yield Place(exchange, "request", where, (parameter.name,), kind, names, parameter.required)
+
+
+def _of_schema(exchange: Exchange, part: str, medium: str, schema: Schema, example: Any = None) -> Iterator[Place]:
     for steps, item, siblings, required in _walk(schema, ()):
-        yield Place(exchange, part, medium, steps, kind_of(item), siblings, required)
+        value = example
+        for step in steps:
+            value = value.get(step) if isinstance(value, dict) else None
+        known = value if isinstance(value, str | int | float) else None
+        yield Place(exchange, part, medium, steps, kind_of(item), siblings, required, known)
 
 
 def _walk(schema: Schema, steps: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Schema, tuple[str, ...], bool]]:
     """Steps, schema, siblings and whether it is required, for each field below a schema."""
-    properties: dict[str, Any] = schema.get("properties", {})
+    schema = flat(schema)
+    properties: dict[str, Schema] = {name: flat(item) for name, item in schema.get("properties", {}).items()}
     for name, item in properties.items():
         siblings = tuple(other for other in properties if other != name and kind_of(properties[other]) == kind_of(item))
         yield (*steps, name), item, siblings, name in schema.get("required", ())
         yield from _walk(item, (*steps, name))
     items = schema.get("items")
-    if isinstance(items, dict) and "properties" in items:
+    if isinstance(items, dict):
         yield from _walk(items, (*steps, ITEM))
 
 

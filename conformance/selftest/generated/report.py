@@ -1,20 +1,23 @@
-"""What is said of mutants by rule: for selftest.json, for people, and on the page on coverage."""
+"""What a self-test reports of mutants by rule: in selftest.json, for people, and on the page on coverage."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.selftest.generated.catalogue import every_change, generated_mutants
-from conformance.selftest.generated.judging import BROKEN, CAUGHT, GIVEN_UP, NOT_REACHED, SURVIVED, GeneratedResult
-from conformance.selftest.generated.open_places import RULES, reason_for
+from conformance.selftest.generated.judging import BROKEN, GIVEN_UP, KILLED, NOT_REACHED, SURVIVED, GeneratedResult
+from conformance.selftest.generated.open_places import open_place, open_places
 from conformance.selftest.generated.sampling import Rate, rate_of, rates_by
 
+# The result file's word for a mutant that was killed, as roaas-selftest/1 has it.
+_WRITTEN = {KILLED: "caught"}
 _KEYS = ("class", "operator", "effort")
 
 
 def _figures(rate: Rate) -> dict[str, Any]:
     return {
-        "caught": rate.caught,
+        "caught": rate.killed,
         "survived": rate.survived,
         "not_reached": rate.not_reached,
         "rate": round(rate.share, 4),
@@ -22,11 +25,11 @@ def _figures(rate: Rate) -> dict[str, Any]:
     }
 
 
-def document(results: Iterable[GeneratedResult], seed: int) -> dict[str, Any]:
-    """The part of selftest.json on mutants by rule; ``at_least`` is the lower end of Wilson's 95 % interval."""
+def document(contract: Contract, results: Iterable[GeneratedResult], seed: int) -> dict[str, Any]:
+    """Return the part of selftest.json on mutants by rule; ``at_least`` is the lower end of Wilson's 95 % interval."""
     results = list(results)
     return {
-        "exist": len(generated_mutants()),
+        "exist": len(generated_mutants(contract)),
         "seed": seed,
         "all": _figures(rate_of(results)),
         **{f"by_{key}": {name: _figures(rate) for name, rate in rates_by(results, key).items()} for key in _KEYS},
@@ -34,7 +37,7 @@ def document(results: Iterable[GeneratedResult], seed: int) -> dict[str, Any]:
             {
                 "name": result.mutant.name,
                 "says": result.mutant.says,
-                "outcome": result.outcome,
+                "outcome": _WRITTEN.get(result.outcome, result.outcome),
                 "by": list(result.by),
                 "not_conformant": result.fails,
                 "effort": result.effort,
@@ -48,11 +51,11 @@ def document(results: Iterable[GeneratedResult], seed: int) -> dict[str, Any]:
     }
 
 
-def summary(results: Iterable[GeneratedResult]) -> str:
-    """What a person wants to know: the rates, then every survivor."""
+def summary(contract: Contract, results: Iterable[GeneratedResult]) -> str:
+    """Return what a person wants to know: the rates, then every survivor."""
     results = list(results)
-    lines = [f"Faulty robots by rule: {rate_of(results).words()}; {len(generated_mutants())} exist"]
-    if warned := sum(result.outcome == CAUGHT and not result.fails for result in results):
+    lines = [f"Mutants by rule killed: {rate_of(results).words()}; {len(generated_mutants(contract))} exist"]
+    if warned := sum(result.outcome == KILLED and not result.fails for result in results):
         lines.append(f"{warned} of them by a SHOULD alone")
     for key in _KEYS:
         lines.append(f"by {key}:")
@@ -66,75 +69,77 @@ def summary(results: Iterable[GeneratedResult]) -> str:
 
 
 def rates_page(
-    results: Iterable[GeneratedResult], target: str, seed: int, theirs: Mapping[str, bool], notes: Iterable[str]
+    contract: Contract,
+    results: Iterable[GeneratedResult],
+    target: str,
+    seed: int,
+    theirs: Mapping[str, bool],
+    notes: Iterable[str],
 ) -> str:
-    """A page of the rates, for selftest.md and docs/caught.md.
+    """Return a page of the rates, for selftest.md and docs/caught.md.
 
     Args:
+        contract: the pack.
         results: of each mutant.
-        target: the good robot behind them.
+        target: the good device behind them.
         seed: of the sample.
-        theirs: whether plain Schemathesis caught it, by name, of those that it was tried on.
+        theirs: whether plain Schemathesis killed it, by name, of those that it was tried on.
         notes: remarks in the end.
     """
     results = list(results)
+    pack = "" if contract.name == DEFAULT_PACK else f" --contract {contract.name}"
     about = (
-        f"`roaas selftest --generated {len(results)} --seed {seed} --target {target}`: {len(results)} of the "
-        f"{len(generated_mutants())} changes by rule that a client could see. The sample takes each operator in each "
-        "class in turn, so that rare ones weigh as much as frequent ones. A change counts as caught when a requirement "
-        "says so that does not say it of the good robot; what altered nothing in any run does not count. Bounds are "
-        "the lower end of Wilson's 95 % interval."
+        f"`roaas selftest --generated {len(results)} --seed {seed} --target {target}{pack}`: {len(results)} of the "
+        f"{len(generated_mutants(contract))} mutants by rule. The sample takes each operator in each class in turn, so "
+        "that rare ones weigh as much as frequent ones. A mutant is killed when a requirement fails or warns of it and "
+        "passes the good device. A mutant that altered nothing in any run does not count. Bounds are the lower end of "
+        "Wilson's 95 % interval."
     )
-    lines = ["# Faulty robots by rule, and how many are caught", "", about, "", f"**{rate_of(results).words()}.**"]
+    lines = ["# Mutants by rule, and how many are killed", "", about, "", f"**{rate_of(results).words()}.**"]
     for key in _KEYS:
-        lines += ["", f"| {key} | caught | altered something | rate | at least |", "|---|---|---|---|---|"]
+        lines += ["", f"| {key} | killed | altered something | rate | at least |", "|---|---|---|---|---|"]
         lines += [
-            f"| `{name}` | {rate.caught} | {rate.reached} | {rate.share:.1%} | {rate.bound:.1%} |"
+            f"| `{name}` | {rate.killed} | {rate.reached} | {rate.share:.1%} | {rate.bound:.1%} |"
             for name, rate in rates_by(results, key).items()
         ]
     if theirs:
         both = [result for result in results if result.mutant.name in theirs and result.outcome != NOT_REACHED]
         ours, schemathesis = (
-            Rate(caught, len(both) - caught, 0)
-            for caught in (
-                sum(result.outcome == CAUGHT for result in both),
+            Rate(killed, len(both) - killed, 0)
+            for killed in (
+                sum(result.outcome == KILLED for result in both),
                 sum(theirs[result.mutant.name] for result in both),
             )
         )
         lines += ["", "Of those over REST that plain Schemathesis was tried on as well:", ""]
         lines += [f"- this suite: {ours.words()}", f"- plain Schemathesis: {schemathesis.words()}"]
-    lines += ["", "| not caught | what it does | outcome | how often |", "|---|---|---|---|"]
+    lines += ["", "| not killed | what it does | outcome | how often |", "|---|---|---|---|"]
     lines += [
         f"| `{_cell(result.mutant.name)}` | {_cell(result.mutant.says)} | {result.outcome} | {result.altered} |"
         for result in results
-        if result.outcome not in {CAUGHT, NOT_REACHED}
+        if result.outcome not in {KILLED, NOT_REACHED}
     ]
     return "\n".join([*lines, *(f"\n{note}" for note in notes)]) + "\n"
 
 
-def page_part() -> list[str]:
-    """Lines of the page on coverage: how many there are, and what the rules make that breaks no clause."""
-    mutants = generated_mutants()
+def page_part(contract: Contract) -> list[str]:
+    """Return lines of the page on coverage: how many there are, and what the rules make that breaks no clause."""
+    mutants = generated_mutants(contract)
     operators = Counter(mutant.operator.partition("@")[0] for mutant in mutants)
-    left = Counter(reason_for(change.name) for change in every_change())
+    left = Counter(open_place(contract, change) for change in every_change(contract))
+    covering = [place for place in open_places(contract) if left[place]]
     listed = ", ".join(f"`{name}` {number}" for name, number in sorted(operators.items()))
     about = (
-        f"{len(mutants)} changes by rule, at every field, status, header and operation of the contract's files; "
+        f"{len(mutants)} mutants by rule, at every field, status, header and operation of the pack's descriptions; "
         "`roaas selftest --generated N --seed S` judges a sample, with `--list` it shows them. "
         f"By operator: {listed}."
     )
-    return [
-        "",
-        "## Faulty robots by rule",
-        "",
-        about,
-        "",
-        "These changes the rules make as well; they break no clause, and are not judged:",
-        "",
-        "| changes (regular expression) | number | why they break no clause |",
-        "|---|---|---|",
-        *(f"| `{_cell(rule.pattern)}` | {left[rule.reason]} | {_cell(rule.reason)} |" for rule in RULES),
-    ]
+    lines = ["", "## Mutants by rule", "", about]
+    if covering:
+        lines += ["", "The rules also make these changes, which break no clause and are not judged:", ""]
+        lines += ["| changes (regular expression) | number | why they break no clause |", "|---|---|---|"]
+        lines += [f"| `{_cell(place.pattern)}` | {left[place]} | {_cell(place.reason)} |" for place in covering]
+    return lines
 
 
 def _cell(text: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from conformance.selftest.generated.judging import CAUGHT, NOT_REACHED, SURVIVED, GeneratedResult
+from conformance.selftest.generated.judging import KILLED, NOT_REACHED, SURVIVED, GeneratedResult
 from conformance.selftest.generated.mutant import GeneratedMutant
 
 # Of the normal distribution, for 95 %.
@@ -15,7 +15,7 @@ _Z: Final = 1.959964
 
 
 def sample(mutants: Iterable[GeneratedMutant], number: int, seed: int) -> list[GeneratedMutant]:
-    """``number`` mutants (all, if there are no more), one of each stratum (operator, class) in turn.
+    """Return ``number`` mutants (all, if there are no more), one of each stratum (operator, class) in turn.
 
     The strata are dealt out in random order, so that a small sample leaves out others with each seed.
     """
@@ -36,25 +36,25 @@ def sample(mutants: Iterable[GeneratedMutant], number: int, seed: int) -> list[G
 
 @dataclass(frozen=True)
 class Rate:
-    """How many of those that altered something were caught.
+    """How many of the mutants that altered something were killed.
 
     Attributes:
-        caught: how many; survived: how many were not; not_reached: how many altered nothing, and do not count.
+        killed: how many; survived: how many were not; not_reached: how many altered nothing, and do not count.
     """
 
-    caught: int
+    killed: int
     survived: int
     not_reached: int
 
     @property
     def share(self) -> float:
-        """Caught of those that altered something; 1 where none did."""
-        return self.caught / self.reached if self.reached else 1.0
+        """Killed of those that altered something; 1 where none did."""
+        return self.killed / self.reached if self.reached else 1.0
 
     @property
     def reached(self) -> int:
         """How many altered something."""
-        return self.caught + self.survived
+        return self.killed + self.survived
 
     @property
     def bound(self) -> float:
@@ -67,22 +67,21 @@ class Rate:
 
     def words(self) -> str:
         """For people."""
-        reached = f"{self.caught} of {self.reached} ({self.share:.1%}, at least {self.bound:.1%})"
+        reached = f"{self.killed} of {self.reached} ({self.share:.1%}, at least {self.bound:.1%})"
         return f"{reached}, {self.not_reached} not reached" if self.not_reached else reached
 
 
 def rate_of(results: Iterable[GeneratedResult]) -> Rate:
-    """The rate of some results."""
+    """Return the rate of some results."""
     outcomes = [result.outcome for result in results]
-    return Rate(outcomes.count(CAUGHT), outcomes.count(SURVIVED), outcomes.count(NOT_REACHED))
+    return Rate(outcomes.count(KILLED), outcomes.count(SURVIVED), outcomes.count(NOT_REACHED))
 
 
 def rates_by(results: Iterable[GeneratedResult], key: str) -> dict[str, Rate]:
-    """Rates by ``operator`` (with its mode), ``class`` or ``effort`` (of those caught at it, or never)."""
+    """Return rates by ``operator`` (with its mode), ``class`` or ``effort`` (of the last run)."""
     groups: dict[str, list[GeneratedResult]] = defaultdict(list)
     for result in results:
-        name = {"operator": result.mutant.operator, "class": result.mutant.exchange.class_, "effort": result.effort}[
-            key
-        ]
-        groups[name].append(result)
+        mutant = result.mutant
+        names = {"operator": mutant.operator, "class": mutant.exchange.class_, "effort": result.effort}
+        groups[names[key]].append(result)
     return {name: rate_of(group) for name, group in sorted(groups.items())}

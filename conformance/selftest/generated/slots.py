@@ -285,12 +285,13 @@ def _in_target(place: Place, request: Request, edit: Edit) -> bool:
     found = re.fullmatch(place.exchange.path, request.path)
     if found is None:
         return False
-    parameters = {key: unquote(item) for key, item in found.groupdict().items()}
+    names = place.exchange.parameters
+    parameters = {key: unquote(item) for key, item in zip(names, found.groups(), strict=True)}
     if not edit([TextSlot(parameters, name, place.kind)]):
         return False
     path = request.path
-    for key in reversed(list(found.groupdict())):
-        start, end = found.span(key)
+    for number, key in reversed(list(enumerate(names, start=1))):
+        start, end = found.span(number)
         path = path[:start] + quote(parameters[key], safe="+-.,") + path[end:]
     request.target = path + (f"?{request.query}" if request.query else "")
     return True

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from conformance.mutation.programs import built, program
 from conformance.selftest.robots import Robot, RobotError
-from conformance.selftest.servers.programs import built, program
 
 _HERE = Path(__file__).parent
 _START_S, _STOP_S = 20.0, 10.0
@@ -27,8 +27,9 @@ class Ports:
     robot: Robot
 
     def values(self, folder: Path) -> dict[str, str]:
-        """What the configurations name with a dollar sign."""
-        rest, soap = (urlsplit(url).netloc for url in (self.robot.rest, self.robot.soap))
+        """Return what the configurations name with a dollar sign; a device without SOAP has REST on both ports."""
+        wsdl = self.robot.publishers or self.robot.subscribers
+        rest, soap = (urlsplit(url).netloc for url in (self.robot.rest, wsdl or self.robot.rest))
         return {
             "rest": str(self.rest),
             "soap": str(self.soap),
@@ -48,13 +49,11 @@ class Front:
         name: its name; says: what it is, in a few words.
         command: makes what starts it in the foreground, from the ports and a folder that is its own; raises
             NotInstalledError where it is not there.
-        robot: the good robot behind it.
     """
 
     name: str
     says: str
     command: Callable[[Ports, Path], list[str]]
-    robot: str = "reference"
 
 
 def _nginx(ports: Ports, folder: Path) -> list[str]:
@@ -89,13 +88,13 @@ FRONTS = (
     Front("haproxy", "behind haproxy", _haproxy),
     Front("apache", "behind Apache httpd", _apache),
     Front("go-reverse-proxy", "behind Go's httputil.ReverseProxy", _go),
-    Front("nginx-http10", "HTTP/1.0 behind nginx", _nginx, robot="plain"),
+    Front("nginx-http10", "HTTP/1.0 behind nginx", _nginx),
 )
 
 
 @contextlib.contextmanager
 def behind(front: Front, robot: Robot) -> Iterator[Robot]:
-    """A front before a robot: yields the robot as clients see it then.
+    """Put a web server before a robot; yield the robot as clients reach it then.
 
     Raises:
         NotInstalledError: the server is not there.
@@ -113,8 +112,11 @@ def behind(front: Front, robot: Robot) -> Iterator[Robot]:
         try:
             for port in (ports.rest, ports.soap):
                 _await(port, process, front.name, log)
-            soap = urlsplit(robot.soap)._replace(netloc=f"127.0.0.1:{ports.soap}").geturl()
-            yield replace(robot, rest=f"http://127.0.0.1:{ports.rest}", soap=soap)
+            publishers, subscribers = (
+                url and urlsplit(url)._replace(netloc=f"127.0.0.1:{ports.soap}").geturl()
+                for url in (robot.publishers, robot.subscribers)
+            )
+            yield replace(robot, rest=f"http://127.0.0.1:{ports.rest}", publishers=publishers, subscribers=subscribers)
         finally:
             process.terminate()
             try:
