@@ -136,3 +136,11 @@ def test_a_fleet_is_judged_by_the_pack(tmp_path):
         )
     assert done.exit_code == 0, done.output
     assert json.loads((out / "fleet.json").read_text(encoding="utf-8"))["class_titles"]["lamp"].startswith("The lamp")
+
+
+def test_mutants_by_rule_are_made_for_the_pack(tmp_path):
+    out = tmp_path / "selftest"
+    command = ["selftest", "--contract", LAMP, "--generated", "4", "--seed", "77", "--parallel", "1", "--out", out]
+    done = roaas(*command)
+    assert done.exit_code in {0, 1}, done.output
+    assert re.search(r"Mutants by rule killed: [1-4] of [1-4]", done.output), done.output

@@ -1,0 +1,9 @@
+"""How the self-test starts the lamp."""
+
+import sys
+from pathlib import Path
+
+from conformance.mutation.self_test import GoodDevice, SelfTest
+
+LAMP = GoodDevice("lamp", lambda _: [sys.executable, str(Path(__file__).with_name("lamp.py")), "0"])
+SELFTEST = SelfTest(devices=(LAMP,))
