@@ -36,13 +36,13 @@ _SUMMARIES = {
     "load": "Measure SOAP against REST.",
     "replay": "Send a finding's requests again, and say whether it is still there.",
     "report": "Write the pages from the result files again.",
-    "compare": "Say whether a robot got slower between two load tests.",
-    "diff": "Tell what changed between two results: new failures, fixed, lost coverage.",
+    "compare": "Show whether a robot got slower between two load tests.",
+    "diff": "Show what changed between two results: new failures, fixed, lost coverage.",
     "keygen": "Make a key pair for signing results.",
-    "sign": "Sign a result, so that others can check whose it is.",
-    "verify": "Say what a signed certificate proves, and whether it is enough.",
-    "registry": "Make a static site of signed certificates: who passed what.",
-    "selftest": "Show that the suite kills mutants and has no false positives on good devices.",
+    "sign": "Sign a result, so that others can check who vouches for it.",
+    "verify": "Check a signed certificate, and whether it meets your policy.",
+    "registry": "Make a static site from signed certificates: which robot passed which classes.",
+    "selftest": "Test the suite: it must kill mutants, and must not fail a good device.",
     "contract": "Show the requirements, export the contract's files.",
 }
 _EXTRAS = {"robot": "robot", "load": "load"}
@@ -133,9 +133,12 @@ class FrontDoor:
             click.echo(f"no history: {error}", err=True)
 
     @staticmethod
-    def known() -> dict[str, Any]:
-        """What the installed suite knows: its digest, the requirement sets, the profiles."""
-        known: dict[str, Any] = import_module("conformance.engine.suite").known()
+    def known(pack: str | None) -> dict[str, Any]:
+        """Return what the installed suite knows of a contract pack: digest, requirement sets, profiles."""
+        try:
+            known: dict[str, Any] = import_module("conformance.engine.suite").known(pack)
+        except import_module("conformance.contract.locating").ContractError as error:
+            raise click.UsageError(str(error)) from error
         return known
 
 

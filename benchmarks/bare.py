@@ -1,9 +1,10 @@
 """The yardstick: a bare uvicorn ASGI application that answers fixed bytes.
 
 ``python bare.py ANSWERS.json`` serves ``{"/path": {"status": …, "headers": [[name, value], …], "body": …}, …}`` and
-prints its port.
+prints its port. With ``--count`` it prints in the end how many requests it answered.
 """
 
+import contextlib
 import json
 import socket
 import sys
@@ -35,12 +36,27 @@ def application(answers: dict[str, Any]) -> Any:
     return bare
 
 
-def main(path: str) -> None:
+class Counting:
+    """An application that counts its requests."""
+
+    def __init__(self, inner: Any) -> None:
+        self.inner, self.count = inner, 0
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Count a request and answer it."""
+        self.count += 1
+        await self.inner(scope, receive, send)
+
+
+def main(path: str, *options: str) -> None:
     """Serve until killed."""
+    serving = application(json.loads(Path(path).read_text()))
+    if options:
+        serving = Counting(serving)
     listener = socket.create_server(("127.0.0.1", 0))
     print(listener.getsockname()[1], flush=True)
     config = uvicorn.Config(
-        application(json.loads(Path(path).read_text())),
+        serving,
         loop="uvloop",
         http="httptools",
         ws="none",
@@ -50,8 +66,11 @@ def main(path: str) -> None:
         log_config=None,
         server_header=False,
     )
-    uvicorn.Server(config).run(sockets=[listener])
+    with contextlib.suppress(KeyboardInterrupt):
+        uvicorn.Server(config).run(sockets=[listener])
+    if options:
+        print(serving.count, flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

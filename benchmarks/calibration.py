@@ -1,37 +1,33 @@
-"""How often `roaas load` claims a difference where there is none, and finds one where there is: calibration and power.
+"""How often `roaas load` claims a difference where there is none, and finds one where there is one.
 
-`python benchmarks/calibration.py` prints the table of docs/load.md, `--quick` a rougher one. Most runs are made: the
-schedule of a real plan, with service times that are log-normal about a level which wanders as a first-order
-autoregressive series (lag-1 autocorrelation of the per-second medians about 0.6, as was measured on a shared machine),
-go through the real recorder and the real statistics. Some are real: `roaas load` over HTTP against `noisy_robot.py`.
+`python benchmarks/calibration.py` prints the table of docs/load.md, `--quick` a rougher one. Most runs are artificial:
+the schedule of a real plan goes through the real recorder and the real statistics, with service times that are
+log-normal around a drifting level. The level is a first-order autoregressive series (lag-1 autocorrelation of the
+per-second medians about 0.6, as measured on a shared machine). Some runs are real: `roaas load` over HTTP against
+`noisy_robot.py`.
 """
 
 import argparse
-import json
 import math
 import multiprocessing
 import os
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from pathlib import Path
-from typing import Any
 
 import numpy as np
+from programs import HERE, machine, median_of, roaas_load, started
 from scipy import signal, stats
 
+from conformance.packs.table1.files import CONTRACT_DIR
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import SHORT_BLOCK_S, Load, Plan
 from loadtests.statistics.between_runs import IDLE_MACHINE
-from loadtests.statistics.figures import comparison, noise
+from loadtests.statistics.comparisons import aa_interval, comparison
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
 
-_HERE = Path(__file__).parent
-_CONTRACT = _HERE.parent / "conformance" / "contract"
 RATE, LEVEL_NS, FAST, DRIFT, MEMORY_S = 200.0, 2_000_000, 0.2, 0.1, 2.0
 _STEP_S = 0.01
 SHIFT = 1.05
@@ -41,7 +37,7 @@ CLAIMS = frozenset({"differs", "bounded"})
 
 
 def made_run(seed: int, seconds: float, shift: float) -> Measured:
-    """A run of which only the robot's times are made; SOAP's are `shift` times REST's."""
+    """Return a run in which only the robot's times are artificial; SOAP's are `shift` times REST's."""
     load = Load(RATE, None, seconds, 0.0, "constant", seed)
     plan = Plan(("pose",), ("rest", "soap"), ("wire",), load, 10.0, 1, 32, least_block_s=SHORT_BLOCK_S)
     schedule, recorder = Schedule(plan, 0, 1), Recorder(plan.series_of())
@@ -59,39 +55,28 @@ def made_run(seed: int, seconds: float, shift: float) -> Measured:
 
 
 def judged(run: tuple[int, float, float, str]) -> tuple[str, bool, bool]:
-    """Of a made run: the judgement, and whether the intervals of the duel and of A/A leave the truth out."""
+    """Return the judgement of an artificial run, and whether the intervals of duel and A/A control miss the truth."""
     seed, seconds, shift, quantile = run
     measured = made_run(seed, seconds, shift)
-    floor = noise(measured, "pose", quantile)
-    entry = comparison(measured, "pose", "wire", quantile, floor, IDLE_MACHINE)
-    low, high = entry["ci95"]
-    return entry["judgement"], not low <= shift <= high, floor is None or not floor[0] <= 1 <= floor[1]
+    control = aa_interval(measured, "pose", quantile)
+    entry = comparison(measured, "pose", "wire", quantile, control, IDLE_MACHINE)
+    low, high = entry.ci95
+    return entry.judgement, not low <= shift <= high, control is None or not control[0] <= 1 <= control[1]
 
 
 def real_run(seed: int, seconds: float, shift: float) -> str:
-    """The judgement of `roaas load` on a robot whose noise is made; what it found goes to stderr."""
-    robot = subprocess.Popen(
-        [sys.executable, _HERE / "noisy_robot.py", str(seed), str(shift)], stdout=subprocess.PIPE, text=True
-    )
-    try:
-        url = f"http://127.0.0.1:{robot.stdout.readline().strip()}" if robot.stdout else ""
-        wsdl = ["--subscribers-wsdl", _CONTRACT / "subscribers.wsdl", "--subscribers-endpoint", f"{url}/subscribers"]
-        with tempfile.TemporaryDirectory() as folder:
-            command = [sys.executable, "-c", "from loadtests.cli import load; load()", "--rest", url, *wsdl]
-            times = ["--client", "wire", "--duration", f"{seconds:g}", "--seed", str(seed), "--out", folder]
-            subprocess.run([*command, *times], check=False, capture_output=True, timeout=seconds + 120)
-            found: dict[str, Any] = json.loads((Path(folder) / "latency.json").read_text())
-    finally:
-        robot.kill()
-        robot.wait()
-    median = next(entry for entry in found["comparisons"] if entry["quantile"] == "p50")
-    told = (median[key] for key in ("ratio", "ci95", "noise_ci95", "judgement"))
+    """Return the judgement of `roaas load` on a robot with artificial noise; print what it found to stderr."""
+    with started(sys.executable, HERE / "noisy_robot.py", seed, shift) as (_, port):
+        url = f"http://127.0.0.1:{port}"
+        wsdl = ["--subscribers-wsdl", CONTRACT_DIR / "subscribers.wsdl", "--subscribers-endpoint", f"{url}/subscribers"]
+        found = median_of(roaas_load("--rest", url, *wsdl, "--duration", f"{seconds:g}", "--seed", seed))
+    told = (found[key] for key in ("ratio", "ci95", "noise_ci95", "judgement"))
     print(f"seed {seed}, {seconds:g} s, {shift:g} planted:", *told, file=sys.stderr, flush=True)
-    return str(median["judgement"])
+    return str(found["judgement"])
 
 
 def share(number: int, runs: int) -> str:
-    """A share with the 95 % interval of its own."""
+    """Return a share with its own 95 % interval."""
     low, high = stats.binomtest(number, runs).proportion_ci(method="wilson")
     return f"{number} of {runs} = {number / runs:.1%} ({low:.1%} to {high:.1%})"
 
@@ -103,7 +88,7 @@ def row(words: str, cell: str, aim: str, *, met: bool) -> bool:
 
 
 def made_rows(pool: ProcessPoolExecutor, runs: int) -> list[bool]:
-    """The rows of what is made."""
+    """Print the rows of artificial runs."""
     met = []
     for quantile, seconds in (("p50", 20.0), ("p99", 60.0)):
         found = list(pool.map(judged, [(seed, seconds, 1.0, quantile) for seed in range(runs)]))
@@ -126,7 +111,7 @@ def _few(number: int, runs: int) -> bool:
 
 
 def real_rows(same: int, planted: int) -> list[bool]:
-    """The rows of what is real, a run for each processor at a time: robot and generator sleep most of theirs.
+    """Print the rows of real runs, one for each processor at a time: robot and generator mostly sleep.
 
     So few runs show that the made ones are no fiction, and no more.
     """
@@ -161,7 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             met += made_rows(pool, runs)
     if options.only != "made":
         met += real_rows(real, real)
-    print(f"\n{time.monotonic() - began:.0f} s, {os.cpu_count()} processors, load average {os.getloadavg()[0]:.1f}")
+    print(f"\n{time.monotonic() - began:.0f} s, {machine()}")
     return 0 if all(met) else 1
 
 

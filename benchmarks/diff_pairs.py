@@ -1,10 +1,10 @@
-"""Whether `roaas diff` is right on pairs of a good robot and a faulty one (a mutant), there and back.
+"""Whether `roaas diff` is right on pairs of a good robot and a faulty one (a mutant), in both directions.
 
-``python benchmarks/diff_pairs.py --pairs 100`` takes mutants in turn from all classes, judges each and the good robot
-behind the same proxy on the mutant's classes, and asks `roaas diff`. What broke is known: the requirements that
-the mutant is made to break, and whatever else has another verdict in the two result files, which is worked out here
-from the files alone. Each pair must name exactly those as new failures (or new warnings), exit with 1 where one is a
-MUST, and in reverse name exactly those as fixed and exit with 0. Ends with exit code 1 if a pair is wrong.
+``python benchmarks/diff_pairs.py --pairs 100`` takes mutants from all classes in turn. It judges each of them, and the
+good robot behind the same proxy, on the mutant's classes, and runs `roaas diff` on the two results. It is known what
+broke: the requirements that the mutant is made to break, and any other whose verdict differs between the two result
+files. `roaas diff` must name exactly those as new failures (or new warnings), and exit with 1 where one is a
+MUST; in reverse it must name exactly those as fixed, and exit with 0. The exit code is 1 if a pair is wrong.
 """
 
 import argparse
@@ -44,7 +44,7 @@ _BROKEN = ("fail", "warn")
 
 @dataclass(frozen=True)
 class Answer:
-    """What `roaas diff` said: its exit code, and under each heading the requirements that it names."""
+    """What `roaas diff` printed: its exit code, and the requirements under each heading."""
 
     exit_code: int
     named: dict[str, set[str]]
@@ -82,7 +82,7 @@ def main() -> int:
 
 
 def _sample(pattern: str, seed: int) -> list[Mutant]:
-    """Mutants that need no ROS, from all classes in turn."""
+    """Return mutants that need no ROS, from all classes in turn."""
     by_class: dict[str, list[Mutant]] = defaultdict(list)
     for mutant in MUTANTS:
         if not mutant.probe and fnmatch.fnmatch(mutant.name, pattern):
@@ -96,7 +96,7 @@ def _sample(pattern: str, seed: int) -> list[Mutant]:
 
 @dataclass(frozen=True)
 class Pair:
-    """What came of a pair.
+    """The outcome of a pair.
 
     Attributes:
         problems: what is wrong with the differences.
@@ -111,7 +111,7 @@ class Pair:
 
     @property
     def told(self) -> str:
-        """In a line."""
+        """Return the outcome as one line."""
         if self.none:
             return f"no pair: {self.none}"
         others = f" (the fault breaks {', '.join(sorted(self.others))} as well)" if self.others else ""
@@ -174,7 +174,7 @@ def _compare(mutant: Mutant, good: Path, faulty: Path) -> Pair:
 
 
 def _wrong(answer: Answer, old: dict[str, str], new: dict[str, str]) -> list[str]:
-    """What an answer should say and does not, by the two files' verdicts."""
+    """Return what an answer should say by the two files' verdicts, and does not."""
     wanted = {
         _FAILURES: {id_ for id_ in new if new[id_] == "fail" and old[id_] not in _BROKEN},
         _WARNINGS: {id_ for id_ in new if new[id_] == "warn" and old[id_] not in _BROKEN},

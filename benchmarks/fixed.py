@@ -1,4 +1,4 @@
-"""The yardsticks: servers that give the robot's answers as fixed octets, and do nothing for them."""
+"""The baselines: servers that give the robot's responses as fixed bytes, without any work."""
 
 import http.client
 import json
@@ -10,10 +10,11 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from loader import Call
+from programs import HERE, started
 
 _START = 10.0  # seconds
 _NO_CONTENT = 204
@@ -41,7 +42,7 @@ http {{
 
 @dataclass(frozen=True)
 class Answer:
-    """A response as it came from the robot, but for its Date, which each server adds by itself."""
+    """A response without its Date, which each server adds by itself."""
 
     target: str
     status: int
@@ -50,7 +51,7 @@ class Answer:
 
 
 def answers_to(calls: list[Call]) -> list[Answer]:
-    """Ask the robot once for each call."""
+    """Return the robot's response to each call."""
     answers = []
     for call in calls:
         connection = http.client.HTTPConnection(call.host, call.port)
@@ -62,28 +63,24 @@ def answers_to(calls: list[Call]) -> list[Answer]:
     return answers
 
 
+#: A pose, for the bare application alone.
+_POSE = json.dumps({"pose": {"pose": {"position": {"x": 1.0, "y": 2.0, "z": 0.0}}}, "covariance": [0.0] * 36})
+POSE = Answer("/robot/pose/", 200, [("content-type", "application/json"), ("content-length", str(len(_POSE)))], _POSE)
+
+
 @contextmanager
-def running_bare(calls: list[Call]) -> Iterator[tuple[int, int]]:
-    """Run a bare uvicorn application with the robot's answers to some calls; yields its port and process."""
-    told = {
-        answer.target: {"status": answer.status, "headers": answer.headers, "body": answer.body}
-        for answer in answers_to(calls)
-    }
+def running_bare(answers: list[Answer], *options: str) -> Iterator[tuple[int, subprocess.Popen[str]]]:
+    """Run a bare uvicorn application with fixed answers; yields its port and process."""
     with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
-        file.write(json.dumps(told))
+        file.write(json.dumps({answer.target: asdict(answer) for answer in answers}))
         file.flush()
-        command = [sys.executable, str(Path(__file__).with_name("bare.py")), file.name]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-            try:
-                assert process.stdout is not None  # noqa: S101 - tells mypy what PIPE means
-                yield int(process.stdout.readline()), process.pid
-            finally:
-                process.terminate()
+        with started(sys.executable, HERE / "bare.py", file.name, *options) as (process, port):
+            yield int(port), process
 
 
 @contextmanager
-def running_nginx(calls: list[Call]) -> Iterator[int | None]:
-    """Run nginx with answers of the robot's status and length; yields its port, or None where there is no nginx."""
+def running_nginx(answers: list[Answer]) -> Iterator[int | None]:
+    """Run nginx with responses of the same status and length; yields its port, or None without nginx."""
     program = shutil.which("nginx")
     if program is None:
         yield None
@@ -93,7 +90,7 @@ def running_nginx(calls: list[Call]) -> Iterator[int | None]:
     locations = "\n".join(
         f"location = {answer.target} {{ return {answer.status}"
         + ("; }" if answer.status == _NO_CONTENT else f" '{'x' * len(answer.body)}'; }}")
-        for answer in answers_to(calls)
+        for answer in answers
     )
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "conf").write_text(_NGINX.format(folder=folder, port=port, locations=locations))

@@ -1,11 +1,11 @@
-"""How long a fleet of 20 robots takes beside its slowest member, and that each has the end that it should have.
+"""How long a fleet of 20 robots takes beside its slowest member, and whether each has the right outcome.
 
-``python benchmarks/fleet.py --parallel 4`` starts 4 reference robots, each on a ROS domain of its own, 8 independent
-ones, 6 faulty ones (mutants before independent robots), one that takes connections and never answers, and one that is
-down; and judges them by `roaas certify --fleet`. It prints what each took, the whole, the slowest, what all together
-took over how many ran at once (no schedule is faster than either), and the processor time of the runs. Ends with exit
-code 1 where a good robot does not conform, a faulty one does, or one without an answer has another end than not reached
-or given up. What is not installed here (Node, Go) is left out and named.
+``python benchmarks/fleet.py --parallel 4`` starts 4 reference robots, each on its own ROS domain, 8 independent ones, 6
+faulty ones (mutants before independent robots), one that accepts connections and never responds, and one that is down.
+``roaas certify --fleet`` judges them. The benchmark prints each robot's time, the total, the slowest, the sum divided
+by the number at once (no schedule is faster than either), and the processor time of the runs. The exit code is 1 where
+a good robot does not pass, a faulty one does, or one without a response is neither unreachable nor given up. Robots
+whose language (Node, Go) is not installed are left out and named.
 """
 
 import argparse
@@ -44,7 +44,7 @@ _GOOD, _FAULTY, _ABSENT = ({"conformant"}, {"not-conformant"}, {"unreachable", "
 
 @dataclass(frozen=True)
 class Entry:
-    """A robot of the fleet: its table in the file, and the ends that are right."""
+    """A robot of the fleet: its table in the file, and its right outcomes."""
 
     table: str
     right: set[str]
@@ -92,7 +92,7 @@ def _tell(
 
 
 def _fleet(stack: ExitStack, folder: Path) -> Iterator[tuple[str, Entry]]:
-    """Start the robots; each with its name."""
+    """Start the robots; yields each with its name."""
     for number in range(REFERENCES):
         robot = stack.enter_context(running(Contract.load(), REFERENCE, FIRST_DOMAIN + number))
         yield _entry(folder, f"reference-{number + 1}", robot, _GOOD)
@@ -118,7 +118,7 @@ def _fleet(stack: ExitStack, folder: Path) -> Iterator[tuple[str, Entry]]:
 
 
 def _entry(folder: Path, name: str, robot: Robot, right: set[str]) -> tuple[str, Entry]:
-    """A robot with a statement of its own: its kind's, with its addresses."""
+    """Return a robot with a statement of its own: its kind's, with its addresses."""
     endpoints = f'\n[endpoints]\nrest = "{robot.rest}"\n'
     wsdls = {"publishers_wsdl": robot.publishers, "subscribers_wsdl": robot.subscribers}
     endpoints += "".join(f'{key} = "{url}"\n' for key, url in wsdls.items() if url)
@@ -130,7 +130,7 @@ def _entry(folder: Path, name: str, robot: Robot, right: set[str]) -> tuple[str,
 
 @contextmanager
 def _never_answering() -> Iterator[str]:
-    """A server that takes connections and says nothing."""
+    """Run a server that accepts connections and never responds; yields its URL."""
     server = socket.create_server(("127.0.0.1", 0))
     taken: list[socket.socket] = []
 
@@ -149,7 +149,7 @@ def _never_answering() -> Iterator[str]:
 
 
 def _child_cpu_s() -> float:
-    """Processor time of the processes that have been waited for, and of theirs."""
+    """Return the processor time of child processes that have ended, and of their children."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 

@@ -1,15 +1,14 @@
-"""The load generator beside its yardsticks, on this machine, in one run: `python benchmarks/generator.py`.
+"""The load generator compared with other tools, on this machine, in one run: `python benchmarks/generator.py`.
 
-Prints ratios and whether each target is met. Against the same bare server: the wire client beside wrk at one
-connection, the open model's rate and scheduling lag, the closed model beside Locust's FastHttpUser. Without a server:
-the recorder's cost and memory over ten million requests, and merging the histograms of a hundred workers.
+It prints ratios and whether each target is met. Against the same bare server: the wire client and wrk on one
+connection, the open model's rate and scheduling lag, the closed model and Locust's FastHttpUser. Without a server: the
+recorder's cost and memory over ten million requests, and merging the histograms of a hundred workers.
 
-Measurements that are compared take turns, and the medians of the rounds are printed: on a machine that others use
-too, single figures say little.
+Measurements that are compared take turns, and the medians of the rounds are printed: on a shared machine single figures
+say little.
 """
 
 import argparse
-import json
 import math
 import os
 import re
@@ -18,21 +17,19 @@ import shutil
 import statistics
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fixed import POSE, running_bare
+from loader import Call, load
+from programs import machine, report, roaas_load
 
 from loadtests.statistics.recorder import Recorder
 
-_HERE = Path(__file__).parent
-_POSE = (
-    '{"pose": {"pose": {"position": {"x": 1.0, "y": 2.0, "z": 0.0}}}, "covariance": [' + ", ".join(["0.0"] * 36) + "]}"
-)
+_TARGET_RATE, _MOST_LAG_MS = 4000, 0.3
 _FAST = """
 import gevent, sys, time
 from locust import FastHttpUser, task
@@ -57,68 +54,21 @@ runner.quit()
 """
 
 
-class Server:
-    """The bare server of `bare.py`, in a process of its own."""
-
-    def __enter__(self) -> str:
-        """Start it; returns its base URL."""
-        answer = {
-            "status": 200,
-            "body": _POSE,
-            "headers": [["content-type", "application/json"], ["content-length", str(len(_POSE))]],
-        }
-        self.answers = Path(tempfile.mkdtemp()) / "answers.json"
-        self.answers.write_text(json.dumps({"/robot/pose/": answer}))
-        self.process = subprocess.Popen(
-            [sys.executable, _HERE / "bare.py", self.answers], stdout=subprocess.PIPE, text=True
-        )
-        port = self.process.stdout.readline().strip() if self.process.stdout else ""
-        return f"http://127.0.0.1:{port}"
-
-    def __exit__(self, *_: object) -> None:
-        """Stop it."""
-        self.process.kill()
-        self.process.wait()
-        shutil.rmtree(self.answers.parent)
-
-
-def wrk(url: str, seconds: float) -> tuple[float, float]:
-    """Median and p99 in µs of wrk at one connection."""
-    script = "done = function(s, l, r) io.write(string.format('%f %f\\n', l:percentile(50), l:percentile(99))) end"
-    with tempfile.NamedTemporaryFile("w", suffix=".lua") as file:
-        file.write(script)
-        file.flush()
-        command = ["wrk", "-t1", "-c1", f"-d{seconds:g}s", "-s", file.name, f"{url}/robot/pose/"]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-    median, p99 = done.stdout.splitlines()[-1].split()
-    return float(median), float(p99)
-
-
-def roaas(url: str, seconds: float, *options: str) -> dict[str, Any]:
-    """`roaas load` on REST with the wire client: its latency.json."""
-    with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-c", "from loadtests.cli import load; load()", "--rest", url, "--client", "wire"]
-        times = ["--duration", f"{seconds:g}", "--warmup", "1", "--out", folder]
-        subprocess.run([*command, *times, *options], check=False, capture_output=True)
-        found: dict[str, Any] = json.loads((Path(folder) / "latency.json").read_text())
-    return found
+def wire(port: int, seconds: float, *options: Any) -> dict[str, Any]:
+    """Run `roaas load` over REST on a port; returns its latency.json."""
+    return roaas_load("--rest", f"http://127.0.0.1:{port}", "--duration", f"{seconds:g}", "--warmup", "1", *options)
 
 
 def fast_http_user(url: str, users: int, seconds: float) -> float:
-    """Requests a second of Locust's FastHttpUser."""
+    """Return the requests per second of Locust's FastHttpUser."""
     command = [sys.executable, "-c", _FAST, url, str(users), str(seconds)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return float(re.findall(r"^[\d.]+$", done.stdout, re.MULTILINE)[-1])
 
 
-def verdict(*, met: bool) -> str:
-    """The end of a line."""
-    return "met" if met else "MISSED"
-
-
 @contextmanager
 def awake() -> Iterator[bool]:
-    """Processors do not sleep while this lasts, if that is allowed; yields whether it was (PM QoS, as cyclictest)."""
+    """Keep processors awake, if that is allowed; yields whether it is (PM QoS, as cyclictest does)."""
     try:
         descriptor = os.open("/dev/cpu_dma_latency", os.O_WRONLY)
     except OSError:
@@ -131,77 +81,71 @@ def awake() -> Iterator[bool]:
         os.close(descriptor)
 
 
-def one_connection(url: str, seconds: float, rounds: int) -> bool:
-    """The wire client beside wrk; on a virtual machine that sleeps between two octets, waking up is most of a time."""
+def one_connection(port: int, seconds: float, rounds: int) -> bool:
+    """Compare the wire client with wrk; on a virtual machine that sleeps between packets, waking up takes longest."""
     if shutil.which("wrk") is None:
         print("wire client beside wrk: not measured, wrk is not installed")
         return True
-    met = _beside_wrk("one connection, as the machine is", url, seconds, rounds)
+    met = _beside_wrk("one connection, as the machine is", port, seconds, rounds)
     with awake() as allowed:
-        return _beside_wrk("one connection, processors kept awake", url, seconds, rounds) if allowed else met
+        return _beside_wrk("one connection, processors kept awake", port, seconds, rounds) if allowed else met
 
 
-def _beside_wrk(name: str, url: str, seconds: float, rounds: int) -> bool:
+def _beside_wrk(name: str, port: int, seconds: float, rounds: int) -> bool:
     pairs = []
     for _ in range(rounds):
-        found = roaas(url, seconds, "--users", "1")["series"][0]["service_ms"]
-        pairs.append((*wrk(url, seconds), found["p50"] * 1e3, found["p99"] * 1e3))
+        found = wire(port, seconds, "--users", "1")["series"][0]["service_ms"]
+        wrk = load(Call("127.0.0.1", port, "GET", "/robot/pose/"), 1, seconds)
+        pairs.append((wrk.median_us, wrk.p99_us, found["p50"] * 1e3, found["p99"] * 1e3))
     theirs, theirs99, ours, ours99 = (statistics.median(column) for column in zip(*pairs, strict=True))
     near = ours <= theirs * 1.3 or ours - theirs <= 40  # noqa: PLR2004 -- the target: 30 % or 40 µs
-    tail = ours99 <= 2 * theirs99
-    print(
-        f"{name}, median: wire {ours:.0f} us, wrk {theirs:.0f} us, ratio {ours / theirs:.2f}, "
-        f"{ours - theirs:+.0f} us: {verdict(met=near)} (30 % or 40 us)"
+    text = (
+        f"{name}, median: wire {ours:.0f} us, wrk {theirs:.0f} us, ratio {ours / theirs:.2f}, {ours - theirs:+.0f} us"
     )
-    print(
-        f"{name}, p99: wire {ours99:.0f} us, wrk {theirs99:.0f} us, "
-        f"ratio {ours99 / theirs99:.2f}: {verdict(met=tail)} (2)"
-    )
-    return near and tail
+    tail = f"{name}, p99: wire {ours99:.0f} us, wrk {theirs99:.0f} us, ratio {ours99 / theirs99:.2f} (2)"
+    return all([report(f"{text} (30 % or 40 us)", met=near), report(tail, met=ours99 <= 2 * theirs99)])
 
 
-def open_model(url: str, seconds: float, rounds: int) -> bool:
-    """Rate and lag of one worker, which sleeps between requests at low rates and hardly at high ones."""
+def open_model(port: int, seconds: float, rounds: int) -> bool:
+    """Measure rate and lag of one worker, which sleeps between requests at low rates and hardly at high ones."""
     met = True
     for rate in (50, 200, 500, 4000, 6000):
-        found = [roaas(url, seconds, "--rate", str(rate)) for _ in range(rounds)]
-        runs = [document["generator"] for document in found if document["generator"]["completed"]]
+        found = [wire(port, seconds, "--rate", rate) for _ in range(rounds)]
+        runs = [document["generator"] for document in found if document["generator"]["lag_ms"]["p50"] is not None]
         if not runs:
-            print(f"open model, {rate}/s: no run: {found[0]['invalid_because']}")
-            return False
+            return report(f"open model, {rate}/s: nothing started on time: {found[0]['invalid_because']}", met=False)
         lags = [run["lag_ms"]["p99"] for run in runs if run["lag_ms"]["p99"] is not None]  # null below 1,000 requests
-        median = statistics.median(run["lag_ms"]["p50"] for run in runs)
-        achieved = statistics.median(run["achieved_rate"] for run in runs)
+        median, achieved, cpu = (
+            statistics.median(values)
+            for values in zip(
+                *((run["lag_ms"]["p50"], run["achieved_rate"], run["cpu_share"]) for run in runs), strict=True
+            )
+        )
         best = min(lags, default=math.inf)
-        good = achieved >= 0.99 * rate and best < 0.3  # noqa: PLR2004 -- best round: others use the machine
         tail = (
-            f"p99 {statistics.median(lags):.3f} ms (best round {best:.3f} ms)" if lags else "no p99 of so few requests"
+            f"p99 {statistics.median(lags):.3f} ms (best round {best:.3f} ms)" if lags else "too few requests for p99"
         )
-        print(
-            f"open model, one worker, {rate}/s: {achieved:.0f}/s achieved, lag {median:.3f} ms median, "
-            f"{tail}, "
-            f"cpu {statistics.median(run['cpu_share'] for run in runs):.0%}"
-            + (f": {verdict(met=good)} (4000/s, 0.3 ms)" if rate == 4000 else "")  # noqa: PLR2004 -- the target
-        )
-        met = met and (good or rate != 4000)  # noqa: PLR2004 -- as above
+        text = f"open model, one worker, {rate}/s: {achieved:.0f}/s, lag {median:.3f} ms median, {tail}, cpu {cpu:.0%}"
+        if rate != _TARGET_RATE:
+            print(text)
+        else:  # by the best round: others use the machine
+            met = report(f"{text} (0.3 ms)", met=achieved >= 0.99 * rate and best < _MOST_LAG_MS)
     return met
 
 
-def closed_model(url: str, seconds: float, rounds: int, users: int = 20) -> bool:
-    """The most that closed users get through, beside FastHttpUser."""
+def closed_model(port: int, seconds: float, rounds: int, users: int = 20) -> bool:
+    """Compare the throughput of closed-model users with FastHttpUser's."""
     ours, theirs = [], []
     for _ in range(rounds):
-        ours.append(roaas(url, seconds, "--users", str(users))["generator"]["achieved_rate"])
-        theirs.append(fast_http_user(url, users, seconds))
+        ours.append(wire(port, seconds, "--users", users)["generator"]["achieved_rate"])
+        theirs.append(fast_http_user(f"http://127.0.0.1:{port}", users, seconds))
     ratio = statistics.median(ours) / statistics.median(theirs)
-    met = ratio >= 0.7  # noqa: PLR2004 -- the target
     rates = f"wire {statistics.median(ours):.0f}/s, FastHttpUser {statistics.median(theirs):.0f}/s"
-    print(f"closed model, {users} users: {rates}, ratio {ratio:.2f}: {verdict(met=met)} (0.7)")
-    return met
+    return report(f"closed model, {users} users: {rates}, ratio {ratio:.2f} (0.7)", met=ratio >= 0.7)  # noqa: PLR2004
 
 
 def recorder(millions: int) -> bool:
-    """Cost and memory of recording."""
+    """Measure cost and memory of recording."""
     book = Recorder(dict.fromkeys(range(600), 4))
     peaks, costs = [], []
     for _ in range(millions):
@@ -212,18 +156,17 @@ def recorder(millions: int) -> bool:
         book.flush()
         costs.append(time.perf_counter() - began)
         peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
-    first = peaks[millions // 3]  # the allocator has its pools by then
-    flat, quick = peaks[-1] - first < 5, statistics.median(costs) < 5  # noqa: PLR2004 -- allocator's noise; the target
-    print(f"recorder: {statistics.median(costs):.2f} us a request: {verdict(met=quick)} (5)")
-    print(
-        f"recorder: {first:.0f} MB after {millions // 3 + 1} million requests in 600 blocks, "
-        f"{peaks[-1]:.0f} MB after {millions} million: {verdict(met=flat)} (does not grow)"
+    first, cost = peaks[millions // 3], statistics.median(costs)  # the allocator has its pools by then
+    memory = (
+        f"recorder: {first:.0f} MB after {millions // 3 + 1} million requests in 600 blocks, {peaks[-1]:.0f} MB after "
+        f"{millions} million (does not grow)"
     )
-    return flat and quick
+    quick = report(f"recorder: {cost:.2f} us a request (5)", met=cost < 5)  # noqa: PLR2004 -- the target
+    return report(memory, met=peaks[-1] - first < 5) and quick  # noqa: PLR2004 -- the allocator's noise
 
 
 def _report(seed: int) -> dict[str, Any]:
-    """What a worker reports each second at 4,000 requests a second: ten blocks of two operations."""
+    """Return a worker's report at 4,000 requests a second: ten blocks of two operations."""
     rng = np.random.default_rng(seed)
     book = Recorder({segment: 4 + 2 * (segment % 2) for segment in range(10)})
     for number, service in enumerate(rng.lognormal(np.log(150_000), 0.4, 4000).astype(int).tolist()):
@@ -232,7 +175,7 @@ def _report(seed: int) -> dict[str, Any]:
 
 
 def merging(workers: int) -> bool:
-    """The master's work on one report from each of so many workers."""
+    """Measure the master's work on one report from each of so many workers."""
     reports = [_report(seed) for seed in range(min(workers, 20))]
     size = sum(
         len(part)
@@ -257,13 +200,15 @@ def merging(workers: int) -> bool:
     for number in range(workers):
         totals[0].merge(parts[number].cells[0, 0].service)
     single = (time.perf_counter() - one) * 1e3
-    print(
+    text = (
         f"merging {workers} workers: one histogram of each {single:.1f} ms; a whole second's report of each "
         f"(20 blocks, 40 histograms, {series:,} requests, {size / 1024:.0f} kB) "
         f"{merged:.0f} ms and {unpacked:.0f} ms to read"
-        + (f": {verdict(met=single < 100)} (100 ms)" if workers == 100 else "")  # noqa: PLR2004 -- the target
     )
-    return single < 100 or workers != 100  # noqa: PLR2004 -- as above
+    if workers != 100:  # noqa: PLR2004 -- the target is for a hundred
+        print(text)
+        return True
+    return report(f"{text} (100 ms)", met=single < 100)  # noqa: PLR2004 -- the target
 
 
 def main() -> int:
@@ -275,11 +220,10 @@ def main() -> int:
         "--millions", type=int, default=10, help="requests that the recorder's memory is judged by [10]"
     )
     options = parser.parse_args()
-    print(f"{os.cpu_count()} processors, load average {os.getloadavg()[0]:.1f}")
-    checks: list[Callable[[], bool]] = [lambda: recorder(options.millions), lambda: merging(100), lambda: merging(1000)]
-    with Server() as url:
-        met = [check(url, options.seconds, options.rounds) for check in (one_connection, open_model, closed_model)]
-    met += [check() for check in checks]
+    print(machine())
+    with running_bare([POSE]) as (port, _):
+        met = [check(port, options.seconds, options.rounds) for check in (one_connection, open_model, closed_model)]
+    met += [recorder(options.millions), merging(100), merging(1000)]
     return 0 if all(met) else 1
 
 

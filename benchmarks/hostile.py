@@ -1,7 +1,7 @@
-"""Clients that mean harm, or do it: the other side of ``soak.py``, as a process of its own.
+"""Hostile clients: the other side of ``soak.py``, as a process of its own.
 
-``python hostile.py REST_PORT SOAP_PORT`` keeps them all at it until its standard input ends, and then prints how often
-each kind came to its end. All of it goes to loopback, and each kind has a bound on its rate.
+``python hostile.py REST_PORT SOAP_PORT`` prints ``ready`` and keeps all kinds busy until its standard input ends. Then
+it prints how often each kind finished. All traffic goes to loopback, and each kind has a limited rate.
 """
 
 import asyncio
@@ -51,7 +51,7 @@ def documents(number: int) -> list[str]:
 
 
 class Hostile:
-    """All kinds of hostile clients; ``done`` counts what they have done, ``failed`` what should not have happened."""
+    """All kinds of hostile clients; ``done`` counts what they did, ``failed`` what should not have happened."""
 
     def __init__(self, rest: int, soap: int) -> None:
         self.rest, self.soap = rest, soap
@@ -89,7 +89,7 @@ class Hostile:
         await self._ended(reader, writer, within=90)
 
     async def never_reads(self) -> None:
-        """Ask for much, and read none of it."""
+        """Send many requests, and read no response."""
         reader, writer = await self._connect(self.rest)
         writer.transport.pause_reading()
         with contextlib.suppress(ConnectionError, TimeoutError):
@@ -128,7 +128,7 @@ class Hostile:
             await asyncio.sleep(0.1)
 
     async def no_http(self) -> None:
-        """Send what is no request."""
+        """Send bytes that are not HTTP."""
         for octets in (b"\x16\x03\x01\x02\x00" * 100, b"GET\r\n\r\n", b"\0" * 5000, os.urandom(5000) + b"\r\n\r\n"):
             await self._asks(self.rest, octets, {400, 408, 431})
             await asyncio.sleep(0.2)
@@ -183,6 +183,7 @@ class Hostile:
 async def main(rest: int, soap: int) -> None:
     """Keep all kinds busy until standard input ends."""
     hostile = Hostile(rest, soap)
+    print("ready", flush=True)
     tasks = [asyncio.create_task(hostile.for_ever(kind)) for kind, count in hostile.kinds() for _ in range(count)]
     await asyncio.to_thread(sys.stdin.read)
     for task in tasks:

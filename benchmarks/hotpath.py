@@ -1,8 +1,8 @@
-"""The path of a request apart from the network: how long each of its stages takes.
+"""The path of a request without the network: how long each of its stages takes.
 
-``python benchmarks/hotpath.py`` feeds octets to the connection of an interface without a socket and prints the time of
-each stage in nanoseconds, the least of several rounds: what the machine does besides only ever adds. The publish is
-once a stub and once Fast DDS with one reader, in this process.
+``python benchmarks/hotpath.py`` feeds bytes to the connection of an interface without a socket. It prints the time of
+each stage in nanoseconds, the shortest of several rounds, because other load only adds time. The publish is once a stub
+and once Fast DDS with one reader, in this process.
 """
 
 import asyncio
@@ -43,7 +43,7 @@ POST = (
 
 
 class Nobody:
-    """Stands for the publishers' node: takes everything; and for the subscribers', which hear nothing."""
+    """Stands for the nodes of publishers and subscribers: accepts everything, receives nothing."""
 
     def __init__(self) -> None:
         self.mission_reports: list[str] = []
@@ -71,7 +71,7 @@ class Wire:
 
 
 class Callbacks:
-    """What a parser costs that tells nobody."""
+    """Parser callbacks that do nothing."""
 
 
 def interfaces(publishers: Any) -> tuple[RestInterface, SoapInterface]:

@@ -1,15 +1,16 @@
-"""Which faults inside a robot the suite notices: in what it does, not in what is said of it on the way to a client.
+"""Which faults inside a robot the suite detects: faults in what it does, not in its messages on the way to a client.
 
 ``python benchmarks/inside.py`` certifies the independent robot ``baroque`` with each of its faulty bodies, and once
-without a fault, and prints a line for each and how many were killed; ``python benchmarks/inside.py 'goal-*'`` takes
-some. No ROS is needed. ``python -m conformance.packs.table1.independent_robots baroque --fault deadband`` starts one to
-look at. The exit code is 1 when the robot without a fault is not found conformant, or no fault has such a name.
+without a fault. It prints a line for each and how many faults were detected; ``python benchmarks/inside.py 'goal-*'``
+takes some. No ROS is needed. ``python -m conformance.packs.table1.independent_robots baroque --fault deadband`` starts
+one to look at. The exit code is 1 when the robot without a fault does not pass, or no fault has such a name.
 """
 
 import argparse
 import signal
 import sys
-from fnmatch import fnmatch
+
+from programs import matching
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.pack import Contract
@@ -33,9 +34,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--parallel", type=int, default=2, help="robots at once")
     options = parser.parse_args()
-    names = [name for name in FAULTY_BODIES if any(fnmatch(name, pattern) for pattern in options.patterns)]
+    names = matching(options.patterns, FAULTY_BODIES)
     if not names:
-        print(f"no fault is named {' or '.join(options.patterns)}; there are {', '.join(FAULTY_BODIES)}")
         return 1
 
     def certify(fault: str) -> tuple[str, Outcome]:

@@ -1,9 +1,9 @@
-"""How surely the suite notices a fault that strikes now and then: at random, in one of sixty answers.
+"""How reliably the suite detects an intermittent fault: one at random, in one of sixty responses.
 
-``python benchmarks/intermittent.py`` certifies the reference robot behind a proxy with each kind of fault, and prints a
-line for each run and how many were caught; a run ends with the first MUST that has failed. ``python
-benchmarks/intermittent.py 'pose-*' --once-in 200`` takes some, which strike more rarely. The exit code is 0 when at
-least 19 of 20 runs were caught, 1 when they were not or no fault has such a name, 130 when it was interrupted.
+``python benchmarks/intermittent.py`` certifies the reference robot behind a proxy with each kind of fault. It prints a
+line for each run and how many faults were detected; a run ends with the first MUST that fails. ``python
+benchmarks/intermittent.py 'pose-*' --once-in 200`` takes some faults, which strike more rarely. The exit code is 0 when
+at least 19 of 20 runs detected theirs, 1 when they did not or no fault has such a name, 130 when it was interrupted.
 """
 
 import argparse
@@ -12,8 +12,9 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from fnmatch import fnmatch
 from typing import Any
+
+from programs import matching
 
 from conformance.contract.classes import Level
 from conformance.contract.pack import Contract
@@ -46,7 +47,7 @@ _OOPS = page(500, b"oops", "text/plain")
 
 
 class Sometimes:
-    """A change that is made at random, to one in so many of the requests that it concerns.
+    """A change that happens at random, to one in so many of the requests that it concerns.
 
     Attributes:
         concerned: how many requests it might have changed.
@@ -60,7 +61,7 @@ class Sometimes:
         self.concerned = self.strikes = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """Answer the request, altered or not."""
+        """Answer the request, changed or not."""
         if not self._where(request):
             return forward(request)
         with self._lock:
@@ -71,7 +72,7 @@ class Sometimes:
 
 
 class _Stale:
-    """The answer of the strike before it to the same request."""
+    """Answers a request with the response to the same request before it."""
 
     def __init__(self) -> None:
         self._answers: dict[tuple[str, str | None], Response] = {}
@@ -146,9 +147,8 @@ def main() -> int:
     parser.add_argument("--parallel", type=int, default=2, help="robots at once")
     parser.add_argument("--domain-id", type=int, default=80, help="ROS domain of the first robot")
     options = parser.parse_args()
-    names = [name for name in FAULTS if any(fnmatch(name, pattern) for pattern in options.patterns)]
+    names = matching(options.patterns, FAULTS)
     if not names:
-        print(f"no fault is named {' or '.join(options.patterns)}; there are {', '.join(FAULTS)}")
         return 1
     contract = Contract.load()
     must = frozenset(id_ for id_, one in contract.ledger.items() if one.level is Level.MUST)

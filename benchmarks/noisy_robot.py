@@ -1,8 +1,8 @@
-"""A robot whose noise is made: `python noisy_robot.py SEED SHIFT`; prints its port. For `calibration.py`.
+"""A robot with artificial noise, for `calibration.py`: `python noisy_robot.py SEED SHIFT` prints its port.
 
-It answers the pose over REST and over SOAP after a time that is log-normal about a level which wanders as a first-order
-autoregressive series, as a shared machine's does; over SOAP the time is multiplied by SHIFT. It goes before what else
-runs on the machine, where that is allowed: the noise is to be the one that is made.
+It returns the pose over REST and SOAP after a time that is log-normal around a drifting level, a first-order
+autoregressive series, as on a shared machine. Over SOAP the time is multiplied by SHIFT. It runs with real-time
+priority where that is allowed, so that the machine adds little noise of its own.
 """
 
 import json
@@ -47,7 +47,7 @@ _SOAP = (
 
 
 class Noise:
-    """The level, and when it was looked at last."""
+    """The level of the noise, and when it was last read."""
 
     def __init__(self, seed: int, shift: float) -> None:
         self._random = random.Random(seed)  # noqa: S311 -- noise, no secret
@@ -57,7 +57,7 @@ class Noise:
         self._lock = Lock()
 
     def takes_s(self, *, soap: bool) -> float:
-        """How long the next answer takes."""
+        """Return how long the next response takes."""
         with self._lock:
             now = time.monotonic()
             kept = math.exp(-(now - self._at) / MEMORY_S)
@@ -67,19 +67,19 @@ class Noise:
 
 
 class Answers(StreamRequestHandler):
-    """Answers one connection's requests."""
+    """Answers the requests of one connection."""
 
     disable_nagle_algorithm = True
     noise: Noise
 
     def handle(self) -> None:
-        """Answer until the client is gone."""
+        """Answer until the client disconnects."""
         with first_in_line(wanted=True):
             while self._answered():
                 pass
 
     def _answered(self) -> bool:
-        """Answer a request; False where there is none any more."""
+        """Answer a request; returns False at the end of the connection."""
         lines = [self.rfile.readline()]
         while lines[-1] not in {b"\r\n", b""}:
             lines.append(self.rfile.readline())
@@ -103,7 +103,7 @@ class Robot(ThreadingTCPServer):
     request_queue_size = 128
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """A client that is gone is no news."""
+        """Ignore a client that has disconnected."""
 
 
 def main() -> None:

@@ -1,26 +1,22 @@
-"""Do runs of `roaas load` agree with one another? `python benchmarks/repeatability.py` measures one robot ten times.
+"""Whether runs of `roaas load` agree: `python benchmarks/repeatability.py` measures one robot ten times.
 
-Ten runs of 20 s, one after the other, of deliveries by the wire client at 200 requests/s: whether the ten intervals of
-SOAP's median over REST's overlap, whether the ratios lie within 5 %, and by how much the ratios scatter beyond what
-the intervals allow for: Birge's ratio, 1 where they allow for all of it (Physical Review 40, 1932), and the
-probability of as much scatter where they do (Cochran's Q).
+There are ten runs of 20 s, one after the other, of deliveries by the wire client at 200 requests/s. The benchmark
+prints whether the ten intervals of SOAP's median over REST's overlap, and whether the ratios lie within 5 %. It also
+prints by how much the ratios scatter beyond their intervals: Birge's ratio, 1 where the intervals explain all of it
+(Physical Review 40, 1932), and the probability of that scatter (Cochran's Q).
 
-Intervals that are right at 95 % overlap less often than one thinks: of ten, all do in about 85 % of such experiments.
+Correct 95 % intervals overlap less often than one expects: all of ten do in about 85 % of such experiments.
 """
 
 import argparse
-import json
 import math
-import os
-import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from robot import running_robot
+from programs import machine, median_of, roaas_load, running_robot
 from scipy import stats
 
 _WITHIN = 0.05
@@ -29,7 +25,7 @@ _STATEMENT = Path(__file__).parents[1] / "reference_robot" / "statement.toml"
 
 
 class Run(NamedTuple):
-    """What one run said of the median's ratio, and its 95 % interval."""
+    """The median's ratio in one run, and its 95 % interval."""
 
     ratio: float
     low: float
@@ -37,30 +33,23 @@ class Run(NamedTuple):
 
 
 def measured(rest: str, soap: str, seconds: float, seed: int) -> Run:
-    """One run of `roaas load`."""
-    with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-c", "from loadtests.cli import load; load()", _STATEMENT, "--rest", rest]
-        services = ["--publishers-wsdl", soap, "--subscribers-wsdl", soap.replace("publisher", "subscriber")]
-        what = ["--allow-motion", "--operation", "delivery", "--client", "wire", "--rate", "200", "--warmup", "1"]
-        times = ["--duration", f"{seconds:g}", "--seed", str(seed), "--out", folder]
-        done = subprocess.run([*command, *services, *what, *times], check=False, capture_output=True, text=True)
-        file = Path(folder) / "latency.json"
-        if not file.exists():
-            raise RuntimeError(done.stderr)
-        found: dict[str, Any] = json.loads(file.read_text())
-    median = next(entry for entry in found["comparisons"] if entry["quantile"] == "p50")
+    """Run `roaas load` once."""
+    services = ["--publishers-wsdl", soap, "--subscribers-wsdl", soap.replace("publisher", "subscriber")]
+    what = ["--allow-motion", "--operation", "delivery", "--rate", "200", "--warmup", "1"]
+    times = ["--duration", f"{seconds:g}", "--seed", seed]
+    found = roaas_load(_STATEMENT, "--rest", rest, *services, *what, *times)
+    median = median_of(found)
     low, high = median["ci95"] or (math.nan, math.nan)
-    load = os.getloadavg()[0]
     print(
         f"run {seed}: {median['ratio']:.3f} ({low:.3f} to {high:.3f}), {median['judgement']}, "
-        f"{'valid' if found['valid'] else '; '.join(found['invalid_because'])}, load average {load:.1f}",
+        f"{'valid' if found['valid'] else '; '.join(found['invalid_because'])}, {machine()}",
         flush=True,
     )
     return Run(median["ratio"], low, high)
 
 
 def agreement(runs: Sequence[Run]) -> bool:
-    """Say how far the runs agree."""
+    """Print how far the runs agree; returns whether they do."""
     lows, highs, ratios = (np.array(column) for column in zip(*[(r.low, r.high, r.ratio) for r in runs], strict=True))
     overlap = bool(lows.max() <= highs.min())
     spread = float(ratios.max() / ratios.min() - 1)
@@ -78,13 +67,13 @@ def agreement(runs: Sequence[Run]) -> bool:
 
 
 def main() -> int:
-    """Measure again and again; the exit code is 1 where the runs do not agree."""
+    """Measure repeatedly; the exit code is 1 where the runs do not agree."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=10, help="[10]")
     parser.add_argument("--seconds", type=float, default=20.0, help="of each [20]")
     parser.add_argument("--domain-id", default="50", help="ROS domain of the robot [50]")
     options = parser.parse_args()
-    with running_robot(options.domain_id) as robot:
+    with running_robot(f"--domain-id={options.domain_id}") as robot:
         rest = f"http://{robot.rest.host}:{robot.rest.port}"
         soap = f"http://{robot.soap.host}:{robot.soap.port}{robot.soap.target}?wsdl"
         runs = [measured(rest, soap, options.seconds, seed) for seed in range(1, options.runs + 1)]

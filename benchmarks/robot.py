@@ -1,27 +1,24 @@
-"""How fast the reference robot answers, as ratios to a bare application, and what it uses.
+"""How fast the reference robot responds, as ratios to a bare application, and what it uses.
 
-``python benchmarks/robot.py`` starts the robot with its simulation, and beside it a bare uvicorn application that
-answers the same bytes and, where there is one, nginx with fixed answers. It measures them in turn with the load from
-another process: so the machine's speed and other load cancel.
-It ends with exit code 1 if a target is missed. ``--seconds`` sets the length of each of the measurements.
+``python benchmarks/robot.py`` starts the robot with its simulation, a bare uvicorn application that returns the same
+bytes and, if installed, nginx with fixed responses. It loads them alternately from another process, so that the
+machine's speed and other load cancel out. The exit code is 1 if a target is missed. ``--seconds`` sets the length of
+each measurement.
 """
 
 import argparse
 import os
 import statistics
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
-from urllib.parse import urlsplit
 
-from fixed import running_bare, running_nginx
-from footprint import Footprint
+from fixed import answers_to, running_bare, running_nginx
 from loader import Call, Load, alternately, load
+from programs import Footprint, Robot, report, running_robot
 
 DELIVERY = (
     "/robot/app/delivery/4/depot_x/68.269/depot_y/38.718/dest_x/60.633/dest_y/37.51/source_x/76.02/source_y/41.35"
@@ -48,15 +45,6 @@ MOST_IDLE_CORE = 0.05
 MOST_MEGABYTES = 250
 
 
-@dataclass(frozen=True)
-class Robot:
-    """The running robot: its REST and SOAP addresses, and its processes."""
-
-    rest: Call
-    soap: Call
-    pids: tuple[int, ...]
-
-
 def main() -> int:
     """Measure everything; return 0 when all targets are met."""
     options = argparse.ArgumentParser(description=__doc__)
@@ -73,7 +61,7 @@ def main() -> int:
     chosen = options.parse_args()
     met = []
     with ExitStack() as stack:
-        robot = stack.enter_context(running_robot(chosen.domain_id))
+        robot = stack.enter_context(running_robot(f"--domain-id={chosen.domain_id}"))
         met += idle(robot)
         before = megabytes(robot)
         asked = {
@@ -84,15 +72,15 @@ def main() -> int:
                 1.4,
             ),
         }
-        calls = [call for call, _ in asked.values()]
-        bare, bare_pid = stack.enter_context(running_bare(calls))
-        nginx = stack.enter_context(running_nginx(calls))
+        answers = answers_to([call for call, _ in asked.values()])
+        bare, server = stack.enter_context(running_bare(answers))
+        nginx = stack.enter_context(running_nginx(answers))
         servers = [("bare", bare, bare), *([("nginx", nginx, nginx)] if nginx else []), *chosen.beside]
 
         def yardsticks(call: Call) -> dict[str, Call]:
             return {name: replace(call, port=soap if call.body else rest) for name, rest, soap in servers}
 
-        with pinned(robot.pids[0]), pinned(bare_pid):
+        with pinned(robot.pids[0]), pinned(server.pid):
             for name, (call, most) in asked.items():
                 met.append(back_to_back(name, call, yardsticks(call), most, chosen.seconds))
             for name, (call, _) in asked.items():
@@ -191,30 +179,6 @@ def after_requests(robot: Robot) -> float:
     while left > 0:
         left -= load(replace(robot.rest, method="PUT", target=DELIVERY), MANY_CONNECTIONS, 3).requests
     return megabytes(robot)
-
-
-def report(text: str, *, met: bool) -> bool:
-    """Print one line of the result."""
-    print(f"{'ok    ' if met else 'MISSED'} {text}", flush=True)
-    return met
-
-
-@contextmanager
-def running_robot(domain_id: str) -> Iterator[Robot]:
-    """Run the robot on free ports."""
-    command = [sys.executable, "-m", "reference_robot", "--rest-port=0", "--soap-port=0", f"--domain-id={domain_id}"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            words = dict(word.split("=", 1) for word in process.stdout.readline().split()[1:])
-            rest, soap = urlsplit(words["rest"]), urlsplit(words["soap"])
-            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-            yield Robot(
-                Call(rest.hostname, rest.port, "GET", "/"),
-                Call(soap.hostname, soap.port, "POST", soap.path),
-                (process.pid, *map(int, children)),
-            )
-        finally:
-            process.terminate()
 
 
 @contextmanager

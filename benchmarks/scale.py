@@ -1,26 +1,23 @@
-"""Nothing is lost and nothing counted twice, over workers: `python benchmarks/scale.py`.
+"""Nothing is lost and nothing counted twice with several workers: `python benchmarks/scale.py`.
 
-Two parts. Recorders: processes record a million requests that a seed gives and hand them over in reports, as workers do
-each second; the merged whole is compared with one recorder that has seen everything, histogram by histogram. A run:
-`roaas load` with workers against a bare server that counts what reaches it, closed users for as long as is said, and
-the books have to balance to the request. The exit code is 1 where anything differs.
+It has two parts. Recorders: processes record a million requests, fixed by a seed, and report them each second as
+workers do; the merged result is compared with one recorder of all requests, histogram by histogram. A run: `roaas load`
+with workers and closed-model users against a bare server that counts its requests; all counts must agree exactly. The
+exit code is 1 where anything differs.
 """
 
 import argparse
-import json
 import multiprocessing
-import os
 import signal
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import msgpack
 import numpy as np
+from fixed import POSE, running_bare
+from programs import machine, roaas_load
 
 from loadtests.statistics.recorder import Recorder
 
@@ -28,29 +25,10 @@ _SEGMENTS = 600
 _REPORTED = 4000  # requests in a report: what a worker at 4,000/s has to tell after a second
 _BLOCKS = 10  # that it tells of
 _SERIES = {segment: 4 + 2 * (segment % 2) for segment in range(_SEGMENTS)}
-_SERVER = """
-import json, sys
-sys.path.insert(0, sys.argv[1])
-import bare
-count = 0
-inner = bare.application(json.loads(sys.argv[2]))
-async def counting(scope, receive, send):
-    global count
-    count += 1
-    await inner(scope, receive, send)
-bare.application = lambda _: counting
-try:
-    bare.main(sys.argv[3])
-except KeyboardInterrupt:
-    pass
-finally:
-    print(count, flush=True)
-"""
-_POSE = '{"pose": {"pose": {"position": {"x": 1.0, "y": 2.0, "z": 0.0}}}, "covariance": []}'
 
 
 def record(book: Recorder, seed: int, first: int, requests: int) -> None:
-    """Record requests, numbered from `first`: one in 500 failed, one in 1,000 was never started."""
+    """Record requests, numbered from `first`: one in 500 fails, one in 1,000 never starts."""
     rng = np.random.default_rng([seed, first])
     service = rng.lognormal(np.log(150_000), 0.6, requests).astype(int).tolist()
     lag = rng.exponential(30_000, requests).astype(int).tolist()
@@ -68,13 +46,13 @@ def record(book: Recorder, seed: int, first: int, requests: int) -> None:
 
 
 def reports(first: int, requests: int) -> Iterator[tuple[int, int]]:
-    """The reports that a worker's share makes up: the first request and the number of each."""
+    """Yield the reports of a worker's share: the first request and the number of each."""
     for at in range(first, first + requests, _REPORTED):
         yield at, min(_REPORTED, first + requests - at)
 
 
 def work(seed: int, first: int, requests: int, pipe: Any) -> None:
-    """A worker: record, and report as often as one does, packed as for the network."""
+    """Record a worker's share, and report as often as a worker does, packed as for the network."""
     book = Recorder(_SERIES)
     for at, number in reports(first, requests):
         record(book, seed, at, number)
@@ -83,7 +61,7 @@ def work(seed: int, first: int, requests: int, pipe: Any) -> None:
 
 
 def contents(book: Recorder) -> dict[str, Any]:
-    """Everything that a recorder holds, in an order that does not depend on who reported first."""
+    """Return everything in a recorder, in an order that does not depend on who reported first."""
     return {name: sorted(map(repr, dict(part).items())) for name, part in _parts(book).items()}
 
 
@@ -97,7 +75,7 @@ def _parts(book: Recorder) -> dict[str, Any]:
 
 
 def recorders(requests: int, workers: int, seed: int) -> bool:
-    """Workers' reports, merged, beside one recorder of all."""
+    """Compare the workers' merged reports with one recorder of all requests."""
     share = requests // workers
     context = multiprocessing.get_context("spawn")
     ends = []
@@ -138,31 +116,16 @@ def recorders(requests: int, workers: int, seed: int) -> bool:
 
 
 def run(seconds: float, workers: int, users: int) -> bool:
-    """`roaas load` over workers, beside what the server has counted."""
-    answer = {
-        "status": 200,
-        "body": _POSE,
-        "headers": [["content-type", "application/json"], ["content-length", str(len(_POSE))]],
-    }
-    with tempfile.TemporaryDirectory() as folder:
-        answers = Path(folder) / "answers.json"
-        answers.write_text(json.dumps({"/robot/pose/": answer}))
-        command = [sys.executable, "-c", _SERVER, Path(__file__).parent, answers.read_text(), answers]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-            if server.stdout is None:
-                return False
-            url = f"http://127.0.0.1:{server.stdout.readline().strip()}"
-            load = [sys.executable, "-c", "from loadtests.cli import load; load()", "--rest", url, "--client", "wire"]
-            times = ["--users", str(users), "--duration", f"{seconds:g}", "--warmup", "0"]
-            subprocess.run([*load, *times, "--processes", str(workers), "--out", folder], check=False)
-            server.send_signal(signal.SIGINT)
-            reached = int(server.stdout.readline())
-        found: dict[str, Any] = json.loads((Path(folder) / "latency.json").read_text())
-    return balance(found, reached)
+    """Run `roaas load` over workers, and compare with what the server has counted."""
+    with running_bare([POSE], "--count") as (port, server):
+        options = ["--users", users, "--duration", f"{seconds:g}", "--warmup", "0", "--processes", workers]
+        found = roaas_load("--rest", f"http://127.0.0.1:{port}", *options)
+        server.send_signal(signal.SIGINT)
+        return balance(found, int(server.stdout.readline() if server.stdout else 0))
 
 
 def balance(found: dict[str, Any], reached: int) -> bool:
-    """Whether the books balance: what was due, what workers reported, and what the server has seen."""
+    """Return whether the counts agree: what was due, what workers reported, and what the server received."""
     told = found["generator"]
     due, answered, failed, dropped = (told[name] for name in ("scheduled", "completed", "errors", "dropped"))
     reported = sum(worker["requests"] for worker in found["workers"])
@@ -178,7 +141,7 @@ def balance(found: dict[str, Any], reached: int) -> bool:
 
 
 def _after_pauses(series: dict[str, Any]) -> int:
-    """How many requests a series' look at pauses made; its first turn is not among the counts."""
+    """Return how many requests a series sent after pauses; the first turn is not among its counts."""
     paused = series["after_pause"]
     if not paused or not paused["cold_count"]:
         return 0
@@ -195,7 +158,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=["recorders", "run"], help="one part alone")
     options = parser.parse_args()
-    print(f"{os.cpu_count()} processors, load average {os.getloadavg()[0]:.1f}")
+    print(machine())
     met = []
     if options.only != "run":
         met.append(recorders(options.requests, options.workers, options.seed))

@@ -1,13 +1,13 @@
 """Whether the reference robot lasts: good clients beside hostile ones, while the robot behind it dies and comes back.
 
 ``python benchmarks/soak.py`` runs for ten minutes (``--minutes``). The simulation, which is the robot and its action
-servers, is killed and started again every minute. It ends with exit code 1 unless
+servers, is killed and restarted every minute. The exit code is 1 unless
 
-- good clients are always answered, and never by a 5xx but 503 (or the SOAP fault that says the same);
-- hostile clients get no other status than they should, and the robot's log has no traceback;
-- memory is within 5 % of what it was after the first tenth, descriptors and threads where they were;
+- good clients always get a response, and no 5xx but 503 (or the SOAP fault that says the same);
+- hostile clients get only the expected statuses, and the robot's log has no traceback;
+- memory stays within 5 % of its size after the first tenth, descriptors and threads where they were;
 - the good clients' p99 at the end is within 20 % of the beginning's, both under the same load. A bare application,
-  asked in turn with the robot, tells how much slower the machine itself has become, and that is taken out.
+  loaded alternately with the robot, shows how much slower the machine itself has become; that is taken out.
 """
 
 import argparse
@@ -23,13 +23,12 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from fixed import running_bare
-from footprint import Footprint
-from loader import Call
-from robot import DELIVERY, ENVELOPE, report
+from fixed import answers_to, running_bare
+from programs import HERE, Footprint, report, running_robot, started
+from robot import DELIVERY, ENVELOPE
 
 RATE = 100.0  # good requests a second, and as many to the bare application
 SLICES = 10  # of a window; its p99 is the median of theirs, so that a neighbour's burst is none of the robot's
@@ -53,7 +52,7 @@ ASKED = (  # (operation, SOAP or REST, method, target, content); deliveries seld
 
 @dataclass
 class Good:
-    """What good clients have seen: times in ms by when they were asked for, s since the start; what went wrong."""
+    """What good clients saw: response times in ms by when they were due, in s since the start, and what went wrong."""
 
     robot: list[tuple[float, float]] = field(default_factory=list)
     bare: list[tuple[float, float]] = field(default_factory=list)
@@ -62,7 +61,7 @@ class Good:
 
 
 class Client:
-    """A good client of one port, which connects again when its connection is closed."""
+    """A good client of one port, which reconnects when its connection is closed."""
 
     def __init__(self, port: int) -> None:
         self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=DEADLINE)
@@ -77,12 +76,12 @@ class Client:
         return answer.status, content, (time.perf_counter() - began) * 1000
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._connection.close()
 
 
 class Soak:
-    """One run: a robot, who asks it, and what was seen."""
+    """One run: a robot, its clients, and what they saw."""
 
     def __init__(self, domain_id: int, seconds: float, log: Path) -> None:
         self.seconds, self.log, self._domain = seconds, log, f"--domain-id={domain_id}"
@@ -93,21 +92,23 @@ class Soak:
         self.restarts = 0
 
     def run(self) -> None:
-        """Keep everything busy for as long as asked, and look at what is left."""
+        """Keep everything busy for the given time, and record what is left."""
         with contextlib.ExitStack() as stack:
             simulation = stack.enter_context(self._simulation())
-            pid, rest, soap = stack.enter_context(self._web_services())
-            pose = Call("127.0.0.1", rest, "GET", "/robot/pose/")
+            log = stack.enter_context(self.log.open("w", encoding="utf-8"))
+            robot = stack.enter_context(running_robot("--attach", self._domain, stderr=log))
+            pid, rest, soap = robot.pids[0], robot.rest.port, robot.soap.port
             self._await_pose(rest)
-            bare, _ = stack.enter_context(running_bare([pose]))
+            bare, _ = stack.enter_context(running_bare(answers_to([replace(robot.rest, target="/robot/pose/")])))
             clients = {False: Client(rest), True: Client(soap)}
             yardstick = Client(bare)
             before = Footprint.of(pid)
-            hostile = stack.enter_context(self._hostile(rest, soap))
-            started = time.monotonic()
+            command = (sys.executable, HERE / "hostile.py", rest, soap)
+            hostile, _ = stack.enter_context(started(*command, stdin=subprocess.PIPE))
+            began = time.monotonic()
             tenth = self.seconds / 10
             next_kill, asked = 2 * tenth, 0
-            while (now := time.monotonic() - started) < self.seconds:
+            while (now := time.monotonic() - began) < self.seconds:
                 if not self.warm.threads and now > tenth:
                     self.warm = Footprint.of(pid)
                 # None in the last part, whose time is compared with that of the first.
@@ -120,7 +121,7 @@ class Soak:
                     self.processor.append((now, Footprint.of(pid).processor))
                 if asked % (10 * RATE) == 0:
                     print(f"{now:5.0f} s: {dict(self.good.statuses)}, {Footprint.of(pid)}", flush=True)
-                time.sleep(max(0.0, started + asked / RATE - time.monotonic()))
+                time.sleep(max(0.0, began + asked / RATE - time.monotonic()))
             assert hostile.stdin is not None  # noqa: S101 - tells mypy what PIPE means
             hostile.stdin.close()
             assert hostile.stdout is not None  # noqa: S101 - as above
@@ -170,32 +171,6 @@ class Soak:
         command = [sys.executable, "-m", "reference_robot.simulation", self._domain, "--time-scale=5"]
         return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True)
 
-    @contextlib.contextmanager
-    def _web_services(self) -> Iterator[tuple[int, int, int]]:
-        """Run the web services; yields process and ports."""
-        command = [sys.executable, "-m", "reference_robot", "--attach", "--rest-port=0", "--soap-port=0", self._domain]
-        with (
-            self.log.open("w", encoding="utf-8") as log,
-            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True) as process,
-        ):
-            try:
-                assert process.stdout is not None  # noqa: S101 - tells mypy what PIPE means
-                words = dict(word.split("=", 1) for word in process.stdout.readline().split()[1:])
-                rest, soap = (int(words[name].split(":")[2].split("/")[0]) for name in ("rest", "soap"))
-                yield process.pid, rest, soap
-            finally:
-                process.terminate()
-
-    @contextlib.contextmanager
-    def _hostile(self, rest: int, soap: int) -> Iterator[subprocess.Popen[str]]:
-        program = str(Path(__file__).with_name("hostile.py"))
-        pipes: dict[str, int] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        with subprocess.Popen([sys.executable, program, str(rest), str(soap)], text=True, **pipes) as process:
-            try:
-                yield process
-            finally:
-                process.terminate()
-
     def _await_pose(self, port: int) -> None:
         give_up = time.monotonic() + BACK
         client = Client(port)
@@ -235,7 +210,7 @@ def busy(used: list[tuple[float, float]], start: float, end: float) -> float:
 
 
 def judged(soak: Soak) -> list[bool]:
-    """Print what was seen, line by line; return what is as it should be."""
+    """Print the results, line by line; returns which are met."""
     good, warm, left = soak.good, soak.warm, soak.left
     fifth = soak.seconds / 5
     first, last = (fifth / 2, fifth * 1.5), (soak.seconds - fifth, soak.seconds)
@@ -271,7 +246,7 @@ def judged(soak: Soak) -> list[bool]:
 
 
 def main() -> int:
-    """Run, and return 0 when everything is as it should be."""
+    """Run; returns 0 when every result is met."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--minutes", type=float, default=10.0)
     options.add_argument("--domain-id", type=int, default=int(os.environ.get("ROS_DOMAIN_ID", "0")))

@@ -1,10 +1,10 @@
 """Whether the verdict on a good robot depends on chance: many seeds, over links and on a busy machine.
 
 ``python benchmarks/verdicts.py --robot reference --seeds 30 --busy 2`` certifies the reference robot with 30 seeds, one
-after another, while two loops keep the processors busy, and prints a line for each run and a table in the end. With
-``--link`` clients are away from the robot by such a link; ``--robot realistic`` is another robot for each seed. Both
-may be repeated: every robot is tried over every link. The exit code is 0 when there was no false positive, at most one
-run in twenty was undecided, and something was run; 1 otherwise; 130 when it was interrupted.
+after another, while two loops keep the processors busy. It prints a line for each run and a table at the end. With
+``--link`` the clients reach the robot over such a link; ``--robot realistic`` is another robot for each seed. Both may
+be repeated: every robot is tried over every link. The exit code is 0 when no robot failed, at most one run in twenty
+was undecided, and there was a run; 1 otherwise; 130 when it was interrupted.
 """
 
 import argparse
@@ -126,7 +126,7 @@ def _spin() -> None:
 
 
 def _word(result: ControlResult) -> str:
-    """What became of one run."""
+    """Return the outcome of one run in a word."""
     if result.outcome is None:
         return "not tried"
     if result.false_positives or result.outcome.exit_code == _NOT_CONFORMANT:
@@ -135,7 +135,7 @@ def _word(result: ControlResult) -> str:
 
 
 def _warned(result: ControlResult) -> dict[str, str]:
-    """Requirements that only warn, with what was said."""
+    """Return the requirements that only warn, with their reasons."""
     outcome = result.outcome
     return {id_: outcome.reasons[id_] for id_, word in outcome.verdicts.items() if word == "warn"} if outcome else {}
 
@@ -156,7 +156,7 @@ def _tell(result: ControlResult) -> None:
 
 
 def _table(results: list[ControlResult]) -> str:
-    """A line for each robot and link, as Markdown."""
+    """Return a Markdown table with a line for each robot and link."""
     columns = ("robot", "link", "runs", "conformant", "false", "undecided", "verdicts", "median s", "longest s")
     lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for (robot, link), group in itertools.groupby(results, lambda one: (one.robot, one.variant)):

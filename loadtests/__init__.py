@@ -1,8 +1,14 @@
-"""Load tests: how fast a robot answers over SOAP and over REST, up to which load, and how sure we are.
+"""Load tests: how fast a robot responds over SOAP and over REST, up to which load, and how certain the figures are.
 
-Of the other rooms only the contract is imported. From the ground up, none importing what stands above it: `clients`
-send requests and tell what came of them; `schedule` says when each is due and starts it then; `statistics` record what
-happened and turn it into quantiles, intervals and verdicts; `settings` say what is asked for; `measuring` carries plans
-out with Locust's users, here or on other machines; `result` makes latency.json of it; `engine` runs all this in a
-process of its own, which `cli` starts. `locustfile` and `node` are for Locust and its Kubernetes operator to call.
+The rooms from the ground up; none imports what stands above it:
+
+- `clients` send requests and return the outcome;
+- `schedule` decides when each request is due, and starts it then;
+- `statistics` record outcomes and turn them into quantiles, intervals and verdicts;
+- `settings` hold what is asked for;
+- `measuring` carries plans out with Locust's users, on this machine or on others;
+- `result` makes latency.json;
+- `engine` runs all this in a process of its own, which `cli` starts.
+
+Locust loads `locustfile`, and its Kubernetes operator starts `node`.
 """

@@ -1,12 +1,10 @@
 """The process that measures: `python -m loadtests`.
 
-On its standard input stand the name of the file into which it puts the result's path, and the settings as JSON.
+Its standard input contains the name of the file into which it writes the result's path, and the settings as JSON.
 
-It is a process of its own because importing Locust makes gevent replace the sockets, locks and sleeps of
-everything in the process: front door, reports and tests keep the real ones.
+It is a process of its own because importing Locust makes gevent replace the sockets, locks and sleeps of the whole
+process: front door, reports and tests keep the real ones.
 """
-
-from __future__ import annotations
 
 import signal
 import sys
@@ -17,7 +15,7 @@ from conformance.commandline.exit_codes import ExitCode
 
 
 def main() -> int:
-    """Do the run; returns the exit code."""
+    """Run the settings on standard input; returns the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during the imports ends it without a traceback
     from loadtests.engine.run import carry_out  # noqa: PLC0415 -- it takes a second, during which Ctrl-C has to work
     from loadtests.settings.settings import Settings  # noqa: PLC0415 -- as above
@@ -35,7 +33,7 @@ def main() -> int:
 
 
 def _raise_file_limit() -> None:
-    """A connection is a descriptor: take as many as the system lets us have."""
+    """Raise the limit on open files as far as the system allows: each connection is one."""
     if sys.platform == "win32":
         return
     import resource  # noqa: PLC0415 -- there is none on Windows

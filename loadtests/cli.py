@@ -1,16 +1,16 @@
-"""`roaas load`: options, and the process that does the measuring."""
-
-from __future__ import annotations
+"""`roaas load`: the options, and the process that does the measuring."""
 
 import os
 import shlex
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from types import FrameType
+from typing import Any, Self
 
 import click
 
@@ -27,20 +27,17 @@ from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
 from loadtests.settings.settings import STEP_S, Settings
 from loadtests.settings.settle import DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, SettingsError, settle
 
-if TYPE_CHECKING:
-    from types import FrameType
-
 DEFAULT_OUT = "out"  # as `roaas certify` does
-#: NumPy's linear algebra: its threads wait for one another by spinning, ten times as long on a busy machine.
+#: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _FILE = click.Path(path_type=Path)
 _DESCRIPTIONS = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint")
 
 
 def _run_load(settings: Settings, written: Path) -> CommandResult:
-    """Carry out a run in a process of its own, which says by a file of ours what it wrote.
+    """Carry out a run in a process of its own, which writes the path of its result into the file `written`.
 
-    The process has its own session, so that Ctrl-C comes to it through us, once: it then writes what it has.
+    The process has its own session, so that Ctrl-C reaches it through this process, once: it then writes what it has.
     """
     child = subprocess.Popen(
         [sys.executable, "-m", "loadtests"],
@@ -62,36 +59,35 @@ def _run_load(settings: Settings, written: Path) -> CommandResult:
     finally:
         for number, handler in earlier.items():
             signal.signal(number, handler)
-    if code < 0:  # ended by a signal: before it could take Ctrl-C as a wish, or by force
+    if code < 0:  # ended by a signal: before it handled Ctrl-C itself, or killed
         code = ExitCode.INTERRUPTED if -code in earlier else ExitCode.INCONCLUSIVE
     return CommandResult(code, Path(written.read_text(encoding="utf-8")) if written.exists() else None)
 
 
-def _rates(_: click.Context, __: click.Parameter, value: str | None) -> tuple[float, ...]:
-    if not value:
-        return ()
-    try:
-        return tuple(float(part) for part in value.split(","))
-    except ValueError:
-        raise click.BadParameter(f"{value!r} is no list of rates such as 100,200,400") from None
+def _parsed(read: Callable[[str], Any], expected: str) -> Callable[[click.Context, click.Parameter, str | None], Any]:
+    """Return a callback that reads an option's text, and names what it expected where it cannot."""
+
+    def callback(_: click.Context, __: click.Parameter, value: str | None) -> Any:
+        try:
+            return read(value or "")
+        except ValueError:
+            raise click.BadParameter(f"{value!r} is not {expected}") from None
+
+    return callback
 
 
-def _counts(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, ...]:
-    try:
-        return tuple(sorted({int(part) for part in value.split(",")})) if value else ()
-    except ValueError:
-        raise click.BadParameter(f"{value!r} is no list of numbers such as 1,8,32,128,512") from None
-
-
-def _share(_: click.Context, __: click.Parameter, value: str) -> float:
-    try:
-        return float(value.removesuffix("%")) / 100
-    except ValueError:
-        raise click.BadParameter(f"{value!r} is no percentage such as 5%") from None
+_RATES = _parsed(
+    lambda text: tuple(float(part) for part in text.split(",")) if text else (), "a list of rates such as 100,200,400"
+)
+_COUNTS = _parsed(
+    lambda text: tuple(sorted({int(part) for part in text.split(",")})) if text else (),
+    "a list of numbers such as 1,8,32,128,512",
+)
+_SHARE = _parsed(lambda text: float(text.removesuffix("%")) / 100, "a percentage such as 5%")
 
 
 def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
-    """What the options say of the robot to compare with; without a statement it takes this robot's credentials.
+    """Return what the options say of the robot to compare with; without a statement it shares this robot's credentials.
 
     Raises:
         TomlFileError: its statement cannot be used.
@@ -108,94 +104,105 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 
 @click.command(cls=ResultCommand)
 @click.argument("statement", required=False, type=_FILE)
-@click.option("--rest", metavar="URL", help="The REST interface's base URL.")
-@click.option("--publishers-wsdl", metavar="URL|FILE", help="WSDL of the service that takes deliveries.")
-@click.option("--subscribers-wsdl", metavar="URL|FILE", help="WSDL of the service that tells the pose.")
-@click.option("--publishers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say.")
-@click.option("--subscribers-endpoint", metavar="URL", help="Likewise for the subscribers' service.")
-@click.option("--rosbridge", metavar="URL", help="A rosbridge to the robot, to measure as well.")
+@click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
+@click.option("--publishers-wsdl", metavar="URL|FILE", help="WSDL of the publishers service, which takes deliveries.")
+@click.option("--subscribers-wsdl", metavar="URL|FILE", help="WSDL of the subscribers service, which returns the pose.")
+@click.option("--publishers-endpoint", metavar="URL", help="Address of that service, when its WSDL does not say.")
+@click.option("--subscribers-endpoint", metavar="URL", help="Address of that service, when its WSDL does not say.")
+@click.option("--rosbridge", metavar="URL", help="Measure this rosbridge to the robot as well.")
 @click.option(
-    "--operation", "operations", multiple=True, type=click.Choice(OPERATIONS), help="What to call (repeatable)."
+    "--operation", "operations", multiple=True, type=click.Choice(OPERATIONS), help="Call this operation; repeatable."
 )
 @click.option("--interface", "interfaces", multiple=True, type=click.Choice(INTERFACES), help="Only this interface.")
 @click.option("--client", "clients", multiple=True, type=click.Choice(CLIENTS), help="Only this client.")
 @click.option("--rate", type=float, help=f"Open model: requests per second (default {DEFAULT_RATE:g}).")
-@click.option("--users", type=int, help="Closed model: users that each wait for their answer.")
-@click.option("--arrivals", type=click.Choice(["constant", "poisson"]), default="constant", show_default=True)
+@click.option("--users", type=int, help="Closed model: users, each of which waits for its response.")
+@click.option(
+    "--arrivals",
+    type=click.Choice(["constant", "poisson"]),
+    default="constant",
+    show_default=True,
+    help="Open model: how requests are spaced.",
+)
 @click.option("--duration", "duration_s", type=float, help=f"Seconds to measure (default {DEFAULT_DURATION_S:g}).")
 @click.option(
-    "--warmup", "warmup_s", type=float, help=f"Seconds of load before, not counted (default {DEFAULT_WARMUP_S:g})."
+    "--warmup", "warmup_s", type=float, help=f"Seconds of load beforehand, not counted (default {DEFAULT_WARMUP_S:g})."
 )
-@click.option("--timeout", "timeout_s", type=float, help="Deadline of a request in seconds.")
-@click.option("--seed", type=int, default=1, show_default=True, help="Fixes schedule, payloads and intervals.")
+@click.option("--timeout", "timeout_s", type=float, help="Deadline of one request, in seconds.")
+@click.option("--seed", type=int, default=1, show_default=True, help="Seed of schedule, payloads and intervals.")
 @click.option(
     "--repeat",
     type=click.IntRange(1, 100),
     default=1,
     show_default=True,
-    help="Run the duel so often, each time over new connections; intervals then hold for another run as well.",
+    help="Repeat the duel N times over new connections; from 4 on, the intervals show how runs differ.",
+    metavar="N",
 )
 @click.option(
-    "--restart-command", metavar="CMD", help="Start the robot anew before each repeat by this command (no shell)."
+    "--restart-command", metavar="CMD", help="Restart the robot with this command before each repeat (no shell)."
 )
 @click.option("--processes", type=click.IntRange(0, 256), default=1, show_default=True, help="Workers on this machine.")
 @click.option(
-    "--expect-workers", "expect", type=click.IntRange(0, 1000), default=0, help="Workers in all, on other machines too."
+    "--expect-workers", "expect", type=click.IntRange(0, 1000), default=0, help="Workers in total, on all machines."
 )
 @click.option("--master-host", default="127.0.0.1", show_default=True, help="Where the master listens for workers.")
 @click.option("--master-port", type=click.IntRange(0, 65535), default=0, help="Its port; 0 picks a free one.")
 @click.option("--web-port", type=click.IntRange(1, 65535), help="Show Locust's web UI on this port.")
 @click.option("--web-host", default="127.0.0.1", show_default=True, help="Where the web UI and the metrics listen.")
 @click.option("--metrics-port", type=click.IntRange(1, 65535), help="Serve the histograms to Prometheus on this port.")
-@click.option("--steps", is_flag=True, help="Then step the load up to find where the robot gives way.")
-@click.option("--step-rates", callback=_rates, metavar="R,R,…", help="The rates to step through.")
-@click.option("--knee", is_flag=True, help="Search by bisection where REST, SOAP and both at once give way.")
+@click.option("--steps", is_flag=True, help="Then raise the rate in steps until the robot breaks down.")
+@click.option("--step-rates", callback=_RATES, metavar="R,R,…", help="The rates of these steps.")
+@click.option("--knee", is_flag=True, help="Find the highest rate of REST, SOAP and both together, by bisection.")
 @click.option(
-    "--knee-searches", type=click.IntRange(1, 50), default=KNEE_SEARCHES, show_default=True, help="How often to search."
+    "--knee-searches",
+    type=click.IntRange(1, 50),
+    default=KNEE_SEARCHES,
+    show_default=True,
+    help="How often to search for it.",
 )
-@click.option("--connections", callback=_counts, metavar="N,N,…", help="Then keep so many connections busy.")
+@click.option("--connections", callback=_COUNTS, metavar="N,N,…", help="Then keep this many connections busy.")
 @click.option(
     "--step-duration",
     "step_s",
     type=float,
     default=STEP_S,
     show_default=True,
-    help="Seconds for each step and interface.",
+    help="Seconds of each step, for each interface.",
 )
-@click.option("--end-to-end", is_flag=True, help="Also time deliveries until the application has them.")
+@click.option("--end-to-end", is_flag=True, help="Also measure the time until the robot's application has a delivery.")
 @click.option("--ros-domain-id", type=click.IntRange(0, 232), help="The robot's ROS domain, for --end-to-end.")
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
-@click.option("--token-file", metavar="FILE", help="Holds the robot's bearer token.")
+@click.option("--token-file", metavar="FILE", help="File with the robot's bearer token.")
 @click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")
-@click.option("--against", metavar="URL|STATEMENT", help="Another robot, or version, to take turns with and compare.")
-@click.option("--against-publishers-wsdl", metavar="URL|FILE", help="That robot's WSDLs.")
-@click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="Likewise.")
-@click.option("--against-publishers-endpoint", metavar="URL", help="Where its services are, when no WSDL says.")
-@click.option("--against-subscribers-endpoint", metavar="URL", help="Likewise.")
+@click.option("--against", metavar="URL|STATEMENT", help="Compare with another robot or version; the two take turns.")
+@click.option("--against-publishers-wsdl", metavar="URL|FILE", help="WSDL of the other robot's publishers service.")
+@click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="WSDL of its subscribers service.")
+@click.option("--against-publishers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
+@click.option("--against-subscribers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
 @click.option(
-    "--tolerance", callback=_share, default="5%", show_default=True, help="By how much it may be slower than that."
+    "--tolerance", callback=_SHARE, default="5%", show_default=True, help="How much slower than the other it may be."
 )
 @click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
-@click.option("--save", metavar="NAME", help="Store the result as a baseline of that name.")
-@click.option("--baseline", metavar="NAME", help="Compare with the result that was stored last under that name.")
-@click.option("--baselines", type=_FILE, metavar="DIR", default=FOLDER, show_default=True, help="Where they are.")
-@click.option("--out", metavar="DIR", default=DEFAULT_OUT, show_default=True, help="Where the result goes.")
+@click.option("--save", metavar="NAME", help="Store the result as a baseline of this name.")
+@click.option("--baseline", metavar="NAME", help="Compare with the latest result stored under this name.")
+@click.option("--baselines", type=_FILE, metavar="DIR", default=FOLDER, show_default=True, help="Folder of baselines.")
+@click.option("--out", metavar="DIR", default=DEFAULT_OUT, show_default=True, help="Folder for the results.")
 def load(statement: Path | None, **options: Any) -> CommandResult:
-    """Measure how fast a robot answers, SOAP against REST.
+    """Measure how fast a robot responds, and compare SOAP with REST.
 
-    With --against two robots take turns, and what counts is whether this one is slower than that.
+    With --against, two robots take turns, and the result says whether this one is slower than the other.
 
-    Exit codes: 0 thresholds met, not slower; 1 missed, slower; 2 usage; 3 robot not reachable; 4 measurement not valid,
-    or it cannot be told; 130 interrupted.
+    Exit codes: 0 thresholds met and not slower; 1 threshold missed or slower; 2 usage error; 3 robot not reachable;
+    4 measurement not valid or inconclusive; 130 interrupted.
     """
     try:
         said = load_robot_statement(statement) if statement is not None else Statement()
         kept = _Baselines.of(options.pop("baselines"), options.pop("save"), options.pop("baseline"))
-        limits = load_thresholds(options.pop("thresholds")) if options["thresholds"] else ()
-        options.pop("thresholds", None)
+        file = options.pop("thresholds")
+        limits = load_thresholds(file) if file else ()
         other, tolerance = _other_robot(options, said), options["tolerance"]
         settings = settle(CliOptions.of(**options, against=other, thresholds=limits, command=_command_line()), said)
-        _check_folder(Path(settings.output.folder))
+        _make_folder(Path(settings.output.folder))
     except (TomlFileError, SettingsError, BaselineError) as error:
         click.echo(f"roaas load: {error}", err=True)
         return CommandResult(ExitCode.USAGE)
@@ -206,29 +213,29 @@ def load(statement: Path | None, **options: Any) -> CommandResult:
 
 @dataclass(frozen=True)
 class _Baselines:
-    """What a run has to do with stored results: the folder to store it in, and the result to compare it with."""
+    """The stored results that concern a run: the folder to store its result in, and the result to compare it with."""
 
     store_in: Path | None
     old: Path | None
 
     @classmethod
-    def of(cls, baselines: Path, save: str | None, baseline: str | None) -> _Baselines:
-        """Look before the run whether all is there.
+    def of(cls, baselines: Path, save: str | None, baseline: str | None) -> Self:
+        """Check the options before the run.
 
         Raises:
-            BaselineError: a name is none, or there is nothing to compare with.
+            BaselineError: a name is not allowed, or there is nothing to compare with.
         """
         old = newest(folder_of(baselines, baseline)) if baseline is not None else None
         return cls(folder_of(baselines, save) if save is not None else None, old)
 
     def after(self, result: CommandResult, tolerance: float, door: Any) -> CommandResult:
-        """Compare and store a run's result; a run that missed nothing else has the comparison's exit code."""
+        """Compare and store a run's result; where the run itself passed, the comparison decides the exit code."""
         code = result.exit_code
         if result.file is None:
             return result
         if self.old is not None and door is not None:
-            told = door.compare(self.old, result.file, tolerance)
-            code = told if code == ExitCode.PASSED else code
+            compared = door.compare(self.old, result.file, tolerance)
+            code = compared if code == ExitCode.PASSED else code
         if self.store_in is not None:
             try:
                 stored = store(result.file, self.store_in)
@@ -242,12 +249,12 @@ class _Baselines:
 
 
 def _command_line() -> str:
-    """As it was given, without the folders of this machine."""
+    """Return the command line without the folders of this machine."""
     return shlex.join(["roaas", *map(without_folders, sys.argv[1:])])
 
 
-def _check_folder(folder: Path) -> None:
-    """Fail now rather than after the run."""
+def _make_folder(folder: Path) -> None:
+    """Make the folder for the result, so that a run does not fail at its end."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,13 +1,11 @@
 """Users for plain Locust, with its web UI: `locust -f loadtests/locustfile.py --rest URL`.
 
-Closed users of both interfaces, wire and library clients, as many of each as the UI is told. Locust's buckets of
-whole milliseconds are replaced by microseconds, so that its percentiles say something at a robot's speed. For
-figures to rely on (open model, alternating blocks, intervals) there is `roaas load`.
+Closed-model users of both interfaces, with wire and library clients, as many of each as the web UI asks for. Locust's
+buckets of whole milliseconds are replaced by microseconds, because a robot responds in less than one. For reliable
+figures (open model, alternating blocks, intervals) use `roaas load`.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import locust.stats
 from locust import User, constant_throughput, events, tag, task
@@ -22,10 +20,8 @@ from loadtests.clients.payloads import CATALOGUE, VARIANTS
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.settings.cli_options import CliOptions
+from loadtests.settings.settings import Settings
 from loadtests.settings.settle import SettingsError, settle
-
-if TYPE_CHECKING:
-    from loadtests.settings.settings import Settings
 
 OPERATIONS = tuple(CATALOGUE)
 _TEXTS = ("rest", "publishers-wsdl", "subscribers-wsdl", "publishers-endpoint", "subscribers-endpoint")
@@ -33,7 +29,7 @@ _FILES = ("token-file", "ca-file")
 
 
 def microseconds(response_time_ms: float) -> float:
-    """Locust's bucket of a response time: whole microseconds, in ms."""
+    """Return the bucket of a response time for Locust: whole microseconds, in ms."""
     return round(response_time_ms, 3)
 
 
@@ -42,7 +38,7 @@ locust.stats.bucket_response_time = microseconds  # type: ignore[assignment]  # 
 
 @events.init_command_line_parser.add_listener  # type: ignore[untyped-decorator]  # Locust is typed in part
 def add_options(parser: Any) -> None:
-    """Our options beside Locust's own; they appear in the web UI too, but for the token's file."""
+    """Add our options to Locust's own; the token's file does not appear in the web UI."""
     for name in _TEXTS:
         parser.add_argument(f"--{name}", env_var=f"ROAAS_{name.upper().replace('-', '_')}", default="")
     for name in _FILES:
@@ -54,7 +50,7 @@ def add_options(parser: Any) -> None:
 
 
 class _Events:
-    """Records into Locust's request event: what callers expect of a recorder."""
+    """Records into Locust's request event, in place of a recorder."""
 
     def __init__(self, environment: Any, workload: Workload) -> None:
         self._environment = environment
@@ -62,17 +58,17 @@ class _Events:
         self.label = ("", "")
 
     def record(self, _: int, operation: int, due: int, start: int, *moments: int, queued: bool) -> None:
-        """A success; moments are built, received, done and the server's time."""
+        """Record a success; the moments are built, received, done and the server's time."""
         del due, queued
         self._fire(operation, (moments[2] - start) / 1e6, None)
 
     def failed(self, _: int, operation: int, error: CallError, due_ns: int, start_ns: int) -> None:
-        """A failure."""
+        """Record a failure."""
         del start_ns
         self._fire(operation, (now_ns() - due_ns) / 1e6, error)
 
     def count(self, name: str) -> None:
-        """Connections opened: Locust has no place for them."""
+        """Ignore connections: Locust does not count them."""
 
     def _fire(self, operation: int, time_ms: float, error: CallError | None) -> None:
         interface, client = self.label
@@ -88,10 +84,10 @@ class _Events:
 
 
 def settings_of(options: Any) -> Settings:
-    """Locust's options, checked as `roaas load` checks its own.
+    """Return settings from Locust's options, checked as `roaas load` checks its own.
 
     Raises:
-        SettingsError: see there.
+        SettingsError: the options do not make a run.
     """
     names = [name.replace("-", "_") for name in (*_TEXTS, *_FILES)]
     given = {name: getattr(options, name) for name in names}
@@ -101,10 +97,10 @@ def settings_of(options: Any) -> Settings:
 
 
 def workload_of(options: Any) -> Workload:
-    """What all users share: requests built beforehand, WSDLs parsed.
+    """Return what all users share: requests built beforehand, WSDLs parsed.
 
     Raises:
-        StopTest: the options do not lead to a robot; the message says why.
+        StopTest: the options do not make a run; the message says why.
     """
     try:
         robot = with_addresses(settings_of(options).robot)
@@ -116,7 +112,7 @@ def workload_of(options: Any) -> Workload:
 
 
 class RobotUser(User):
-    """A user of one interface through one client; once a second it calls something."""
+    """A user of one interface through one client; it calls something once a second."""
 
     abstract = True
     wait_time = constant_throughput(1)
@@ -124,7 +120,7 @@ class RobotUser(User):
     client = "wire"
 
     def on_start(self) -> None:
-        """Share what the process has built, or build it."""
+        """Share the process's workload; the first user builds it."""
         environment = self.environment
         if not hasattr(environment, "roaas_workload"):
             environment.roaas_workload = workload_of(environment.parsed_options)
@@ -138,7 +134,7 @@ class RobotUser(User):
         self._caller.close()
 
     def call(self, operation: str) -> None:
-        """Make one request, unless it would move a robot that must not, or goes where nothing is."""
+        """Send one request, unless the robot must not move or does not offer the operation."""
         options, workload = self.environment.parsed_options, self.environment.roaas_workload
         moves = CATALOGUE[operation].code is not None
         if (moves and not options.allow_motion) or not workload.robot.offers(self.interface, self.client, operation):
@@ -151,28 +147,28 @@ class RobotUser(User):
     @tag("pose")
     @task(2)
     def pose(self) -> None:
-        """Ask for the pose."""
+        """Request the pose."""
         self.call("pose")
 
     @tag("delivery")
     @task
     def delivery(self) -> None:
-        """Ask for a courier delivery."""
+        """Request a courier delivery."""
         self.call("delivery")
 
     @tag("coffee")
     @task
     def coffee(self) -> None:
-        """Ask for a coffee."""
+        """Request a coffee."""
         self.call("coffee")
 
 
 class RestWireUser(RobotUser):
-    """REST by the lean client."""
+    """REST by the wire client."""
 
 
 class SoapWireUser(RobotUser):
-    """SOAP by the lean client."""
+    """SOAP by the wire client."""
 
     interface = "soap"
 

@@ -1,11 +1,9 @@
-"""A load test's master or one of its workers, as the Locust operator for Kubernetes starts them.
+"""A master or a worker of a load test, as the Locust operator for Kubernetes starts them.
 
-The operator runs one image as `--master ARGS` once and as `--worker --master-host SERVICE ARGS` as often as asked,
-with the same ARGS. Here ARGS are those of `roaas load`; the worker passes over what only the master needs. When the
-master is done it lingers, for its pod and the result in it vanish with it.
+The operator runs one image as `--master ARGS` once and as `--worker --master-host SERVICE ARGS` as often as wanted,
+with the same ARGS. Here ARGS are those of `roaas load`; a worker ignores what only the master needs. When the master is
+done it lingers, because its pod and the result in it vanish with it.
 """
-
-from __future__ import annotations
 
 import os
 import sys
@@ -19,7 +17,7 @@ LINGER_S = 600.0
 
 
 def main(words: list[str]) -> None:
-    """Take the role that the words say; ends with the exit code of `roaas load`."""
+    """Run as the master or as a worker; ends with the exit code of `roaas load`."""
     if "--worker" in words:
         _work(words)
         return
@@ -47,7 +45,7 @@ def _work(words: list[str]) -> None:
 
 
 def _value(words: list[str], option: str) -> str | None:
-    """An option's value, in either way of writing it."""
+    """Return an option's value, given as `--option value` or `--option=value`."""
     for word, following in zip(words, [*words[1:], ""], strict=True):
         if word == option:
             return following

@@ -1,5 +1,5 @@
-"""Turns result files into what people read, and signs them.
+"""Writes reports from result files, and signs them.
 
-`reports.rendering.render(directory)` writes everything that belongs to the result files of a directory;
-`reports.attestation` signs and verifies; `reports.errors` names what can be wrong.
+`reports.rendering.render(directory)` writes all pages for the result files in a directory, `reports.attestation` signs
+and verifies, and `reports.errors` has the exceptions.
 """

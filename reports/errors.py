@@ -1,45 +1,49 @@
-"""What can be wrong with a result file: one named exception for each kind.
+"""What can be wrong with a file that a report is made from: one exception for each kind.
 
-Every message names the file, the place in it and the offending value, so that whoever produced the file can
-act on it. The commands turn any of these into exit code 2.
+Every message names the file, the place in it and the wrong value. A command that raises one of these prints the message
+and ends with exit code 2.
 """
 
+from click import ClickException
 
-class ReportError(Exception):
-    """Base of everything that keeps a report from being written or two results from being compared."""
+
+class ReportError(ClickException):
+    """No report can be written, or two results cannot be compared."""
+
+    exit_code = 2
 
 
 class ResultMissingError(ReportError):
-    """There is no result file where one was asked for."""
+    """The result file does not exist."""
 
 
 class ResultUnreadableError(ReportError):
-    """The file is there, and the operating system or its encoding keeps us from reading it."""
+    """The file cannot be read or written: the operating system refuses, or it is not UTF-8."""
 
 
 class ResultGarbledError(ReportError):
-    """The file is no JSON (RFC 8259), as after a run that was killed while it wrote."""
+    """The file is not JSON (RFC 8259), as after a run that was killed while it wrote."""
 
 
 class ResultFormatError(ReportError):
-    """The file is JSON and names another format, or another version of it, than the one that was expected."""
+    """The file is JSON of another format or format version."""
 
 
 class ResultInvalidError(ReportError):
-    """The file names the right format and breaks its JSON Schema."""
+    """The file names the right format and violates its JSON Schema."""
 
 
 class ResultsIncompatibleError(ReportError):
-    """Both files are valid, and hold nothing that could be compared."""
+    """Both files are valid, and nothing in them can be compared."""
 
 
 class KeyUnusableError(ReportError):
-    """A key file that cannot be read, or holds another kind of key than the one that is needed."""
+    """A key file cannot be read, or holds another kind of key."""
 
 
 class PolicyUnusableError(ReportError):
-    """A policy file that cannot be read, or asks for something that does not exist."""
+    """A policy file cannot be read, or has an unknown line or value."""
 
 
 class EnvelopeRefusedError(ReportError):
-    """An envelope that proves nothing: it is garbled, of another kind, or not signed by the key that was given."""
+    """An envelope is malformed, of another kind, or not signed by the given key."""

@@ -1,4 +1,4 @@
-"""Reads result files: JSON that is checked against its public JSON Schema before it is shown."""
+"""Reads result files: JSON that is validated by its public JSON Schema before it is shown."""
 
 import json
 from functools import cache
@@ -39,28 +39,28 @@ def _schema(result_format: str) -> dict[str, Any]:
 
 @cache
 def validator(result_format: str) -> Draft202012Validator:
-    """The validator of one of the formats; kept, because building one costs more than using it."""
+    """Return the validator of a format; it is cached, because building it costs more than using it."""
     return Draft202012Validator(_schema(result_format))
 
 
 @cache
 def _quick_validator(result_format: str) -> jsonschema_rs.Validator:
-    """One that passes what is right a hundred times faster, and says less of what is not."""
+    """Return a validator that is a hundred times faster, and gives poorer error messages."""
     return jsonschema_rs.validator_for(_schema(result_format))
 
 
 def read_result(path: Path) -> dict[str, Any]:
-    """Read a conformance result; errors as in `reports.errors`."""
+    """Return a conformance result; errors as in `reports.errors`."""
     return _read(path, RESULT_FORMAT)
 
 
 def read_latency(path: Path) -> dict[str, Any]:
-    """Read a latency result; errors as in `reports.errors`."""
+    """Return a latency result; errors as in `reports.errors`."""
     return _read(path, LATENCY_FORMAT)
 
 
 def read_fleet(path: Path) -> dict[str, Any]:
-    """Read what came of a fleet; errors as in `reports.errors`."""
+    """Return the result of a fleet; errors as in `reports.errors`."""
     return _read(path, FLEET_FORMAT)
 
 
@@ -83,10 +83,10 @@ def _text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
-        raise ResultMissingError(f"{path}: there is no such file") from error
+        raise ResultMissingError(f"{path}: no such file") from error
     except UnicodeDecodeError as error:
         octet = error.object[error.start]
-        raise ResultUnreadableError(f"{path}: octet {error.start} (0x{octet:02x}) is not UTF-8") from error
+        raise ResultUnreadableError(f"{path}: byte {error.start} (0x{octet:02x}) is not UTF-8") from error
     except OSError as error:
         raise ResultUnreadableError(f"{path}: {error.strerror or error}") from error
 
@@ -102,7 +102,7 @@ def _parse(path: Path, text: str) -> Any:
     except ValueError as error:  # NaN and Infinity, and integers of thousands of digits
         raise ResultGarbledError(f"{path}: {error}") from error
     except RecursionError as error:
-        raise ResultGarbledError(f"{path}: nested too deeply to be a result") from error
+        raise ResultGarbledError(f"{path}: nested too deeply for a result") from error
 
 
 def _refuse_constant(name: str) -> NoReturn:

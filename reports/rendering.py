@@ -1,11 +1,12 @@
-"""Writes the pages that belong to the result files of a directory."""
+"""Writes the pages for the result files in a directory."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope, statement_in
+from reports.attestation.signing import Notary
 from reports.attestation.statement import RESULT_SUBJECT, sha256
 from reports.certificate.page import certificate_html, certificate_print
 from reports.certificate.seal import Seal
@@ -15,31 +16,21 @@ from reports.formats.catalogue import FORMATS
 from reports.pages.page import write_pages
 from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_fleet, read_latency, read_result
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
-
-    from reports.attestation.signing import Notary
-
 
 def render(directory: Path, notary: Notary | None = None) -> list[Path]:
-    """Write what belongs to the result files in a directory, beside them.
+    """Write the pages for each result file in a directory, and return their paths.
 
-    `result.json` gives certificate.html, certificate.md and junit.xml, where it is signed certificate-print.html too,
-    and with a notary the signed certificate.intoto.json; `latency.json` gives latency.html and latency.md;
-    `fleet.json` gives fleet.html and fleet.md. Each file is replaced at once, so that a reader never sees half of one.
-    Where one of the results is broken, the others' pages are written before the error is raised.
-
-    Returns:
-        The files written.
+    `result.json` becomes certificate.html, certificate.md and junit.xml; if it is signed, certificate-print.html as
+    well, and with a notary the signed certificate.intoto.json. `latency.json` becomes latency.html and latency.md,
+    `fleet.json` fleet.html and fleet.md. If one result is broken, the pages of the others are written first.
 
     Raises:
         ResultMissingError: there is no such directory, or no result file in it.
-        ResultUnreadableError: a file cannot be read, or the directory not be written to.
-        ResultGarbledError: a file is no JSON.
+        ResultUnreadableError: a file cannot be read, or the directory cannot be written to.
+        ResultGarbledError: a file is not JSON.
         ResultFormatError: a file is of another format or version.
-        ResultInvalidError: a file breaks its schema, a histogram in it cannot be decoded, or what is to be signed
-            contradicts itself.
+        ResultInvalidError: a file violates its schema, a histogram cannot be decoded, or a result to sign contradicts
+            itself.
     """
     if not directory.is_dir():
         raise ResultMissingError(f"{directory}: there is no such directory")
@@ -48,36 +39,31 @@ def render(directory: Path, notary: Notary | None = None) -> list[Path]:
         LATENCY_NAME: _latency,
         FLEET_NAME: _fleet,
     }
-    there = {directory / name: pages_of for name, pages_of in pages.items() if (directory / name).exists()}
-    if not there:
+    found = [directory / name for name in pages if (directory / name).exists()]
+    if not found:
         raise ResultMissingError(f"{directory}: it holds no {', '.join(pages)}")
     written: list[Path] = []
     problems: list[ReportError] = []
-    for path, pages_of in there.items():
+    for path in found:
         try:
-            written += write_pages(directory, pages_of(path))
+            written += write_pages(directory, pages[path.name](path))
         except ReportError as error:
             problems.append(error)
     if problems:
-        # One result is no worse for the other's fault: what could be written is there by now.
         raise problems[0]
     return written
 
 
 def render_formats(directory: Path, names: Sequence[str]) -> list[Path]:
-    """Write a directory's `result.json` in the formats of these names, as `reports.formats.catalogue` has them.
-
-    Returns:
-        The files written.
+    """Write a directory's `result.json` in formats of `reports.formats.catalogue`, and return the paths.
 
     Raises:
-        ReportError: as `render`, of `result.json` alone.
+        ReportError: as for `render`.
     """
-    return write_pages(directory, written_as(read_result(directory / RESULT_NAME), names))
+    return write_pages(directory, _in_formats(read_result(directory / RESULT_NAME), names))
 
 
-def written_as(result: Mapping[str, Any], names: Sequence[str]) -> dict[str, str]:
-    """A valid `roaas-result/1` document in some formats: each file's name and its text."""
+def _in_formats(result: Mapping[str, Any], names: Sequence[str]) -> dict[str, str]:
     return {FORMATS[name].file: FORMATS[name].write(result) for name in names}
 
 
@@ -85,14 +71,14 @@ def _conformance(path: Path, notary: Notary | None) -> dict[str, str]:
     document = read_result(path)
     digest = sha256(path.read_bytes())
     seal = Seal(digest, notary.key if notary else _signed_by(path, digest))
-    pages = {"certificate.html": certificate_html(document, seal), **written_as(document, ("markdown", "junit"))}
+    pages = {"certificate.html": certificate_html(document, seal), **_in_formats(document, ("markdown", "junit"))}
     if seal.key:
         pages["certificate-print.html"] = certificate_print(document, seal)
     return {**pages, ENVELOPE_NAME: notary.envelope(path, document, pages)} if notary else pages
 
 
 def _signed_by(path: Path, digest: str) -> str | None:
-    """The key that signed this very result, as the envelope beside it says: it is shown, and nothing follows."""
+    """Return the key named in the envelope beside a result, if that is for this result; nothing is verified."""
     try:
         opened = open_envelope(read_envelope(path.with_name(ENVELOPE_NAME)))
         return opened.keyid if statement_in(opened).digest_of(RESULT_SUBJECT) == digest else None
@@ -106,7 +92,7 @@ def _fleet(path: Path) -> dict[str, str]:
 
 
 def _latency(path: Path) -> dict[str, str]:
-    # Loads matplotlib and numpy, which a certificate does without: that is worth half a second.
+    # Loads matplotlib and numpy, half a second that a certificate does not need.
     from reports.latency.page import latency_html, latency_markdown  # noqa: PLC0415 - see above
 
     document = read_latency(path)

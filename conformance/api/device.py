@@ -1,4 +1,4 @@
-"""What a contract pack knows of its device, asked by the generic suite; the defaults know nothing and move nothing."""
+"""The hooks by which a contract pack tells the generic suite about its device; the defaults move nothing."""
 
 from __future__ import annotations
 

@@ -134,7 +134,7 @@ def _judge_again(
 ) -> CommandResult:
     import msgspec  # noqa: PLC0415 - as above
 
-    from conformance.engine.judged_again import judged_by_checks  # noqa: PLC0415
+    from conformance.engine.replay import judged_by_checks  # noqa: PLC0415
     from conformance.statement.statement import StatementError, load_statement  # noqa: PLC0415
 
     if contract is None:

@@ -1,4 +1,4 @@
-"""What ``roaas certify`` says at its end: classes, findings with a command to replay each, the verdict."""
+"""What ``roaas certify`` says at its end: classes, findings by cause with a command to replay each, the verdict."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-claimed": "not claimed"}
 _SHOWN_CURL = 1000
+_SHOWN_BLOCKED = 5
 
 
 def print_summary(outcome: Certification) -> None:
@@ -28,10 +29,12 @@ def print_summary(outcome: Certification) -> None:
     click.echo()
     for name, value in document["classes"].items():
         reason = document["class_reasons"].get(name, "")
-        click.echo(f"  {name:<20} {_MARKS[value]:<13}{reason[:300]}".rstrip())
-    for requirement in document["requirements"]:
+        click.echo(f"  {name:<20} {_MARKS[value]:<13}{inert(reason[:300])}".rstrip())
+    by_id = {requirement["id"]: requirement for requirement in document["requirements"]}
+    for cause in document["causes"]:
+        requirement = by_id[cause["requirement"]]
         if requirement["verdict"] in {"fail", "warn"}:
-            _print_finding(requirement)
+            _print_cause(cause, requirement)
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
     told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()))
     accepted = f", accepted by the baseline until {document['accepted_until']}" if "accepted_until" in document else ""
@@ -42,11 +45,15 @@ def print_summary(outcome: Certification) -> None:
     click.echo(f"result: {outcome.path}")
 
 
-def _print_finding(requirement: dict[str, Any]) -> None:
-    verdict, level = requirement["verdict"].upper(), requirement["level"]
-    click.echo(f"\n{verdict} {requirement['id']} ({level}, {requirement['source']})\n  {requirement['text']}")
-    for failure in requirement["failures"]:
-        click.echo(f"  expected: {inert(failure['expected'])}")
-        click.echo(f"  found:    {inert(failure['message'])} (seen {failure['seen']}x)")
-        if failure["request"]:
-            click.echo(f"  replay:   {inert(failure['request']['curl'][:_SHOWN_CURL])}")
+def _print_cause(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
+    """Print one finding, with the requirements that are not tested because of it."""
+    head = f"{requirement['verdict'].upper()} {requirement['id']} ({requirement['level']}, {requirement['source']})"
+    click.echo(f"\n{cause['number']}. {head}\n  {requirement['text']}\n  {inert(cause['text'])}")
+    blocks = cause["blocks"]
+    if blocks:
+        shown = ", ".join(blocks[:_SHOWN_BLOCKED])
+        more = f" and {len(blocks) - _SHOWN_BLOCKED} more" if len(blocks) > _SHOWN_BLOCKED else ""
+        click.echo(f"  not tested because of it: {shown}{more}")
+    failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
+    if failure["request"]:
+        click.echo(f"  replay: {inert(failure['request']['curl'][:_SHOWN_CURL])}")

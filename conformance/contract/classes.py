@@ -34,6 +34,16 @@ class Origin(StrEnum):
     CONTRACT = "contract"  # a pack's contract.md: devices that claim it
 
 
+class CauseKind(StrEnum):
+    """Why requirements are not met, or cannot be tested; in the order in which a vendor looks at them."""
+
+    NO_RESPONSE = "no-response"  # no connection, or one that was closed without a response
+    HANG = "hang"  # no whole response within the deadline
+    SERVER_ERROR = "server-error"  # a status of 5xx
+    UNREADABLE = "unreadable"  # no HTTP, or JSON or XML that no parser reads
+    RULE = "rule"  # a response that breaks a rule
+
+
 class Prerequisite(StrEnum):
     """What a run must have to judge a requirement, beside the interface."""
 

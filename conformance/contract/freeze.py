@@ -1,12 +1,13 @@
 """``python -m conformance.contract.freeze NAME [PACK]``: freeze a pack's ledger as a set, at the end of a release."""
 
 import sys
+from pathlib import Path
 
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.requirement_sets import frozen, set_folder
 
 
-def freeze(name: str, pack: str = DEFAULT_PACK) -> None:
+def freeze(name: str, pack: str | Path = DEFAULT_PACK) -> None:
     """Write ``sets/NAME.toml`` of a pack from its ledger."""
     contract = Contract.load(pack)
     lines = [f"# The requirements of set {name}: level, and SHA-256 of the text. Frozen: written once, by freeze.py."]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from conformance.contract.classes import Level, Origin, Prerequisite
+from conformance.contract.classes import CauseKind, Level, Origin, Prerequisite
 from conformance.contract.toml_file import Text, TomlFileError, fit, read_tables
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ class Requirement:
         origin: what kind of text that is.
         needs: what a run must have to judge it beside the interface.
         untestable: why no check can judge it, or None.
+        forbids: the kinds of causes that the requirement is about: it gets the finding that others meet as well.
     """
 
     id: str
@@ -43,6 +44,7 @@ class Requirement:
     origin: Origin
     needs: tuple[Prerequisite, ...] = ()
     untestable: str | None = None
+    forbids: tuple[CauseKind, ...] = ()
 
 
 class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -54,6 +56,7 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     origin: Origin
     needs: tuple[Prerequisite, ...] = ()
     untestable: Text | None = None
+    forbids: tuple[CauseKind, ...] = ()
 
 
 def expanded(ids: Iterable[str], ledger: Iterable[str]) -> tuple[str, ...]:

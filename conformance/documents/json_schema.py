@@ -26,7 +26,7 @@ class UnresolvedError(Exception):
 
 
 def pointed(document: Schema, reference: str) -> Any:
-    """What a local ``#/...`` reference points to.
+    """Return what a local ``#/...`` reference points to.
 
     Raises:
         UnresolvedError: it is not local, or there is nothing.
@@ -43,7 +43,7 @@ def pointed(document: Schema, reference: str) -> Any:
 
 
 def resolved(document: Schema, value: Any, trail: tuple[str, ...] = ()) -> Any:
-    """A copy of ``value`` in which every ``$ref`` is replaced by what it points to.
+    """Return a copy of ``value`` in which every ``$ref`` is replaced by what it points to.
 
     A schema that holds itself becomes ``{}`` at the second turn: it is then checked to that depth.
 
@@ -65,7 +65,7 @@ def resolved(document: Schema, value: Any, trail: tuple[str, ...] = ()) -> Any:
 
 
 def modern(schema: Any) -> Any:
-    """A schema of OpenAPI 3.0 in the terms of Draft 2020-12; one of OpenAPI 3.1 stays as it is."""
+    """Return a schema of OpenAPI 3.0 in the terms of Draft 2020-12; one of OpenAPI 3.1 stays as it is."""
     if isinstance(schema, list):
         return [modern(item) for item in schema]
     if not isinstance(schema, dict):
@@ -80,7 +80,7 @@ def modern(schema: Any) -> Any:
 
 
 def opened(schema: Any) -> Any:
-    """The schema without a ban on further fields: what a robot sends may carry more than the contract names."""
+    """Return the schema without a ban on further fields: a response may have more than the contract names."""
     if isinstance(schema, list):
         return [opened(item) for item in schema]
     if not isinstance(schema, dict):
@@ -93,7 +93,7 @@ def opened(schema: Any) -> Any:
 
 
 def types_of(schema: Schema) -> tuple[str, ...]:
-    """The JSON types that a schema names; empty where it names none."""
+    """Return the JSON types that a schema names; empty where it names none."""
     given = schema.get("type", ())
     if isinstance(given, str):
         return (given,)
@@ -105,18 +105,45 @@ def types_of(schema: Schema) -> tuple[str, ...]:
 
 
 def kind_of(schema: Schema) -> str:
-    """The one JSON type of a schema other than null; ``string`` where it is open (an enumeration, mostly)."""
+    """Return the one JSON type of a schema other than null; ``string`` where it is open (an enumeration, mostly)."""
     return next((name for name in types_of(schema) if name != "null"), "string")
 
 
+def kinds_of(schema: Schema) -> frozenset[str]:
+    """Return the JSON types other than null that a value may have, in any alternative; empty where any will do."""
+    named = types_of(schema)
+    if not named and ("enum" in schema or "const" in schema):
+        named = tuple(_type_of(value) for value in schema.get("enum", [schema.get("const")]))
+    if named:
+        return frozenset(named) - {"null"}
+    for key in ("anyOf", "oneOf"):
+        alternatives = [kinds_of(part) for part in schema.get(key, ()) if types_of(part) != ("null",)]
+        if alternatives:
+            return frozenset().union(*alternatives) if all(alternatives) else frozenset()
+    return next(filter(None, map(kinds_of, schema.get("allOf", ()))), frozenset())
+
+
+def is_numeric(schema: Schema) -> bool:
+    """Return whether every value of a schema is a number, or null."""
+    return bool(kinds_of(schema)) and kinds_of(schema) <= {"number", "integer"}
+
+
+def _type_of(value: Any) -> str:
+    """Return the JSON type of a value."""
+    for kind, name in ((bool, "boolean"), (int, "integer"), (float, "number"), (str, "string"), (list, "array")):
+        if isinstance(value, kind):
+            return name
+    return "null" if value is None else "object"
+
+
 def is_number(value: Any) -> bool:
-    """Whether a JSON value is a number that a double can hold; an integer counts as one."""
+    """Return whether a JSON value is a number that a double can hold; an integer counts as one."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(as_double(value))
 
 
 @cache
 def _naming() -> Any:
-    """The class of validators that name what is wrong."""
+    """Return the class of validators that name what is wrong."""
     # Imported late: it costs a tenth of a second, and is needed when something is wrong.
     from jsonschema import Draft202012Validator  # noqa: PLC0415
     from jsonschema.validators import extend  # noqa: PLC0415
@@ -134,7 +161,7 @@ class Shape:
         self._quick = jsonschema_rs.validator_for(schema)
 
     def problem(self, value: Any, where: str = "") -> str:
-        """Why ``value``, found at ``where``, does not have this shape, with its place; empty where it has."""
+        """Return why ``value``, found at ``where``, does not have this shape, with its place; empty where it has."""
         try:
             if self._passes(value):
                 return ""
@@ -144,7 +171,7 @@ class Shape:
         return _described(error, where) if error is not None else ""
 
     def broken_rule(self, value: Any) -> tuple[str, bool]:
-        """The keyword that ``value`` breaks first, and whether it is the value itself that breaks it (or a part)."""
+        """Return the keyword that ``value`` breaks first, and whether the value itself breaks it, or a part of it."""
         error = self._first_error(value)
         return ("", False) if error is None else (str(error.validator), not error.absolute_path)
 
@@ -186,7 +213,7 @@ _SHAPES: dict[int, Shape] = {}
 
 
 def shape_of(schema: Schema) -> Shape:
-    """The shape of a schema, made once for each schema object (which the shape then keeps alive)."""
+    """Return the shape of a schema, made once for each schema object (which the shape then keeps alive)."""
     shape = _SHAPES.get(id(schema))
     if shape is None or shape.schema is not schema:
         shape = _SHAPES[id(schema)] = Shape(schema)
@@ -194,7 +221,7 @@ def shape_of(schema: Schema) -> Shape:
 
 
 def numbers_in(value: Any) -> Iterator[float]:
-    """Every number in a JSON value, as a double."""
+    """Yield every number in a JSON value, as a double."""
     if isinstance(value, bool):
         return
     if isinstance(value, int | float):
@@ -208,7 +235,7 @@ def numbers_in(value: Any) -> Iterator[float]:
 
 
 def _all_finite(value: Any) -> bool:
-    """Whether every number in a JSON value is one that a double can hold; every answer is looked through by this."""
+    """Return whether every number in a JSON value is one that a double can hold; called for every response."""
     if isinstance(value, float):
         return math.isfinite(value)
     if isinstance(value, list):
@@ -219,7 +246,7 @@ def _all_finite(value: Any) -> bool:
 
 
 def as_double(value: float) -> float:
-    """A JSON number as the double that a client makes of it; an integer beyond every double is infinite."""
+    """Return a JSON number as the double that a client makes of it; an integer beyond every double is infinite."""
     try:
         return float(value)
     except OverflowError:

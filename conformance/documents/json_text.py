@@ -54,26 +54,26 @@ class _Reader:
         self.twice = ""
 
     def constant(self, name: str) -> float:
-        """NaN and the Infinities, which are no JSON."""
+        """Return NaN or an Infinity, which are no JSON, and record it."""
         self.non_finite = self.non_finite or name
         return {"NaN": math.nan, "Infinity": math.inf}.get(name, -math.inf)
 
     def real(self, lexeme: str) -> float:
-        """A number with a fraction or an exponent."""
+        """Return a number with a fraction or an exponent."""
         number = float(lexeme)
         if math.isinf(number):
             self.non_finite = self.non_finite or lexeme[:40]
         return number
 
     def whole(self, lexeme: str) -> int | float:
-        """An integer of any length."""
+        """Return an integer of any length."""
         if len(lexeme) <= _DIGITS_READ:
             return int(lexeme)
         self.non_finite = self.non_finite or f"{lexeme[:12]}... ({len(lexeme)} digits)"
         return -math.inf if lexeme.startswith("-") else math.inf
 
     def members(self, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        """An object."""
+        """Return an object, and record a name that stands in it twice."""
         result = dict(pairs)
         if len(result) < len(pairs):
             names = [name for name, _ in pairs]
@@ -115,7 +115,7 @@ def read_json(body: bytes) -> JsonText:
 
 
 def shown(value: Any) -> str:
-    """A value as JSON writes it, cut where it is long."""
+    """Return a value as JSON writes it, cut where it is long."""
     try:
         text = json.dumps(value)
     except (ValueError, RecursionError):

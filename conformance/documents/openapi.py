@@ -89,7 +89,7 @@ class Operation:
         return self.method in SAFE
 
     def declared(self, status: int) -> dict[str, Schema] | None:
-        """The media types that the contract declares for a status; None where it does not declare the status."""
+        """Return the media types that the contract declares for a status; None where it does not declare the status."""
         for key in (str(status), f"{status // 100}XX", f"{status // 100}xx", "default"):
             if key in self.responses:
                 return self.responses[key]
@@ -112,23 +112,23 @@ class Operation:
         return None
 
     def parameter(self, where: str) -> tuple[Parameter, ...]:
-        """The parameters of one kind."""
+        """Return the parameters of one kind."""
         return tuple(item for item in self.parameters if item.where == where)
 
 
 def is_json(media_type: str) -> bool:
-    """Whether a media type is JSON (RFC 6839 3.1)."""
+    """Return whether a media type is JSON (RFC 6839 3.1)."""
     return media_type == "application/json" or media_type.endswith("+json")
 
 
 def is_xml(media_type: str) -> bool:
-    """Whether a media type is XML (RFC 7303 4)."""
+    """Return whether a media type is XML (RFC 7303 4)."""
     return media_type in {"application/xml", "text/xml"} or media_type.endswith("+xml")
 
 
 @lru_cache(maxsize=8)
 def operations_of(contract: Contract) -> tuple[Operation, ...]:
-    """All operations of a contract, in its order.
+    """Return all operations of a contract, in its order.
 
     Raises:
         ContractError: its OpenAPI description has a reference that leads nowhere, or is not built as one.
@@ -140,7 +140,7 @@ def operations_of(contract: Contract) -> tuple[Operation, ...]:
 
 
 def read_operations(document: Schema) -> list[Operation]:
-    """The operations of an OpenAPI document.
+    """Return the operations of an OpenAPI document.
 
     Raises:
         UnresolvedError, AttributeError, TypeError, KeyError: it is not built as one.
@@ -195,7 +195,7 @@ def _parameter(given: dict[str, Any]) -> Parameter:
 
 
 def _examples(given: dict[str, Any]) -> tuple[Any, ...]:
-    """The examples of a parameter or a media type; its schema's where it has none of its own."""
+    """Return the examples of a parameter or a media type; its schema's where it has none of its own."""
     if "example" in given:
         return (given["example"],)
     named = tuple(item["value"] for item in given.get("examples", {}).values() if "value" in item)
@@ -232,7 +232,7 @@ class Resource:
 
 @lru_cache(maxsize=8)
 def resources_of(contract: Contract) -> tuple[Resource, ...]:
-    """The resources of a contract, in its order.
+    """Return the resources of a contract, in its order.
 
     Raises:
         ContractError: see operations_of.
@@ -245,31 +245,31 @@ def resources_of(contract: Contract) -> tuple[Resource, ...]:
 
 @lru_cache(maxsize=512)
 def resource_at(contract: Contract, path: str) -> Resource | None:
-    """The resource that a path is for; a literal path wins over a template (OpenAPI 3.1, 4.8.8.2)."""
+    """Return the resource that a path is for; a literal path wins over a template (OpenAPI 3.1, 4.8.8.2)."""
     found = [item for item in resources_of(contract) if item.pattern.fullmatch(path)]
     return min(found, key=lambda item: item.template.count("{"), default=None)
 
 
 def matching(contract: Contract, method: str, path: str) -> Operation | None:
-    """The operation that a request is for; HEAD counts as GET. The path is below the base URL, without query."""
+    """Return the operation that a request is for; HEAD counts as GET. The path is below the base URL, without query."""
     resource = resource_at(contract, path)
     return resource.operations.get("GET" if method == "HEAD" else method) if resource else None
 
 
 def known_path(contract: Contract, path: str) -> bool:
-    """Whether any resource of the contract has this path."""
+    """Return whether any resource of the contract has this path."""
     return resource_at(contract, path) is not None
 
 
 @lru_cache(maxsize=512)
 def is_normal(path: str) -> bool:
-    """Whether a path has no segment that servers take away by themselves: an empty one, ``.`` or ``..``."""
+    """Return whether a path has no segment that servers take away by themselves: an empty one, ``.`` or ``..``."""
     segments = [unquote(segment) for segment in path.split("/")]
     return "" not in segments[1:-1] and not {".", ".."} & set(segments)
 
 
 def inside_prefix(contract: Contract, path: str) -> bool:
-    """Whether a path begins with the first segment of one of the contract's; elsewhere anybody may answer."""
+    """Return whether a path begins like one of the contract's; elsewhere another server may respond."""
     return path.lstrip("/").split("/", 1)[0] in {
         item.template.lstrip("/").split("/", 1)[0] for item in resources_of(contract)
     }

@@ -10,7 +10,7 @@ from conformance.documents.openapi import PARAMETER, Operation, read_operations
 
 
 def openapi_fault(document: Any) -> str:
-    """Why a document is no valid OpenAPI 3 description; empty where it is one.
+    """Return why a document is no valid OpenAPI 3 description; empty where it is one.
 
     Schemathesis carries the schemas that the OpenAPI Initiative publishes, and is there anyway.
     """
@@ -18,17 +18,17 @@ def openapi_fault(document: Any) -> str:
         return "it is no object"
     version = document.get("openapi")
     if not isinstance(version, str) or not re.fullmatch(r"3\.[0-2]\.\d+", version):
-        return f"its version is {version!r}"
+        return f"a description of version {version!r}"
     error = next(iter(_validator(version[:3]).iter_errors(document)), None)
     if error is not None:
         where = ".".join(str(part) for part in error.instance_path)
-        return f"at {where or 'its root'}: {error.message[:200]}"
+        return f"a fault at {where or 'the root'}: {error.message[:200]}"
     try:
         operations = read_operations(document)
     except UnresolvedError as unresolved:
         return str(unresolved)
     except (AttributeError, TypeError, KeyError, RecursionError) as broken:
-        return f"it is not built as one: {broken!r}"
+        return f"no description: {broken!r}"
     return _path_fault(operations)
 
 
@@ -42,10 +42,10 @@ def _validator(version: str) -> Any:
 
 
 def _path_fault(operations: Sequence[Operation]) -> str:
-    """A path parameter that is used and not described, or described and not used (OpenAPI 3.1, 4.8.8.2)."""
+    """Return a path parameter that is used and not described, or described and not used (OpenAPI 3.1, 4.8.8.2)."""
     for operation in operations:
         used = set(PARAMETER.findall(operation.template))
         described = {item.name for item in operation.parameter("path")}
         if used != described:
-            return f"{operation.label} uses the path parameters {sorted(used)} and describes {sorted(described)}"
+            return f"{operation.label} with the path parameters {sorted(used)} and {sorted(described)} described"
     return ""

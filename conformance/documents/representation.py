@@ -15,7 +15,7 @@ from conformance.documents.openapi import is_json, is_xml
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d{1,400}", re.ASCII)
 _NULLS = {"", "null", "~", "Null", "NULL"}
-# libyaml where PyYAML was built with it: an Odometry is 150 lines, and pure Python takes 20 ms for them.
+# libyaml where PyYAML was built with it: pure Python takes 20 ms for a document of 150 lines.
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _ByItself: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _COMBINING = frozenset({"allOf", "oneOf", "anyOf"})
@@ -27,7 +27,7 @@ class UnreadableError(Exception):
 
 
 def read(media_type: str, body: bytes, schema: Schema) -> Any:
-    """A body as a JSON value of the given schema; fields that the schema does not name are left out.
+    """Return a body as a JSON value of the given schema; fields that the schema does not name are left out.
 
     What does not fit the schema stays as it is written (mostly text), so that validating the value shows it.
 
@@ -44,11 +44,11 @@ def read(media_type: str, body: bytes, schema: Schema) -> Any:
             return from_element(parse_xml(body), schema)
         return from_plain(parse_yaml(body), schema)
     except RecursionError as error:
-        raise UnreadableError("it is nested too deeply to be read") from error
+        raise UnreadableError("a document that is nested too deeply to be read") from error
 
 
 def parse_xml(body: bytes) -> etree._Element:
-    """The root element of a document that a robot sent, without comments.
+    """Return the root element of a document that a robot sent, without comments.
 
     Raises:
         UnreadableError: it is not well-formed, or has a document type declaration.
@@ -60,7 +60,7 @@ def parse_xml(body: bytes) -> etree._Element:
 
 
 def parse_yaml(body: bytes) -> Any:
-    """The one document of a YAML stream, its scalars as text; a last empty document (``---``) is no document.
+    """Return the one document of a YAML stream, its scalars as text; a last empty document (``---``) is no document.
 
     ``ros2 topic echo`` prints ``---`` behind each message.
 
@@ -79,7 +79,7 @@ def parse_yaml(body: bytes) -> Any:
 
 
 def by_itself(body: bytes) -> Any:
-    """The first document of a YAML stream as a reader takes it that knows no schema: plain 123 is a number.
+    """Return the first document of a YAML stream as a reader takes it that knows no schema: plain 123 is a number.
 
     Raises:
         UnreadableError: it is no YAML.
@@ -91,12 +91,12 @@ def by_itself(body: bytes) -> Any:
 
 
 def local_name(element: etree._Element) -> str:
-    """An element's name without its namespace."""
+    """Return an element's name without its namespace."""
     return etree.QName(element).localname
 
 
 def from_element(element: etree._Element, schema: Schema) -> Any:
-    """An element as a JSON value; see read()."""
+    """Return an element as a JSON value; see read()."""
     schema = flat(schema)
     kind = kind_of(schema)
     children = xml.elements(element)
@@ -132,7 +132,7 @@ def _from_children(children: list[etree._Element], schema: Schema) -> dict[str, 
 
 
 def _items(group: list[etree._Element], schema: Schema) -> list[Any]:
-    """An array's items: one child of the field's name for each, or all nested in one such child."""
+    """Return an array's items: one child of the field's name for each, or all nested in one such child."""
     if len(group) == 1:
         inner = xml.elements(group[0])
         fields = set(flat(schema).get("properties", {}))
@@ -143,7 +143,7 @@ def _items(group: list[etree._Element], schema: Schema) -> list[Any]:
 
 
 def from_plain(value: Any, schema: Schema) -> Any:
-    """YAML whose scalars are all text as a JSON value; see read()."""
+    """Return YAML whose scalars are all text as a JSON value; see read()."""
     schema = flat(schema)
     kind = kind_of(schema)
     if isinstance(value, str):
@@ -165,7 +165,7 @@ def from_plain(value: Any, schema: Schema) -> Any:
 
 
 def scalar(text: str, kind: str) -> Any:
-    """A single value as its schema's type; the text itself where it is none."""
+    """Return a single value as its schema's type; the text itself where it is none."""
     stripped = text.strip(" \t\r\n")
     if kind in {"number", "integer"} and _NUMBER.fullmatch(stripped):
         return int(stripped) if _WHOLE.fullmatch(stripped) else float(stripped)
@@ -175,14 +175,14 @@ def scalar(text: str, kind: str) -> Any:
 
 
 def projected(value: Any, schema: Schema) -> Any:
-    """A JSON value without the fields that its schema does not name."""
+    """Return a JSON value without the fields that its schema does not name."""
     if not isinstance(value, list | dict):
         return value
     schema = flat(schema)
     if isinstance(value, list):
         items = flat(schema.get("items", {}))
         if not items.get("properties") and "items" not in items:
-            return list(value)  # numbers, mostly: an odometry has 72 of them in two lists
+            return list(value)  # numbers, mostly: a covariance matrix has 36 of them
         return [projected(item, items) for item in value]
     properties: dict[str, Schema] = schema.get("properties", {})
     if not properties:
@@ -191,7 +191,7 @@ def projected(value: Any, schema: Schema) -> Any:
 
 
 def flat(schema: Schema) -> Schema:
-    """A schema with the properties of its allOf, or of its first alternative, as its own."""
+    """Return a schema with the properties of its allOf, or of its first alternative, as its own."""
     if _COMBINING.isdisjoint(schema):
         return schema
     parts = [*schema.get("allOf", ()), *schema.get("oneOf", ())[:1], *schema.get("anyOf", ())[:1]]
@@ -210,7 +210,7 @@ def flat(schema: Schema) -> Schema:
 
 
 def flattened(value: Any, where: str = "") -> dict[str, Any]:
-    """Every single value by its place; numbers as doubles, and the length of each list."""
+    """Return every single value by its place; numbers as doubles, and the length of each list."""
     if isinstance(value, dict):
         leaves: dict[str, Any] = {} if value else {where: "{}"}
         for name, item in value.items():

@@ -25,6 +25,6 @@ _INSIDES = re.compile(
 
 
 def inside_shown(body: bytes) -> str:
-    """The first piece of a traceback, or of another sign of a program's inside; empty where a body shows none."""
+    """Return the first piece of a traceback or of another inside of a program; empty where a body shows none."""
     found = _INSIDES.search(body[:_LOOKED_THROUGH])
     return found[0].decode("utf-8", "replace")[:_SHOWN] if found else ""

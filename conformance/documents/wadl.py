@@ -1,17 +1,13 @@
 """A WADL (W3C member submission of 2009) as the operations that it describes."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
+
+from lxml import etree
 
 from conformance.documents.openapi import Operation, Parameter
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
 from conformance.documents.xml import elements
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 WADL = "http://wadl.dev.java.net/2009/02"
 # A parameter may come with a regular expression: {code: [0-9]{1,3}}.
@@ -20,14 +16,14 @@ _KINDS = {"template": "path", "query": "query", "matrix": "matrix", "header": "h
 
 
 def read_wadl(body: bytes) -> list[Operation]:
-    """The operations of a WADL, their paths below the server's root.
+    """Return the operations of a WADL, their paths below the server's root.
 
     Raises:
         UnreadableError: it is no XML, or its root is no WADL application.
     """
     root = parse_xml(body)
     if root.tag != f"{{{WADL}}}application":
-        raise UnreadableError(f"its root element is {root.tag}")
+        raise UnreadableError(f"the root element {root.tag}")
     found: list[Operation] = []
     for resources in root.findall(f"{{{WADL}}}resources"):
         prefix = urlsplit(resources.get("base", "")).path.rstrip("/")
@@ -59,7 +55,7 @@ def _of_resource(
 
 
 def _referred(method: etree._Element, root: etree._Element) -> etree._Element:
-    """A method, or the one that it refers to by ``href="#id"``."""
+    """Return a method, or the one that it refers to by ``href="#id"``."""
     name = method.get("href", "").lstrip("#")
     return next((item for item in root.iter(f"{{{WADL}}}method") if name and item.get("id") == name), method)
 

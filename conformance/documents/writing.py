@@ -25,7 +25,7 @@ class Pairs:
 
 
 def json_text(value: Any) -> str:
-    """A value as JSON; Token and Pairs may stand anywhere in it."""
+    """Return a value as JSON; Token and Pairs may stand anywhere in it."""
     if isinstance(value, Token):
         return value.text
     if isinstance(value, Pairs):
@@ -42,7 +42,7 @@ def _object(members: Iterable[tuple[str, Any]]) -> str:
 
 
 def xml_bytes(value: Any, root: str, like: etree._Element | None = None) -> bytes:
-    """A value as XML: a child per field, one child per array item.
+    """Return a value as XML: a child per field, one child per array item.
 
     Args:
         value: JSON value; Pairs makes an element stand twice, Token's text is written as it is.
@@ -71,7 +71,7 @@ def _fill(element: etree._Element, value: Any, like: etree._Element | None) -> N
 
 
 def text_of(value: Any) -> str:
-    """A single value as it stands in XML, a path or a query."""
+    """Return a single value as it stands in XML, a path or a query."""
     if isinstance(value, Token):
         return value.text
     if isinstance(value, bool):

@@ -61,7 +61,7 @@ class Description:
     missing: tuple[tuple[str, str], ...] = ()
 
     def all(self, path: str) -> list[etree._Element]:
-        """Elements by an XPath in which ``w`` is WSDL and ``s`` its SOAP binding, from any of the definitions."""
+        """Return elements of all definitions by an XPath in which ``w`` is WSDL and ``s`` its SOAP binding."""
         spaces = {"w": WSDL, "s": WSDL_SOAP}
         found: list[etree._Element] = []
         for root in self.definitions:
@@ -91,7 +91,7 @@ class Description:
                 return bound
         for element in bindings.values():
             return element
-        raise DescriptionError("it has no wsdl:binding with a soap:binding")
+        raise DescriptionError("no wsdl:binding with a soap:binding")
 
     @cached_property
     def port_type(self) -> etree._Element:
@@ -104,7 +104,7 @@ class Description:
         for element in self.all("w:portType"):
             if name(element) == wanted:
                 return element
-        raise DescriptionError(f"its binding is of the port type {wanted!r}, which it does not have")
+        raise DescriptionError(f"a binding of the port type {wanted!r}, which is not there")
 
     @property
     def ports(self) -> list[etree._Element]:
@@ -131,7 +131,7 @@ class Description:
         return Types.compiled(self.schemas)
 
     def shape(self, tag: str) -> Element | None:
-        """The global element of that name; None where no schema has it.
+        """Return the global element of that name; None where no schema has it.
 
         Raises:
             SchemaError: the schemas do not compile.
@@ -139,7 +139,7 @@ class Description:
         return self.types.shape(tag)
 
     def message(self, reference: str | None) -> etree._Element | None:
-        """The wsdl:message that a QName refers to; prefixes are not looked at, names are unique in practice."""
+        """Return the wsdl:message that a QName refers to; prefixes are not looked at, names are unique in practice."""
         wanted = _local(reference)
         return next((element for element in self.all("w:message") if name(element) == wanted), None)
 
@@ -163,12 +163,12 @@ class Description:
 
 
 def name(element: etree._Element) -> str:
-    """The name attribute, or empty."""
+    """Return the name attribute, or empty."""
     return element.get("name") or ""
 
 
 def qname(element: etree._Element, written: str | None) -> str | None:
-    """A QName in an attribute of ``element``, in Clark notation; None without one, or where its prefix is not bound."""
+    """Return a QName in an attribute of ``element``, in Clark notation; None without one, or with an unbound prefix."""
     if not written:
         return None
     prefix, _, local = written.strip().rpartition(":")
@@ -199,7 +199,7 @@ def describe(wsdl: bytes, location: str, fetch: Fetch) -> Description:
 
 
 def read_file(path: Path) -> Description:
-    """The description in a file of the contract.
+    """Return the description in a file of the contract.
 
     Raises:
         DescriptionError: it is no WSDL, or refers to files that are not there.
@@ -215,13 +215,13 @@ def read_file(path: Path) -> Description:
 
 
 def faults(description: Description) -> Iterator[str]:
-    """What keeps a description from being used: no binding, no port type, no operations, broken schemas."""
+    """Yield what keeps a description from being used: no binding, no port type, no operations, broken schemas."""
     try:
         if not description.operations:
-            yield "its port type has no operations"
+            yield "a port type without operations"
     except DescriptionError as error:
         yield str(error)
     try:
         _ = description.types
     except SchemaError as error:
-        yield f"its schemas do not compile: {error}"
+        yield f"schemas that do not compile: {error}"

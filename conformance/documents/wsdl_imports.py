@@ -1,19 +1,16 @@
 """Follows a WSDL's references: wsdl:import, xsd:import and xsd:include, each document once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 from urllib.parse import urljoin
+
+from lxml import etree
 
 from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xsd import SchemaDocument
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 # Obtains a document by its resolved location. Raises OSError or ValueError with the reason where it cannot.
 Fetch = Callable[[str], bytes]
@@ -48,7 +45,7 @@ def collect(wsdl: bytes, location: str, fetch: Fetch) -> Collected:
     except NotXmlError as error:
         raise ValueError(str(error)) from error
     if root.tag != clark(WSDL, "definitions"):
-        raise ValueError(f"its document element is {root.tag}, not wsdl:definitions")
+        raise ValueError(f"the root element {root.tag} instead of wsdl:definitions")
     found = Collected()
     waiting: list[tuple[str, etree._Element]] = [(location, root)]
     seen = {location}

@@ -42,17 +42,17 @@ def parse(document: bytes, *, doctype: bool = False, comments: bool = True) -> e
 
 
 def has_doctype(root: etree._Element) -> bool:
-    """Whether the document of a root element has a DOCTYPE."""
+    """Return whether the document of a root element has a DOCTYPE."""
     return root.getroottree().docinfo.internalDTD is not None
 
 
 def elements(parent: etree._Element) -> list[etree._Element]:
-    """The element children: neither comments, nor processing instructions, nor entities."""
+    """Return the element children, without comments, processing instructions and entities."""
     return [child for child in parent if isinstance(child.tag, str)]
 
 
 def text_of(element: etree._Element) -> str:
-    """The character data right inside an element, across comments and CDATA sections."""
+    """Return the character data right inside an element, across comments and CDATA sections."""
     parts = [element.text or ""]
     parts += [child.tail or "" for child in element]
     return "".join(parts)

@@ -16,15 +16,15 @@ NEXT_ACTOR: Final = "http://schemas.xmlsoap.org/soap/actor/next"
 
 
 def local(tag: str) -> str:
-    """The local part of a name in Clark notation."""
+    """Return the local part of a name in Clark notation."""
     return tag.rpartition("}")[2]
 
 
 def namespace(tag: str) -> str:
-    """The namespace of a name in Clark notation; empty where it has none."""
+    """Return the namespace of a name in Clark notation; empty where it has none."""
     return tag[1:].rpartition("}")[0] if tag.startswith("{") else ""
 
 
 def clark(space: str | None, name: str) -> str:
-    """Name in Clark notation."""
+    """Return a name in Clark notation."""
     return f"{{{space}}}{name}" if space else name

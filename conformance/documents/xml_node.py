@@ -33,7 +33,7 @@ class Node:
         return local(self.tag)
 
     def path_to(self, name: str) -> tuple[int, ...]:
-        """The path of the first descendant of a local name.
+        """Return the path of the first descendant of a local name.
 
         Raises:
             StopIteration: there is none.
@@ -41,11 +41,11 @@ class Node:
         return next(path for path in self.paths() if self.at(path).name == name)
 
     def at(self, path: tuple[int, ...]) -> Node:
-        """The descendant at a path of child positions."""
+        """Return the descendant at a path of child positions."""
         return self.children[path[0]].at(path[1:]) if path else self
 
     def replaced(self, path: tuple[int, ...], *new: Node) -> Node:
-        """A copy in which others stand for the descendant at ``path``: none, one or more.
+        """Return a copy in which others stand for the descendant at ``path``: none, one or more.
 
         Args:
             path: of child positions; empty for the node itself, which one other can stand for.
@@ -59,7 +59,7 @@ class Node:
         return replace(self, children=(*self.children[:index], *inside, *self.children[index + 1 :]))
 
     def paths(self) -> list[tuple[int, ...]]:
-        """Paths of all descendants, parents before their children."""
+        """Return the paths of all descendants, parents before their children."""
         found: list[tuple[int, ...]] = []
         for index, child in enumerate(self.children):
             found.append((index,))
@@ -67,7 +67,7 @@ class Node:
         return found
 
     def written(self) -> bytes:
-        """The document in plain UTF-8, each namespace bound to a prefix at the root."""
+        """Return the document in plain UTF-8, each namespace bound to a prefix at the root."""
         spaces = sorted(_namespaces(self))
         # The usual prefixes where there are any: findings are read by people.
         prefixes = {space: _USUAL.get(space, f"n{number}") for number, space in enumerate(spaces)}

@@ -81,7 +81,7 @@ class Types:
 
     @classmethod
     def compiled(cls, documents: Sequence[SchemaDocument]) -> Types:
-        """The compiled schemas, compiled once in a process for the same documents: that takes a tenth of a second.
+        """Return the compiled schemas of some documents, once compiled in a process: that takes a tenth of a second.
 
         Raises:
             SchemaError: neither compiler takes them.
@@ -92,21 +92,21 @@ class Types:
         return _COMPILED[key]
 
     def shape(self, tag: str) -> Element | None:
-        """The global element of that name, or None where the schemas have none."""
+        """Return the global element of that name, or None where the schemas have none."""
         if tag not in self._shapes:
             declared = self.python.maps.elements.get(tag)
             self._shapes[tag] = None if declared is None else shape(declared)
         return self._shapes[tag]
 
     def libxml_problem(self, element: etree._Element) -> str:
-        """Why libxml2 finds the element invalid; empty where it finds it valid, or does not know the schema."""
+        """Return why libxml2 finds the element invalid; empty where it finds it valid, or does not know the schema."""
         if self.libxml is None or self.libxml.validate(element):
             return ""
         log: Any = self.libxml.error_log
         return str(log[0].message) if len(log) else "invalid"
 
     def python_problem(self, element: etree._Element) -> str:
-        """Why xmlschema finds the element invalid; empty where it finds it valid."""
+        """Return why xmlschema finds the element invalid; empty where it finds it valid."""
         # A copy, because what stands around the element is none of the schema's business; without comments, because
         # xmlschema takes a value to end at the first one.
         alone = copy.deepcopy(element)
@@ -118,7 +118,7 @@ class Types:
         return "" if error is None else str(getattr(error, "reason", "") or "invalid")
 
     def invalid(self, element: etree._Element) -> str:
-        """Why both find the element invalid; empty where one of them finds it valid."""
+        """Return why both find the element invalid; empty where one of them finds it valid."""
         first = self.libxml_problem(element)
         if self.libxml is not None and not first:
             return ""
@@ -126,7 +126,7 @@ class Types:
         return (first or second)[:_SHOWN] if second else ""
 
     def valid(self, element: etree._Element) -> bool:
-        """Whether both find the element valid."""
+        """Return whether both find the element valid."""
         return not self.libxml_problem(element) and not self.python_problem(element)
 
 
@@ -154,7 +154,7 @@ def _assemble(documents: Sequence[SchemaDocument], folder: Path) -> Path:
 
 
 def _relocated(schema: etree._Element, collected: dict[str, str]) -> bytes:
-    """A document whose imports point at the collected files, and whose includes are left to those."""
+    """Return a document whose imports point at the collected files, and whose includes are left to those."""
     root = copy.deepcopy(schema)
     for reference in [*root.iter(_IMPORT), *root.iter(_INCLUDE)]:
         space = reference.get("namespace") or ""
@@ -177,7 +177,7 @@ def _schema_of(space: str, *, includes: Sequence[str], imports: Mapping[str, str
 
 
 def _only_imports(document: SchemaDocument) -> bool:
-    """Whether a document is nothing but a list of imports, as WSDL tools write them into wsdl:types (R2105)."""
+    """Return whether a document is nothing but a list of imports, as WSDL tools write them into wsdl:types (R2105)."""
     return not document.namespace and all(
         child.tag == _IMPORT for child in document.root if isinstance(child.tag, str) and "annotation" not in child.tag
     )

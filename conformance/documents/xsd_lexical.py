@@ -62,14 +62,14 @@ NON_FINITE: Final = ("INF", "-INF", "NaN")
 
 
 def bounds(simple: Simple) -> tuple[int, int]:
-    """Smallest and greatest value of an integer type; the widest that are tried where the type has no bound."""
+    """Return the smallest and greatest value of an integer type; where it has no bound, the widest that are tried."""
     low = int(simple.minimum.to_integral_value()) if simple.minimum is not None else -_WIDEST
     high = int(simple.maximum.to_integral_value()) if simple.maximum is not None else max(low, 0) + _WIDEST
     return min(low, high), max(low, high)
 
 
 def outside(simple: Simple) -> tuple[str, ...]:
-    """Integers that the type does not hold, as written."""
+    """Return integers that the type does not hold, as text."""
     if simple.builtin not in INTEGERS:
         return ()
     found: list[int] = []
@@ -87,7 +87,7 @@ def _is_outside(value: int, simple: Simple) -> bool:
 
 
 def unreadable(simple: Simple) -> tuple[str, ...]:
-    """Texts that are no value of the type; empty where there is none that all agree on."""
+    """Return texts that are no value of the type; none where readers disagree."""
     if simple.enumeration:
         return ("no-such-value", "")
     if simple.builtin in INTEGERS:
@@ -98,7 +98,7 @@ def unreadable(simple: Simple) -> tuple[str, ...]:
 
 
 def plain(simple: Simple) -> str:
-    """One ordinary value."""
+    """Return an ordinary value of the type, as text."""
     if simple.enumeration:
         return simple.enumeration[0]
     if simple.builtin in INTEGERS:

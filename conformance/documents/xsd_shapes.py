@@ -50,7 +50,7 @@ class Group:
     maximum: int | None = 1
 
     def elements(self) -> Iterator[Element]:
-        """The elements of this group and of those in it."""
+        """Yield the elements of this group and of those in it."""
         for item in self.items:
             yield from (item,) if isinstance(item, Element) else item.elements()
 
@@ -98,7 +98,7 @@ class Element:
 
 
 def shape(declared: Any, depth: int = 0) -> Element:
-    """What an element declaration of xmlschema allows; ``depth`` is how many elements it is in already."""
+    """Return what an element declaration of xmlschema allows; ``depth`` is how many elements it is in already."""
     space, _, name = str(declared.name).rpartition("}")
     tag = str(declared.name) if space else name
     return Element(
@@ -156,7 +156,7 @@ def _written(value: object) -> str:
 
 
 def _decimal(value: object) -> Decimal | None:
-    """A bound as a number; one of a type that is no number (a date) is not known here."""
+    """Return a bound as a number; one of a type that is no number (a date) is not known here."""
     if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
         return None
     bound = Decimal(value) if not isinstance(value, float) else Decimal(repr(value))

@@ -12,18 +12,20 @@ import pytest
 
 from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
 from conformance.engine.checks_plugin import ChecksPlugin
-from conformance.engine.intermittent import look_again
 from conformance.engine.interruption import remembered
 from conformance.engine.planning import pytest_options
 from conformance.engine.progress import Progress
+from conformance.engine.resending import look_again
 from conformance.engine.result import result_document, write_result
 from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stored import write_traces
 from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
+from conformance.verdict.causes import by_cause
 from conformance.verdict.verdicts import Overall, class_verdicts, overall, score, verdict_of
 
 if TYPE_CHECKING:
     from conformance.engine.robot_under_test import RobotUnderTest
+    from conformance.verdict.causes import Cause
     from conformance.verdict.run import Run
     from conformance.verdict.verdicts import Verdict
 
@@ -89,7 +91,7 @@ def certify(
         run.aborted = "the run was interrupted"
         remarks.append("The run was interrupted; what follows is what was judged until then.")
     remarks += run.remarks
-    seen = draw_verdicts(run)
+    seen, causes = draw_verdicts(run)
     if run.requirement_set is not None:
         seen = score(seen, run.requirement_set.requirements, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
@@ -99,8 +101,8 @@ def certify(
     document = result_document(
         robot,
         verdicts,
+        causes,
         classes if failed else accepted,
-        overall(classes if failed else accepted),
         accepted_until=accepted_until(verdicts) if failed and overall(accepted) is not Overall.NOT_CONFORMANT else "",
         started=started,
         finished=dt.datetime.now(dt.UTC),
@@ -115,17 +117,20 @@ def certify(
     return Certification(OF_VERDICT[overall(accepted)] if reached else ExitCode.UNREACHABLE, document, path)
 
 
-def draw_verdicts(run: Run) -> list[Verdict]:
-    """The verdict of each requirement, in the ledger's order, whatever a baseline accepts."""
+def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
+    """Return the verdict of each requirement, whatever a baseline accepts, in the ledger's order; and the causes."""
     judge = run.judge
     for requirement in run.contract.ledger.values():
         evidence = judge.evidence[requirement.id]
         if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
-            judge.error(requirement.id, run.aborted)
-    return [
-        verdict_of(requirement, judge.evidence[requirement.id], run.claims, run.statement.undeclared)
+            judge.stopped(requirement.id, run.aborted)
+    scored = run.requirement_set.requirements if run.requirement_set else None
+    seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, scored)
+    verdicts = [
+        verdict_of(requirement, seen[requirement.id], run.claims, run.statement.undeclared)
         for requirement in run.contract.ledger.values()
     ]
+    return verdicts, causes
 
 
 def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str], recordings: Recordings) -> bool:

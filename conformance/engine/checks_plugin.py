@@ -32,10 +32,13 @@ if TYPE_CHECKING:
     from conformance.verdict.effort import Effort
     from conformance.verdict.evidence import Judge
     from conformance.verdict.explorer import Explorer
+    from conformance.verdict.finding import Finding
     from conformance.verdict.run import Run
 
 _NO_ADDRESS = "the robot's {} interface has no address"
 _Interface = TypeVar("_Interface")
+# On a check that is skipped because an earlier check has failed for what it met.
+_TOLD_BEFORE: pytest.StashKey[bool] = pytest.StashKey()
 
 
 def is_check(item: pytest.Item) -> bool:
@@ -68,6 +71,7 @@ class ChecksPlugin:
         self._has_fixtures = False
         self._recordings = Recordings() if recordings is None else recordings
         self._connected: RobotUnderTest | None = None
+        self._told: set[str] = set()
 
     def _robot(self) -> RobotUnderTest:
         if self._connected is None:
@@ -166,27 +170,44 @@ class ChecksPlugin:
 
         robot = self._robot()
         judge = robot.run.judge
-        refuted, judged = judge.refuted(), judge.counts(ids)
+        judged = judge.counts(ids)
         try:
             result: object = yield
         except Exception as error:  # noqa: BLE001 - whatever a robot makes of a check has to become a verdict
             record_exception(robot.run, robot.alive, ids, judged, error)
             result = None
-        ours = {id_: count for id_, count in judge.refuted().items() if count > refuted.get(id_, 0)}
-        musts = [id_ for id_ in ours if robot.run.contract.ledger[id_].level is Level.MUST]
-        if musts:
-            pytest.fail("\n".join(judge.told(id_) for id_ in musts), pytrace=False)
+        self._tell(item, robot.run)
         return result
+
+    def _tell(self, item: pytest.Item, run: Run) -> None:
+        """Fail a check for each MUST that it found not met; skip it where earlier checks have failed for the causes."""
+        from conformance.verdict.finding import in_full  # noqa: PLC0415 - as above
+
+        musts = {
+            id(finding): finding
+            for finding in run.judge.met
+            if run.contract.ledger[finding.requirement].level is Level.MUST
+        }
+        new: list[Finding] = []
+        for finding in musts.values():
+            if not finding.causes or not finding.causes <= self._told:
+                new.append(finding)
+            self._told |= finding.causes
+        if new:
+            pytest.fail("\n".join(map(in_full, new)), pytrace=False)
+        if musts:
+            item.stash[_TOLD_BEFORE] = True
+            pytest.skip(f"Not tested, because of a failure before: {next(iter(musts.values())).brief}")
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
         """Put a skip's reason down as evidence."""
         report: pytest.TestReport = yield
-        ids = self.ids_of(item) if is_check(item) else ()
+        ids = self.ids_of(item) if is_check(item) and _TOLD_BEFORE not in item.stash else ()
         if ids and report.skipped and call.excinfo is not None:
             run = self._robot().run
             reason = str(getattr(call.excinfo.value, "msg", call.excinfo.value))
-            say = run.judge.error if run.aborted else run.judge.skip
+            say = run.judge.stopped if run.aborted else run.judge.skip
             for id_ in ids:
                 say(id_, reason)
         return report

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
 from conformance.contract.pack import Contract
-from conformance.engine.sequence import read_request
+from conformance.engine.resending import read_request
 from conformance.transport.exchange import SAFE_METHODS
 
 if TYPE_CHECKING:

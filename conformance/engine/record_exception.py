@@ -12,6 +12,7 @@ from conformance.verdict.evidence import RefutedError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from conformance.verdict.finding import Finding
     from conformance.verdict.run import Run
 
 
@@ -47,7 +48,11 @@ def _no_answer(
 ) -> None:
     if alive():
         for id_ in open_ids:
-            run.judge.check(id_, False, error.unanswered, "an answer")  # noqa: FBT003 - the condition of check()
+            run.judge.check(id_, False, error.unanswered, "a response")  # noqa: FBT003 - the condition of check()
+        for finding in run.judge.met:
+            # One that was there before may be of a check that judged this requirement by itself.
+            if finding.exchange is error.unanswered and finding.seen == 1:
+                finding.among = len(open_ids)
         return
     request = error.unanswered.request
     risked = [id_ for id_ in known if id_ in run.judge.at_risk]
@@ -56,10 +61,22 @@ def _no_answer(
             id_,
             False,  # noqa: FBT003 - the condition of check()
             error.unanswered,
-            "a robot that still answers after this request",
-            found=f"{error.unanswered.problem}, and no answer to anything since",
+            "a robot that still responds after this request",
+            found=f"{error.unanswered.problem}, and no response to any request since",
         )
-    run.aborted = f"the robot stopped answering ({error.unanswered.problem}, at {request.method} {request.url[:200]})"
+    ended = [finding for finding in run.judge.met if finding.requirement in risked and _ends_with(finding, error)]
+    for finding in ended:
+        finding.alone = True
+    run.judge.ended_by = next((finding for finding in ended if _is_claimed(run, finding)), None)
+    run.aborted = f"the robot stopped responding ({error.unanswered.problem}, at {request.method} {request.url[:200]})"
     for id_ in open_ids:
         if id_ not in risked:
-            run.judge.error(id_, run.aborted)
+            run.judge.stopped(id_, run.aborted)
+
+
+def _is_claimed(run: Run, finding: Finding) -> bool:
+    return finding.requirement in run.contract.ledger and run.contract.ledger[finding.requirement].class_ in run.claims
+
+
+def _ends_with(finding: Finding, error: NoAnswerError) -> bool:
+    return finding.exchange is error.unanswered

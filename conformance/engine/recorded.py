@@ -51,7 +51,7 @@ def judge_recorded(robot: RobotUnderTest, folder: Path) -> list[Rejudged]:
             record(run.judge, rule.requirement, rule.outcomes(recording.trace, known.__getitem__))
     judged = ((id_, run.judge.evidence[id_]) for id_ in run.contract.ledger)
     return [
-        Rejudged(id_, evidence.cases, tuple(one.told for one in evidence.findings.values()))
+        Rejudged(id_, evidence.cases, tuple(one.text for one in evidence.findings.values()))
         for id_, evidence in judged
         if evidence.cases
     ]

@@ -1,22 +1,32 @@
-"""Sending a finding's requests again, in their order and at their pace, and saying whether it is still there."""
+"""Whether a finding is still there: its requests are sent again, or the checks of its requirement run again."""
 
 from __future__ import annotations
 
+import tempfile
 import time
+from contextlib import closing
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from conformance.engine.judged_again import observed_to_fail
-from conformance.engine.sending_again import is_same, send_again
-from conformance.engine.sequence import read_request
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.observers import Observer
+from conformance.contract.pack import Contract
+from conformance.engine.certification import certify
+from conformance.engine.pytest_run import connection_of
+from conformance.engine.resending import is_same, read_request, send_again
+from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.statement.statement import empty_statement
+from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, NoAnswer, Response, Unanswered
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping
 
-    from conformance.contract.pack import Contract
-    from conformance.transport.client import Connection
+    from conformance.statement.statement import Statement
     from conformance.transport.exchange import Attempt, Request
 
 # A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
@@ -102,6 +112,48 @@ def replay(
     return Replayed(id_, message, outcome, came[-1].came, len(requests), told_by)
 
 
+def judged_by_checks(
+    contract: Contract,
+    statement: Statement,
+    requirements: Collection[str],
+    *,
+    allow_motion: bool,
+    seed: int,
+    effort: str,
+) -> list[dict[str, Any]]:
+    """Run the checks of some requirements, and no others, on a robot.
+
+    Args:
+        contract: by which it is judged.
+        statement: of the robot.
+        requirements: their ids.
+        allow_motion: whether the robot may be moved.
+        seed: of everything random, as in the run before.
+        effort: as in the run before.
+
+    Returns:
+        The requirements as in result.json, in the ledger's order.
+
+    Raises:
+        ContractError: there is no such requirement.
+        OSError: a file that the statement names cannot be read.
+    """
+    contract = Contract.load(contract.directory, only=tuple(sorted(requirements)))
+    classes = {item.class_ for item in contract.ledger.values()}
+    run = Run(
+        statement=statement,
+        contract=contract,
+        claims=tuple(name for name in contract.classes if name in classes),
+        allow_motion=allow_motion,
+        seed=seed,
+        effort=Effort(effort),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        certification = certify(RobotUnderTest(run, connection_of(statement.endpoints)), Path(folder))
+    judged: list[dict[str, Any]] = certification.document["requirements"]
+    return judged
+
+
 def _still_there(
     id_: str, recorded: Mapping[str, Any], request: Request, came: Attempt, rest: str | None, contract: Contract | None
 ) -> tuple[bool, str]:
@@ -119,7 +171,25 @@ def _still_there(
         rest
         and contract
         and "body_length" not in recorded
-        and observed_to_fail(contract, rest, id_, Exchange(request, before))
+        and _observed_to_fail(contract, rest, id_, Exchange(request, before))
     ):
-        return observed_to_fail(contract, rest, id_, Exchange(request, came.response)), _BY_JUDGEMENT
+        return _observed_to_fail(contract, rest, id_, Exchange(request, came.response)), _BY_JUDGEMENT
     return is_same(before, came), _BY_KIND
+
+
+def _observed_to_fail(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:
+    """Whether the observers of REST, which judge each answer by itself, find a requirement not met in an exchange.
+
+    Args:
+        contract: by which the exchange was judged.
+        base_url: of the robot's REST interface.
+        requirement: its id.
+        exchange: any; one with another interface fails nothing.
+    """
+    run = Run(empty_statement(contract), contract)
+    with closing(HttpClient(base_url, Connection())) as client:
+        api = RestInterface(run, client)
+        for observer in (Observer(api), *api.device.observers(api)):
+            observer.answered(exchange)
+    evidence = run.judge.evidence.get(requirement)
+    return bool(evidence and evidence.failures)

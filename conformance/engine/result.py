@@ -10,10 +10,10 @@ from msgspec.structs import asdict
 
 from conformance.commandline.atomic_write import write_atomically
 from conformance.contract.interfaces import Interface
-from conformance.engine.sequence import written
+from conformance.engine.resending import written
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
 from conformance.transport.exchange import Unanswered
-from conformance.verdict.verdicts import views
+from conformance.verdict.verdicts import overall, views
 
 if TYPE_CHECKING:
     import datetime as dt
@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
     from conformance.engine.robot_under_test import RobotUnderTest
     from conformance.transport.exchange import Attempt
-    from conformance.verdict.evidence import Finding
-    from conformance.verdict.verdicts import Verdict
+    from conformance.verdict.causes import Cause
+    from conformance.verdict.finding import Finding
+    from conformance.verdict.verdicts import ClassValue, Verdict
 
 RESULT_FORMAT = "roaas-result/1"
 # As much of a body as a reader looks at; its length is always told.
@@ -35,8 +36,8 @@ _LIBRARIES = ("schemathesis", "hypothesis", "zeep", "lxml", "xmlschema", "h11")
 def result_document(
     robot: RobotUnderTest,
     verdicts: list[Verdict],
-    classes: Mapping[str, tuple[str, str]],
-    overall: str,
+    causes: list[Cause],
+    classes: Mapping[str, tuple[ClassValue, str]],
     *,
     started: dt.datetime,
     finished: dt.datetime,
@@ -49,7 +50,7 @@ def result_document(
     run, statement = robot.run, robot.run.statement
     return {
         "format": RESULT_FORMAT,
-        "verdict": overall,
+        "verdict": overall(classes),
         **({"accepted_until": accepted_until} if accepted_until else {}),
         "interrupted": interrupted,
         "suite": {"version": suite_version(), "contract": run.contract.label, "digest": suite_digest(run.contract)},
@@ -79,6 +80,7 @@ def result_document(
         "finished": rfc3339(finished),
         "duration_s": round((finished - started).total_seconds(), 3),
         "requests": robot.connection.sent,
+        "resent_requests": robot.connection.resent,
         "environment": {
             "python": platform.python_version(),
             "platform": platform.platform(),
@@ -89,6 +91,7 @@ def result_document(
         "class_views": dict(views(verdicts)),
         "class_reasons": {name: reason for name, (_, reason) in classes.items() if reason},
         "requirements": [_requirement(verdict) for verdict in verdicts],
+        "causes": [_cause(cause) for cause in causes],
         "contract_sections": {anchor: section._asdict() for anchor, section in run.contract.cited_sections.items()},
         "notes": notes,
     }
@@ -121,19 +124,35 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
         "untestable": requirement.untestable,
         "checks": sorted(verdict.evidence.checks - {""}),
         "failures": [_failure(finding) for finding in verdict.evidence.findings.values()] if shown else [],
+        **({} if verdict.because is None else {"because_of": verdict.because.number}),
         **({} if verdict.scored else {"scored": False}),
         **({"expected_failure": {"reason": expected[0], "expires": expected[1]}} if expected else {}),
     }
 
 
+def _cause(cause: Cause) -> dict[str, Any]:
+    finding = cause.finding
+    return {
+        "number": finding.number,
+        "kind": finding.cause,
+        "requirement": finding.requirement,
+        "text": finding.text,
+        "blocks": list(cause.blocks),
+    }
+
+
 def _failure(finding: Finding) -> dict[str, Any]:
     return {
-        "message": finding.told,
+        "number": finding.number,
+        "message": finding.text,
+        "subject": finding.subject,
         "expected": finding.expected,
+        "observed": finding.observed,
+        "cause": finding.cause,
         "seen": finding.seen,
         "request": _request(finding.exchange) if finding.exchange else None,
         "response": _response(finding.exchange) if finding.exchange else None,
-        **({"again": finding.again._asdict()} if finding.again else {}),
+        **({"again": {"came_back": finding.again.came_back, "sent": finding.again.sent}} if finding.again else {}),
         "sequence": written(finding.sequence),
     }
 

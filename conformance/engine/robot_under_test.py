@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from conformance.api.device import Device, device_of
 from conformance.api.rest.interface import RestInterface, plain_path
 from conformance.contract.interfaces import Interface
-from conformance.engine.sequence import Recorder
+from conformance.engine.resending import Recorder
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
 

@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from conformance.contract.pack import Contract
+from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.requirement_sets import load_set, names
 
 _PACKAGE = Path(__file__).parents[1]
@@ -70,9 +70,9 @@ def file_digest(path: Path) -> str:
     return f"sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}"
 
 
-def known(contract: Contract | None = None) -> dict[str, Any]:
+def known(pack: str | None = None) -> dict[str, Any]:
     """What tells whether a certificate is of this suite: its digest, its requirement sets, its profiles' classes."""
-    contract = contract or Contract.load()
+    contract = Contract.load(pack or DEFAULT_PACK)
     return {
         "suite": suite_digest(contract),
         "requirement_sets": {name: load_set(contract, name).digest for name in names(contract)},

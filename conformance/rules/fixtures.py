@@ -13,6 +13,8 @@ from conformance.api.rest.observers import Observer
 from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
 from conformance.transport.client import Connection
+from conformance.transport.exchange import Listener
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 # What is imported late because few commands need it, and is needed later in a run.
@@ -24,20 +26,22 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
     """Have every exchange judged from the first check on. Here, and nowhere else, observers are registered."""
     services = interfaces.soap.there.values()
     api = interfaces.rest
+    observers: list[Listener] = []
     if api is not None:
-        connection.listeners.append(Observer(api, [service.endpoint for service in services]))
+        observers.append(Observer(api, [service.endpoint for service in services]))
         connection.listeners.extend(api.device.observers(api))
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(service) for service in services}
-        connection.listeners.append(SoapObserver(run.judge, answers))
+        observers.append(SoapObserver(run.judge, answers))
+    connection.listeners.append(Observers(run.judge, observers))
 
 
 @pytest.fixture
 def _prepared(interfaces: Interfaces) -> Iterator[None]:
-    """For a check that mostly waits for the robot: meanwhile is imported and compiled what later ones need."""
+    """Import and compile what later checks need, while this one mostly waits for the robot."""
     services = tuple(interfaces.soap.there.values())
     for service in services:
-        _ = service.own  # for which the robot may have to be asked: here, and not at any moment of the drive
+        _ = service.own  # may send requests: here, and not at any moment of a drive
     thread = threading.Thread(target=_prepare, args=(services,), name="preparing")
     thread.start()
     yield
@@ -45,7 +49,7 @@ def _prepared(interfaces: Interfaces) -> Iterator[None]:
 
 
 def _prepare(services: Iterable[SoapService]) -> None:
-    # What does not work here does not where it is needed, and is told there.
+    # What fails here fails again in the check that needs it, and is judged there.
     with suppress(Exception):
         for service in services:
             _ = service.described.types, service.contract.types

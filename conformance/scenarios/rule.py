@@ -23,6 +23,7 @@ class Case:
         expected: what the requirement asks for here, as a noun phrase.
         observed: what the trace shows instead; empty: the response is described.
         cause: failures of one cause are one finding; empty: told by the texts.
+        subject: what was tested; empty: method and target of the request.
     """
 
     holds: bool
@@ -30,6 +31,7 @@ class Case:
     expected: str
     observed: str = ""
     cause: str = ""
+    subject: str = ""
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,15 @@ def record(judge: Judge, requirement: str, outcomes: Iterable[Outcome]) -> None:
     for one in outcomes:
         match one:
             case Case():
-                judge.check(requirement, one.holds, one.exchange, one.expected, found=one.observed, cause=one.cause)
+                judge.check(
+                    requirement,
+                    one.holds,
+                    one.exchange,
+                    one.expected,
+                    found=one.observed,
+                    cause=one.cause,
+                    subject=one.subject,
+                )
             case NotTested():
                 judge.skip(requirement, one.reason)
             case Note():

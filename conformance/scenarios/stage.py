@@ -7,10 +7,9 @@ from typing import Final
 class Stage(StrEnum):
     """When in a run the turn of a scenario or a check comes.
 
-    Reading comes first. Then the drive that takes longest, other drives, and the attempts that must
-    leave it at rest, which one watch covers; meanwhile it is read at rest. Deliveries come late, because a robot drives
-    Reading comes first. Then the longest drive, other drives, and the attempts that must
-    suite waits for more of them.
+    Reading comes first. Then the longest drive, other drives, and the attempts that must leave the device at rest,
+    which one watch covers; meanwhile the device is read at rest. Requests whose effects come late are sent late, and
+    other checks run while the suite waits for more of these effects.
     """
 
     REACH = "reach"
@@ -21,7 +20,7 @@ class Stage(StrEnum):
     RESTING = "resting"
     STAYS = "stays"
     INPUT = "input"
-    DELIVERY = "delivery"
+    ACTING = "acting"
     SILENCE = "silence"
     EFFECT = "effect"
     ARRIVAL = "arrival"

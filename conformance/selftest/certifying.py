@@ -76,6 +76,7 @@ class Outcome:
         exit_code: as roaas certify's; -1 when the run was given up.
         verdicts: by requirement.
         reasons: by requirement, where it is not pass.
+        met: requirements whose checks met what is told as the finding of another requirement.
         requests: how many were sent.
         seconds: how long it took.
     """
@@ -85,6 +86,7 @@ class Outcome:
     reasons: dict[str, str]
     requests: int
     seconds: float
+    met: frozenset[str] = frozenset()
 
     @property
     def fails(self) -> frozenset[str]:
@@ -92,8 +94,8 @@ class Outcome:
         return frozenset(id_ for id_, verdict in self.verdicts.items() if verdict == "fail")
 
     def caught(self) -> tuple[str, ...]:
-        """Requirements that say fail or warn."""
-        return tuple(id_ for id_, verdict in self.verdicts.items() if verdict in {"fail", "warn"})
+        """Return the requirements that say fail or warn, or that met what another one says it for."""
+        return tuple(id_ for id_, verdict in self.verdicts.items() if verdict in {"fail", "warn"} or id_ in self.met)
 
 
 def job_at(robot: Robot, **more: Any) -> Job:
@@ -145,6 +147,8 @@ def _run(job: Job, pipe: Pipe) -> None:
                 "verdicts": {item["id"]: item["verdict"] for item in items},
                 "reasons": {item["id"]: item["reason"] for item in items if item["verdict"] != "pass"},
                 "requests": document["requests"],
+                # What was not tested because the run had ended has no case, and met nothing.
+                "met": frozenset(item["id"] for item in items if "because_of" in item and item["cases"]),
             }
         )
 
@@ -197,8 +201,9 @@ class _EnoughKnown(Judge):
         *,
         found: str = "",
         cause: str = "",
+        subject: str = "",
     ) -> bool:
         """Judge one case."""
         if not holds and requirement in self._enough and not self._run.aborted:
             self._run.aborted = f"{requirement} has failed, which is enough to know"
-        return super().check(requirement, holds, exchange, expected, found=found, cause=cause)
+        return super().check(requirement, holds, exchange, expected, found=found, cause=cause, subject=subject)

@@ -1,7 +1,6 @@
 """The HTTP client of the suite: every exchange bounded, recorded and shown to those who watch."""
 
 import math
-import re
 import ssl
 import time
 from collections import defaultdict
@@ -31,10 +30,8 @@ Headers = tuple[tuple[str, str], ...]
 # its deadline twice in that time at most, and a link that was gone twice in a long run is none.
 _HANGS = 2
 _HANGS_WITHIN_S = 60.0
-# A server may close an idle connection at any time (RFC 9112 9.3.1): a request that met the end of one is sent again.
-# From a server that has kept connections open this often, so many closed ones are dropped requests, and told as such.
-_KEPT = 10
-_DROPS = 3
+# A request that met the end of a kept connection is sent so often in all.
+_ATTEMPTS = 2
 
 
 @dataclass
@@ -48,6 +45,7 @@ class Connection:
         request_rate: ceiling in requests per second, or None.
         listeners: told what became of every request.
         sent: how many requests have been sent.
+        resent: how many of them once more, because the server had closed the kept connection before it responded.
         acted_at: when a request by another than a safe method was sent or answered last, s of the monotonic clock.
         pace: how fast the robot answers.
     """
@@ -58,6 +56,7 @@ class Connection:
     request_rate: float | None = None
     listeners: list[Listener] = field(default_factory=list)
     sent: int = 0
+    resent: int = 0
     acted_at: float = -math.inf
     pace: Pace = field(default_factory=Pace)
     _next_slot: float = 0.0
@@ -100,8 +99,6 @@ class HttpClient:
         self.prefix = parts.path
         self.authority = parts.netloc.rsplit("@", 1)[-1]
         self._hangs: defaultdict[str, list[float]] = defaultdict(list)
-        self._kept = 0
-        self._dropped = 0
         self.tls = connection.tls() if parts.scheme == "https" else None
         self._connections = Connections(self.host.encode("idna").decode("ascii"), self.port, self.tls)
 
@@ -141,9 +138,10 @@ class HttpClient:
             sent.append(("Authorization", f"Bearer {self.connection.token}"))
             shown += (("Authorization", "Bearer $ROAAS_TOKEN"),)
         request = Request(method, f"{self.scheme}://{self.authority}{self.prefix}{path}", shown, body)
-        endpoint = f"{method} {_shape(path)}"
+        endpoint = request.endpoint
         if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
-            problem = f"not asked: {endpoint} has not answered {_HANGS} times"
+            hung = endpoint.replace(f"{self.scheme}://{self.authority}", "", 1)
+            problem = f"the request was not sent, because {hung} did not respond {_HANGS} times"
             raise NoAnswerError(Unanswered(request, problem, NoAnswer.CIRCUIT_OPEN))
         deadline = timeout_s or self.connection.timeout_s
         started = time.monotonic()
@@ -185,29 +183,29 @@ class HttpClient:
         target = (self.prefix + path).encode("utf-8", "surrogateescape") or b"/"
         headers = [(name.encode("latin-1"), value.encode("utf-8")) for name, value in fields]
         request = h11.Request(method=method, target=target, headers=headers)
-        for attempt in (1, 2):
+        before = ""
+        for attempt in range(1, _ATTEMPTS + 1):
             self.connection.take_slot(method)
             deadline = Deadline(seconds, len(body))
             keep = not fresh and attempt == 1
             connection = self._connections.take() if keep else self._connections.new()
-            kept = connection.is_open
             try:
-                response = connection.exchange(request, body, deadline)
+                return connection.exchange(request, body, deadline)
             except Exception as error:
                 none = _no_answer(error, seconds + time_to_arrive(len(body)))
-                if none.kind is NoAnswer.CLOSED and kept and attempt == 1 and not self._drops_requests():
+                if none.kind is not NoAnswer.CLOSED:
+                    raise none from error
+                if attempt == 1 and connection.ended_before(method):
+                    # The server may have closed it at any time (RFC 9112 9.3.1).
+                    self.connection.resent += 1
+                    before = f"; the request before it on the first connection was answered {connection.last_status}"
                     continue
+                if attempt > 1:
+                    none = _SilenceError(f"{none}, {attempt} of {attempt} times{before}", none.kind)
                 raise none from error
             finally:
                 self._connections.give_back(connection, keep=keep)
-            self._kept += kept
-            return response
-        raise AssertionError("unreachable: the second attempt returns or raises")
-
-    def _drops_requests(self) -> bool:
-        """Count a connection that ended with a request on it, and say whether that is this server's habit."""
-        self._dropped += 1
-        return self._kept >= _KEPT and self._dropped >= _DROPS
+        raise AssertionError("unreachable: the last attempt returns or raises")
 
 
 class _SilenceError(Exception):
@@ -222,22 +220,14 @@ def _no_answer(error: Exception, seconds: float) -> _SilenceError:
     """Sort what went wrong on the wire; anything that is no network error is the suite's own and is raised again."""
     text = str(error) or type(error).__name__
     if isinstance(error, TimeoutError):
-        return _SilenceError(f"no answer within {seconds:.3g} s", NoAnswer.TIMEOUT)
+        return _SilenceError(f"no response within {seconds:.3g} s", NoAnswer.TIMEOUT)
     if isinstance(error, ClosedError):
-        return _SilenceError("connection closed without an answer", NoAnswer.CLOSED)
+        return _SilenceError("the server closed the connection without a response", NoAnswer.CLOSED)
     if isinstance(error, h11.RemoteProtocolError):
-        return _SilenceError(f"the answer is no HTTP: {text}", NoAnswer.MALFORMED)
+        return _SilenceError(f"the response is not HTTP: {text}", NoAnswer.MALFORMED)
     if isinstance(error, NoConnectionError):
         kind = NoAnswer.TLS if "SSL" in text or "certificate" in text.lower() else NoAnswer.REFUSED
         return _SilenceError(f"no connection: {text}", kind)
     if isinstance(error, OSError):
-        return _SilenceError(f"connection broken: {text}", NoAnswer.CLOSED)
+        return _SilenceError(f"the connection broke without a response: {text}", NoAnswer.CLOSED)
     raise error
-
-
-def _shape(path: str) -> str:
-    """A path with its values taken out, so that one endpoint is one whatever it is asked with."""
-    return "/".join(
-        "*" if re.search(r"\d|%|NaN|Infinity", part) or len(part) > 40 else part  # noqa: PLR2004 - a long segment is a value
-        for part in path.split("?", 1)[0].split("/")
-    )

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 import h11
 
-from conformance.transport.exchange import Response
+from conformance.transport.exchange import IDEMPOTENT_METHODS, Response
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,6 +31,8 @@ _READ: Final = 64 * 1024
 _KEPT: Final = 2
 _EXPIRY_S: Final = 3.0
 _SWITCHING_PROTOCOLS: Final = 101
+# A reset follows the data that nobody reads within this time on a network nearby, ms.
+_RESET_MS: Final = 50
 _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)  # Linux alone has it
 
 
@@ -76,6 +78,7 @@ class HttpConnection:
     Attributes:
         is_open: whether it has been opened, and not closed since.
         is_idle: whether an exchange has ended on it that another one can follow.
+        last_status: of the last response on it; 0 before the first.
     """
 
     def __init__(self, host: str, port: int, tls: ssl.SSLContext | None) -> None:
@@ -84,7 +87,9 @@ class HttpConnection:
         self._state = h11.Connection(h11.CLIENT, max_incomplete_event_size=_MAX_HEAD)
         self._idle_since = 0.0
         self._begun = False
+        self._was_reset = False
         self.is_idle = False
+        self.last_status = 0
 
     @property
     def is_open(self) -> bool:
@@ -118,7 +123,16 @@ class HttpConnection:
         if self._state.our_state is h11.DONE and self._state.their_state is h11.DONE:
             self._state.start_next_cycle()
             self.is_idle, self._idle_since = True, time.monotonic()
+        self.last_status = response.status
         return response
+
+    def ended_before(self, method: str) -> bool:
+        """Return whether the server ended the kept connection before a request on it, so that it may be sent again.
+
+        A request that is not idempotent counts only where the network says that nobody has read it (RFC 9110 9.2.2).
+        """
+        kept = self.last_status > 0 and not self._begun
+        return kept and (method in IDEMPOTENT_METHODS or self._was_reset)
 
     def _send(self, link: socket.socket, request: h11.Request, content: bytes, deadline: Deadline) -> None:
         """Head and content leave as one segment where they are short: a robot is woken once."""
@@ -163,9 +177,14 @@ class HttpConnection:
             if self._begun and _QUICKACK is not None:
                 # Many a server keeps the rest back until its first piece is acknowledged: a kernel takes 40 ms.
                 link.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
-            octets = link.recv(_READ)
-            self._begun = True
+            try:
+                octets = link.recv(_READ)
+            except ConnectionError:
+                self._was_reset = not self._begun
+                raise
+            self._begun = self._begun or bool(octets)
             if not octets and self._state.their_state is h11.SEND_RESPONSE:
+                self._was_reset = not self._begun and _is_reset(link)
                 raise ClosedError
             deadline.came(len(octets))
             self._state.receive_data(octets)
@@ -183,6 +202,15 @@ class HttpConnection:
         if self._link is not None:
             self._link.close()
             self._link = None
+
+
+def _is_reset(link: socket.socket) -> bool:
+    """Return whether a peer that has closed a connection also reset it, as it does on data that nobody reads."""
+    if not hasattr(select, "poll"):  # Windows
+        return False
+    poll = select.poll()
+    poll.register(link, 0)  # errors are reported without being asked for
+    return any(event & select.POLLERR for _, event in poll.poll(_RESET_MS))
 
 
 def _is_readable(link: socket.socket) -> bool:

@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import re
 import shlex
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -9,7 +10,15 @@ from functools import cached_property
 
 # By these nothing is done (RFC 9110 9.2.1), so they may be sent again without leave.
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+# Twice has the effect of once (RFC 9110 9.2.2), so a client may send them again on a new connection.
+IDEMPOTENT_METHODS = SAFE_METHODS | {"PUT", "DELETE"}
 _CURL_PLAIN_LIMIT = 4000
+# A segment of a path that holds this, or is longer than this, is a value and no name.
+_VALUE = re.compile(r"\d|%|NaN|Infinity")
+_LONG_SEGMENT = 40
+# The first element in a SOAP Body names the operation: the operations of a service share one URL.
+_SOAP_OPERATION = re.compile(rb"<(?:[\w.-]+:)?Body[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)")
+_SOAP_HEAD = 4096
 
 
 @dataclass(frozen=True)
@@ -32,8 +41,33 @@ class Request:
 
     @property
     def size(self) -> int:
-        """How much there is to read in it: what "smallest failing request" is measured by."""
+        """Return how much there is to read in the request; the smallest failing request is the one to show."""
+        if self.raw is not None:
+            return len(self.raw)
         return len(self.url) + len(self.body) + sum(len(name) + len(value) for name, value in self.headers)
+
+    @property
+    def target(self) -> str:
+        """Return the request target as it was sent; that of a raw request stands in its first line."""
+        target = "/" + self.url.split("//", 1)[-1].partition("/")[2]
+        if self.raw is not None:
+            words = self.raw.split(b"\r\n", 1)[0].decode("latin-1").split(" ")
+            target = words[1] if len(words) > 1 else ""
+            if target.startswith(("http://", "https://")):
+                target = "/" + target.split("//", 1)[1].partition("/")[2]
+        return target
+
+    @property
+    def endpoint(self) -> str:
+        """Return method, server and path with its values taken out, and the operation of a SOAP message."""
+        path = "/".join(
+            "*" if _VALUE.search(part) or len(part) > _LONG_SEGMENT else part
+            for part in self.target.split("?", 1)[0].split("/")
+        )
+        scheme, _, rest = self.url.partition("//")
+        found = _SOAP_OPERATION.search(self.body[:_SOAP_HEAD]) if self.method == "POST" else None
+        operation = f" {found[1].decode('latin-1')}" if found else ""
+        return f"{self.method} {scheme}//{rest.partition('/')[0]}{path}{operation}"
 
     def curl(self) -> str:
         """A shell command that sends the request again (a raw one by nc)."""
@@ -168,7 +202,7 @@ class Unanswered:
 
     Attributes:
         request: what was sent.
-        problem: what happened instead ("no answer within 10 s", "connection closed without an answer", ...).
+        problem: what happened instead ("no response within 10 s", ...).
         kind: the same as one of a few.
     """
 

@@ -80,15 +80,15 @@ class _Client:
     """One of several clients: its connections are its own, and nobody listens while others are being served."""
 
     def __init__(self) -> None:
-        self._clients: dict[str, HttpClient] = {}
+        # By base URL: the client whose connections are shared, and the own one.
+        self._clients: dict[str, tuple[HttpClient, HttpClient]] = {}
 
     def send(self, request: Outgoing, wait: Callable[[], object]) -> Attempt:
         """Wait for the others, then send."""
         shared = request.client
         # The ceiling on the rate has been kept to before.
-        own = self._clients.setdefault(
-            shared.base_url, HttpClient(shared.base_url, replace(shared.connection, listeners=[], request_rate=None))
-        )
+        settings = replace(shared.connection, listeners=[], request_rate=None, resent=0)
+        _, own = self._clients.setdefault(shared.base_url, (shared, HttpClient(shared.base_url, settings)))
         wait()
         try:
             return own.send(request.method, request.path, headers=request.headers, body=request.body)
@@ -96,9 +96,10 @@ class _Client:
             return none.unanswered
 
     def close(self) -> None:
-        """Close the connections."""
-        for client in self._clients.values():
-            client.close()
+        """Close the connections, and count what was sent again on them."""
+        for shared, own in self._clients.values():
+            own.close()
+            shared.connection.resent += own.connection.resent
 
 
 def _tell(requests: Sequence[Outgoing], attempts: Sequence[Attempt]) -> None:

@@ -1,6 +1,6 @@
-"""HTTP by hand over a socket: for requests that no client would send, and answers read octet by octet.
+"""HTTP/1.1 over a plain socket: requests that no client library would send, and responses read octet by octet.
 
-Every wait ends at one deadline. What is wrong with an answer's framing is told with the clause of RFC 9112.
+Every wait ends at one deadline. A response with broken framing is refused with the clause of RFC 9112 that it breaks.
 """
 
 import itertools
@@ -10,23 +10,24 @@ import socket
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from http import HTTPStatus
+
+import h11
 
 from conformance.transport.client import HttpClient
 from conformance.transport.connections import open_link
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
 from conformance.transport.pace import time_for
 
-_STATUS_LINE = re.compile(rb"HTTP/1\.([01]) (\d{3})(?: [^\r\n]*)?")
-_FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*([^\r\n]*?)[ \t]*")
-_CHUNK = re.compile(rb"([0-9A-Fa-f]{1,15})[ \t]*(?:;[^\r\n]*)?")
+# What a recipient may forgive in a header section, and a server must not send (RFC 9112 2.2, 5.2).
+_FORGIVEN = re.compile(rb"(?<!\r)\n|\r(?!\n)|\n[ \t]")
 _MOST = 4 * 1024 * 1024
-_BODILESS = frozenset({204, 304})
 # The least that a connection is waited for, s.
 _TO_CONNECT_S = 0.05
 
 
 class FramingError(Exception):
-    """Octets that are no well-framed answer; the message says what is wrong, and by which clause."""
+    """Octets are no well-framed response; the message says what is wrong, and by which clause."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class RawAnswer:
 
     Attributes:
         octets: all of it.
-        closed: whether the robot closed the connection (else the deadline passed).
+        closed: whether the robot closed the connection; if not, the deadline passed.
         sent_all: whether the whole request went out.
         elapsed_ms: from the first octet sent to the end.
         early: whether something came in a pause of sending.
@@ -49,10 +50,10 @@ class RawAnswer:
 
 
 def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = True) -> bytes:
-    """A request's head with everything that the robot asks for, and nothing that the caller did not want.
+    """Return the head of a request: request line, Host, the token if the run has one, and the given fields.
 
     Args:
-        client: whose robot, prefix and token.
+        client: gives authority, prefix and token.
         method: as on the wire.
         path: below the base URL.
         fields: whole lines, without line ends.
@@ -67,10 +68,17 @@ def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = 
 
 
 def chunked(body: bytes, size: int, extension: bytes = b"", trailers: bytes = b"") -> bytes:
-    """A body in chunks of so many octets, each with an extension, and whole trailer lines behind (RFC 9112 7.1)."""
+    """Return a body in chunks of ``size`` octets, each with an extension, and whole trailer lines (RFC 9112 7.1)."""
     pieces = (body[start : start + size] for start in range(0, len(body), size))
     chunks = b"".join(b"%x%b\r\n%b\r\n" % (len(piece), extension, piece) for piece in pieces)
     return chunks + b"0%b\r\n%b\r\n" % (extension, trailers)
+
+
+def refuses_chunks(attempt: Attempt) -> bool:
+    """Return whether a server of HTTP/1.0, which has no chunks, asks for a length (RFC 9112 6.1)."""
+    if isinstance(attempt, Unanswered):
+        return False
+    return attempt.response.http_version == "HTTP/1.0" and attempt.response.status == HTTPStatus.LENGTH_REQUIRED
 
 
 def talk(
@@ -88,12 +96,12 @@ def talk(
         client: which robot.
         octets: what to send.
         timeout_s: deadline for all of it, and more for each octet; by default the run's.
-        answers: stop when so many whole answers to GET have come; 0: only at the end.
+        answers: stop after so many complete responses to GET; 0: only when the connection ends.
         cuts: places before which sending pauses.
-        pause_s: for so long, or until something comes.
+        pause_s: length of a pause, s; it ends early when something comes.
 
     Raises:
-        NoAnswerError: there is no connection.
+        NoAnswerError: no connection could be opened.
     """
     deadline = time.monotonic() + (timeout_s or client.connection.timeout_s) + time_for(len(octets))
     request = shown(client, octets)
@@ -131,7 +139,7 @@ def talk(
 def _sent(
     link: socket.socket, octets: bytes, deadline: float, cuts: Sequence[int], pause_s: float
 ) -> tuple[bool, bool]:
-    """Send octets, with pauses before the cuts: whether all of them went out, and whether something came in a pause."""
+    """Send octets with pauses before the cuts; return whether all went out, and whether something came in a pause."""
     early = False
     try:
         for begin, end in itertools.pairwise((0, *cuts, len(octets))):
@@ -140,7 +148,7 @@ def _sent(
             _set_timeout(link, deadline)
             link.sendall(octets[begin:end])
     except OSError:
-        # Too slow, or the robot has closed it; what it said before can still be read.
+        # Too slow, or the robot has closed the connection; what it sent before can still be read.
         return False, early
     return True, early
 
@@ -153,7 +161,7 @@ def _set_timeout(link: socket.socket, deadline: float) -> None:
 
 
 def answers_in(octets: bytes, most: int) -> int:
-    """How many whole answers to GET, up to so many, a connection that is still open has brought."""
+    """Return how many complete responses to GET an open connection has brought, at most ``most``."""
     for count in range(most):
         try:
             _, octets = parse(octets, "GET", closed=False)
@@ -163,7 +171,7 @@ def answers_in(octets: bytes, most: int) -> int:
 
 
 def shown(client: HttpClient, octets: bytes) -> Request:
-    """The request for a finding; the token is never shown."""
+    """Return the request as a finding shows it: without the token."""
     if client.connection.token:
         octets = octets.replace(client.connection.token.encode("latin-1", "replace"), b"$ROAAS_TOKEN")
     line = octets.split(b"\r\n", 1)[0].decode("latin-1")
@@ -176,99 +184,77 @@ def _address(client: HttpClient) -> str:
 
 
 def parse(octets: bytes, method: str, *, closed: bool, elapsed_ms: float = 0.0) -> tuple[Response, bytes]:
-    """The first answer in a stream, and what follows it.
+    """Return the first final response in a stream, and the octets behind it.
+
+    h11 reads them; what it forgives and RFC 9112 does not let a server send is refused before and after.
 
     Args:
         octets: from the first octet of a status line on.
-        method: of the request that it answers.
+        method: of the request that the response is to.
         closed: whether the connection ended behind the octets.
         elapsed_ms: to be put into the response.
 
     Raises:
-        FramingError: it is not well-framed, or not whole.
+        FramingError: the response is not well-framed, or not complete.
     """
-    front, separator, rest = octets.partition(b"\r\n\r\n")
+    section, separator, _ = octets.partition(b"\r\n\r\n")
     if not separator:
         raise FramingError(f"no end of the header section in {octets[:60]!r} (RFC 9112 2.1)")
-    first, *lines = front.split(b"\r\n")
-    status_line = _STATUS_LINE.fullmatch(first)
-    if status_line is None:
-        raise FramingError(f"the status line {first[:60]!r} (RFC 9112 4)")
-    headers = tuple(_field(line) for line in lines)
-    status = int(status_line[2])
-    version = f"HTTP/1.{status_line[1].decode()}"
-    if 100 <= status < 200:  # noqa: PLR2004 - RFC 9110 15.2: interim answers come before the real one
-        return parse(rest, method, closed=closed, elapsed_ms=elapsed_ms)
-    response = Response(status, headers, b"", elapsed_ms, version)
-    if method == "HEAD" or status in _BODILESS:
-        return response, rest
-    body, rest = _body(response, rest, closed=closed)
-    return Response(status, headers, body, elapsed_ms, version), rest
+    if _FORGIVEN.search(section):
+        raise FramingError(f"a bare CR or LF, or a folded field, in {section[:60]!r} (RFC 9112 2.2, 5.2)")
+    reader = h11.Connection(h11.CLIENT, max_incomplete_event_size=_MOST)
+    # Only HEAD changes how a response is framed (RFC 9112 6.3), so no other method needs to be one that h11 takes.
+    reader.send(h11.Request(method="HEAD" if method == "HEAD" else "GET", target="/", headers=[("Host", "")]))
+    reader.send(h11.EndOfMessage())
+    reader.receive_data(octets)
+    if closed:
+        reader.receive_data(b"")
+    try:
+        first = reader.next_event()
+        if isinstance(first, h11.InformationalResponse):
+            # RFC 9110 15.2: interim responses come before the final one.
+            return parse(reader.trailing_data[0], method, closed=closed, elapsed_ms=elapsed_ms)
+        if not isinstance(first, h11.Response) or first.http_version not in {b"1.0", b"1.1"}:
+            raise FramingError(f"no response of HTTP/1.1 or HTTP/1.0: {section[:60]!r} (RFC 9112 2.3, 4)")
+        body, rest = _content(reader)
+    except h11.RemoteProtocolError as error:
+        raise FramingError(f"{error} (RFC 9112 4 to 7)") from error
+    chunked = any(name == b"transfer-encoding" for name, _ in first.headers)
+    if chunked and method != "HEAD" and not octets[: len(octets) - len(rest)].endswith(b"\r\n\r\n"):
+        raise FramingError("a chunked body whose last line does not end in CRLF (RFC 9112 7.1)")
+    headers = tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in first.headers.raw_items())
+    return Response(first.status_code, headers, body, elapsed_ms, f"HTTP/{first.http_version.decode()}"), rest
 
 
-def _field(line: bytes) -> tuple[str, str]:
-    match = _FIELD.fullmatch(line)
-    if match is None:
-        raise FramingError(f"the field line {line[:60]!r} (RFC 9112 5)")
-    return match[1].decode("latin-1"), match[2].decode("latin-1")
+def _content(reader: h11.Connection) -> tuple[bytes, bytes]:
+    """Return the content of a response whose head has been read, and the octets behind it.
 
-
-def _body(response: Response, rest: bytes, *, closed: bool) -> tuple[bytes, bytes]:
-    coding = (response.header("transfer-encoding") or "").lower()
-    if coding:
-        if not coding.endswith("chunked"):
-            raise FramingError(f"Transfer-Encoding: {coding} (RFC 9112 6.1)")
-        return _chunks(rest)
-    lengths = {part.strip() for part in (response.header("content-length") or "").split(",")} - {""}
-    if len(lengths) > 1 or any(not length.isdigit() for length in lengths):
-        raise FramingError(f"Content-Length: {response.header('content-length')} (RFC 9112 6.3)")
-    if lengths:
-        length = int(lengths.pop())
-        if len(rest) < length:
-            raise FramingError(f"{len(rest)} octets of a body of Content-Length {length} (RFC 9112 6.3)")
-        return rest[:length], rest[length:]
-    if not closed:
-        raise FramingError("neither Content-Length nor chunked, and the connection stays open (RFC 9112 6.3)")
-    return rest, b""
-
-
-def _chunks(rest: bytes) -> tuple[bytes, bytes]:
+    Raises:
+        FramingError: the end of the content has not come.
+        h11.RemoteProtocolError: its framing is broken.
+    """
     body = bytearray()
-    while True:
-        line, separator, after = rest.partition(b"\r\n")
-        size = _CHUNK.fullmatch(line)
-        if not separator or size is None:
-            raise FramingError(f"the chunk size {line[:40]!r} (RFC 9112 7.1)")
-        length = int(size[1], 16)
-        if length == 0:
-            break
-        if after[length : length + 2] != b"\r\n":
-            raise FramingError(f"a chunk of {length} octets that does not end where it says (RFC 9112 7.1)")
-        body += after[:length]
-        rest = after[length + 2 :]
-    while True:
-        line, separator, after = after.partition(b"\r\n")
-        if not separator:
-            raise FramingError("a chunked body without its last line (RFC 9112 7.1)")
-        if not line:
-            return bytes(body), after
-        _field(line)
+    while isinstance(event := reader.next_event(), h11.Data):
+        body += event.data
+    if not isinstance(event, h11.EndOfMessage):
+        raise FramingError(f"no end of the content after {len(body)} octets of it (RFC 9112 6.3)")
+    return bytes(body), reader.trailing_data[0]
 
 
 def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) -> tuple[Attempt, bytes]:
-    """The first answer as an exchange, and what follows it; one that cannot be read is none, for that reason.
+    """Return the first response as an exchange, or why it cannot be read; and the octets behind it.
 
     Args:
         client: which robot.
         octets: the request.
-        came: what talk() brought.
+        came: what talk() returned.
         method: of the request.
     """
     request = shown(client, octets)
     if not came.octets:
         if came.closed:
-            return Unanswered(request, "connection closed without an answer", NoAnswer.CLOSED), b""
-        return Unanswered(request, "no answer within the deadline", NoAnswer.TIMEOUT), b""
+            return Unanswered(request, "the server closed the connection without a response", NoAnswer.CLOSED), b""
+        return Unanswered(request, "no response within the deadline", NoAnswer.TIMEOUT), b""
     try:
         response, rest = parse(came.octets, method, closed=came.closed, elapsed_ms=came.elapsed_ms)
     except FramingError as error:
@@ -277,5 +263,5 @@ def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) ->
 
 
 def rest_of(came: RawAnswer, octets: bytes) -> RawAnswer:
-    """What came, from later octets on."""
+    """Return what came over a connection with only ``octets`` of it left."""
     return RawAnswer(octets, came.closed, came.sent_all, came.elapsed_ms)

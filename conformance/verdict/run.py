@@ -73,7 +73,7 @@ class Run:
     cut_short: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.judge = Judge(set(self.contract.ledger))
+        self.judge = Judge(self.contract.ledger)
 
     @property
     def remarks(self) -> tuple[str, ...]:

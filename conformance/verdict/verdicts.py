@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from conformance.contract.ledger import Requirement
     from conformance.verdict.evidence import Evidence
+    from conformance.verdict.finding import Finding
 
 
 # Why there is no verdict on what a robot does by itself, or does not.
@@ -79,6 +80,11 @@ class Verdict:
     expected_failure: tuple[str, str] | None = None
     scored: bool = True
 
+    @property
+    def because(self) -> Finding | None:
+        """Return the finding of another requirement because of which this one was not tested."""
+        return self.evidence.because if self.value in {Value.SKIP, Value.WARN} else None
+
 
 def verdict_of(
     requirement: Requirement,
@@ -107,12 +113,14 @@ def verdict_of(
     if evidence.findings:
         first = next(iter(evidence.findings.values()))
         more = f" (and {len(evidence.findings) - 1} more)" if len(evidence.findings) > 1 else ""
-        reason = f"{first.expected}; found: {first.told}{more}"
+        reason = f"{first.text}{more}"
         value = {Level.MUST: Value.FAIL, Level.SHOULD: Value.WARN}.get(requirement.level)
-        return verdict(value, reason) if value else verdict(Value.PASS, f"not so, as it may be: {reason}")
+        return verdict(value, reason) if value else verdict(Value.PASS, f"The requirement is optional. {reason}")
+    because = evidence.because
     for value, reasons in (
         (Value.SKIP, [requirement.untestable] if requirement.untestable else []),
         (Value.ERROR, evidence.errors),
+        (Value.SKIP, [f"Not tested, because of finding {because.number}: {because.brief}"] if because else []),
         (Value.SKIP, [undeclared[need] for need in requirement.needs if need in undeclared]),
         (Value.SKIP, evidence.skips),
         (Value.SKIP, [] if evidence.cases else evidence.notes or ["nothing was executed for it"]),

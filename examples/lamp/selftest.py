@@ -1,9 +1,9 @@
-"""What the self-test needs of this pack: how a good lamp is started."""
+"""How the self-test starts the lamp."""
 
 import sys
 from pathlib import Path
 
 from conformance.mutation.self_test import GoodDevice, SelfTest
 
-_LAMP = Path(__file__).with_name("lamp.py")
-SELFTEST = SelfTest(devices=(GoodDevice("lamp", lambda _: [sys.executable, str(_LAMP), "0"]),))
+LAMP = GoodDevice("lamp", lambda _: [sys.executable, str(Path(__file__).with_name("lamp.py")), "0"])
+SELFTEST = SelfTest(devices=(LAMP,))

@@ -1,1 +1,1 @@
-"""Those that send requests: the wire client, the library clients, and what they send."""
+"""What sends requests: the wire client, the library clients, and the requests themselves."""

@@ -1,29 +1,25 @@
-"""What one simulated user holds: its connections and clients; it performs arrivals and records them."""
-
-from __future__ import annotations
+"""One simulated user: its connections and clients; it sends requests and records their outcome."""
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 
 from conformance.packs.table1.thresholds import ApiStyle
-from loadtests.clients.failures import CallError, answer_error, is_success
-from loadtests.clients.library import LibraryRest, LibrarySoap
+from loadtests.clients.failures import CallError
+from loadtests.clients.library import LibraryRest, LibrarySoap, Sent
 from loadtests.clients.payloads import Values, variants
+from loadtests.clients.robot import Robot
+from loadtests.clients.rosbridge import Bridge
 from loadtests.clients.wire import Connection, Request, now_ns
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.clients.rosbridge import Bridge
 
 _DURATION = re.compile(rb"([\w-]+)\s*;[^,]*?dur\s*=\s*\"?([0-9.]+)")
 
 
 def server_ns(timing: bytes | None) -> int:
-    """The time that a robot says it spent (Server-Timing, W3C), in ns; -1 where it says nothing.
+    """Return the time that a robot says it spent (Server-Timing, W3C), in ns; -1 where it does not say.
 
-    The metric called `total` if there is one, else the longest: metrics may overlap, so no sum is taken.
+    The metric called `total` counts if there is one, else the longest: metrics may overlap, so they are not added.
     """
     if not timing:
         return -1
@@ -39,9 +35,13 @@ class Workload:
     Args:
         operations: names, in the order in which arrivals number them.
         documents: parsed WSDLs by operation, for zeep.
+        sent: counts what the library clients put on the wire.
     """
 
-    def __init__(self, robot: Robot, operations: tuple[str, ...], seed: int, documents: dict[str, Any]) -> None:
+    def __init__(
+        self, robot: Robot, operations: tuple[str, ...], seed: int, documents: dict[str, Any], sent: Sent | None = None
+    ) -> None:
+        self.sent = sent or Sent()
         self.robot = robot
         self.operations = operations
         self.documents = documents
@@ -63,7 +63,7 @@ class Caller:
         self._soap: LibrarySoap | None = None
 
     def _wire(self, interface: str, operation: int) -> Connection | Bridge:
-        """The connection for an operation; those of one origin share it, as any HTTP client does."""
+        """Return the connection for an operation; operations of one origin share it, as in any HTTP client."""
         known = self._wires.get((interface, operation))
         if known is None:
             known = self.workload.bridge if interface == "rosbridge" else self._http(interface, operation)
@@ -84,7 +84,7 @@ class Caller:
     def perform(
         self, segment: int, interface: str, client: str, operation: int, payload: int, due: int, *, queued: bool
     ) -> bool:
-        """Make a request and record it, whatever comes of it; returns whether it succeeded."""
+        """Send a request and record its outcome; returns whether it succeeded."""
         recorder = self.recorder
         start = now_ns()
         try:
@@ -94,8 +94,7 @@ class Caller:
                 connects = connection.connects
                 built = now_ns()
                 answer = connection.call(request)
-                if not (is_success(answer.status) and request.expects in answer.body):
-                    raise _judged(answer.status, answer.headers.get(b"location"), answer.body, request.expects)
+                answer.require_good(request.expects)
                 done = now_ns()
                 received, timing = answer.received_ns, answer.headers.get(b"server-timing")
                 if connection.connects != connects:
@@ -117,13 +116,13 @@ class Caller:
             with gevent.Timeout(workload.robot.timeout_s):  # requests has no deadline for a body that drips
                 if interface == "rest":
                     if self._rest is None:
-                        self._rest = LibraryRest(workload.robot)
+                        self._rest = LibraryRest(workload.robot, workload.sent)
                     return self._rest.call(name, values)
                 if self._soap is None:
-                    self._soap = LibrarySoap(workload.robot, workload.documents)
+                    self._soap = LibrarySoap(workload.robot, workload.documents, workload.sent)
                 return self._soap.call(name, values)
         except gevent.Timeout:
-            raise CallError("timeout", f"no complete answer within {workload.robot.timeout_s:g} s") from None
+            raise CallError("timeout", f"no complete response within {workload.robot.timeout_s:g} s") from None
 
     def close(self) -> None:
         """Close all connections; the next calls open new ones."""
@@ -132,8 +131,3 @@ class Caller:
         for library in (self._rest, self._soap):
             if library is not None:
                 library.close()
-
-
-def _judged(status: int, location: bytes | None, body: bytes, expects: bytes) -> CallError:
-    where = location.decode("latin-1") if location else None
-    return answer_error(status, where, body, expects) or CallError("content", f"status {status}")

@@ -1,26 +1,22 @@
-"""Where a service listens, as a value, and what goes wrong on the way there.
+"""Where a service listens, as a value.
 
-A URL may carry a base-path prefix (a robot behind a gateway), an IPv6 literal and either scheme.
+A URL may have a base-path prefix (a robot behind a gateway), an IPv6 literal and either scheme.
 """
-
-from __future__ import annotations
 
 import re
 import ssl
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import Self
 from urllib.parse import urlsplit
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
 
 DEFAULT_PORTS = {"http": 80, "https": 443}
 _FORBIDDEN = re.compile(r"[\x00-\x20\x7f]")  # RFC 3986 section 2: neither space nor control characters
 
 
 class EndpointError(ValueError):
-    """A URL that no request can be sent to; the message shows it."""
+    """A URL that no request can be sent to; the message contains it."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +36,7 @@ class Endpoint:
     path: str
 
     @classmethod
-    def parse(cls, url: str, schemes: Mapping[str, int] = DEFAULT_PORTS) -> Endpoint:
+    def parse(cls, url: str, schemes: Mapping[str, int] = DEFAULT_PORTS) -> Self:
         """Read a URL of one of several schemes, which have their default ports.
 
         Raises:
@@ -50,42 +46,42 @@ class Endpoint:
             parts = urlsplit(url.strip())
             port = parts.port
         except ValueError as error:
-            raise EndpointError(f"{url!r} is no URL: {error}") from None
+            raise EndpointError(f"{url!r} is not a URL: {error}") from None
         if parts.scheme not in schemes:
             wanted = " or ".join(f"{name}://" for name in schemes)
             raise EndpointError(f"{url!r} does not begin with {wanted}")
         if not parts.hostname:
             raise EndpointError(f"{url!r} names no host")
         if parts.username is not None or parts.password is not None:
-            raise EndpointError(f"the URL of {parts.hostname} carries a password: give a --token-file instead")
+            raise EndpointError(f"the URL of {parts.hostname} contains a password: use a --token-file instead")
         if _FORBIDDEN.search(parts.netloc + parts.path):
-            raise EndpointError(f"{url!r} holds a space or a control character")
+            raise EndpointError(f"{url!r} contains a space or a control character")
         return cls(
             parts.scheme, parts.hostname, schemes[parts.scheme] if port is None else port, parts.path.rstrip("/")
         )
 
     @property
     def origin(self) -> tuple[str, str, int]:
-        """Scheme, host and port (RFC 9110 section 4.3.1): connections serve an origin."""
+        """Return scheme, host and port (RFC 9110 section 4.3.1); a connection serves one origin."""
         return self.scheme, self.host, self.port
 
     @property
     def authority(self) -> str:
-        """The Host header's value (RFC 9110 section 7.2): the port only where it is not the scheme's own."""
+        """Return the Host header's value (RFC 9110 section 7.2), with the port unless it is the scheme's default."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return host if self.port == DEFAULT_PORTS.get(self.scheme) else f"{host}:{self.port}"
 
     @property
     def url(self) -> str:
-        """The endpoint as a URL, without a trailing slash."""
+        """Return the endpoint as a URL, without a trailing slash."""
         return f"{self.scheme}://{self.authority}{self.path}"
 
 
 def tls_context(ca_file: Path | None) -> ssl.SSLContext:
-    """TLS as a careful client sets it up: certificate and host name are checked; `ca_file` adds trust.
+    """Return a TLS context that checks certificate and host name; `ca_file` adds trusted authorities.
 
     Raises:
-        EndpointError: `ca_file` cannot be read or holds no certificate.
+        EndpointError: `ca_file` cannot be read or contains no certificate.
     """
     try:
         return ssl.create_default_context(cafile=None if ca_file is None else str(ca_file))

@@ -1,6 +1,4 @@
-"""Why a call failed, in the few kinds that the result groups errors by."""
-
-from __future__ import annotations
+"""Why a call failed, in the few kinds by which the result groups errors."""
 
 import re
 import socket
@@ -9,7 +7,7 @@ from http import HTTPStatus
 
 
 class CallError(Exception):
-    """A call that brought no good answer.
+    """A call without a good response.
 
     Attributes:
         kind: `refused`, `resolve`, `network`, `tls`, `closed`, `timeout`, `malformed`, `status`, `redirect`,
@@ -21,23 +19,23 @@ class CallError(Exception):
         self.kind = kind
 
 
-#: Kinds that say that nobody listens there, as against somebody who answers badly.
+#: Kinds that mean that no server listens there; the others are bad responses.
 UNREACHABLE = frozenset({"refused", "resolve", "network", "tls"})
 
 _FAULT_STRING = re.compile(rb"<(?:\w+:)?faultstring[^>]*>\s*(.*?)\s*</", re.DOTALL)
 _FAULT = re.compile(rb"<(?:\w+:)?Fault[\s>/]")
 _SHOWN = 160
-# As plain integers: every request compares with them, and to compare with a member of HTTPStatus takes longer.
+# Plain integers: every request is compared with them, and members of HTTPStatus compare more slowly.
 _OK = int(HTTPStatus.OK)
 _MULTIPLE_CHOICES = int(HTTPStatus.MULTIPLE_CHOICES)
 
 
 def connect_error(error: OSError, where: str) -> CallError:
-    """What kept a connection from being made."""
+    """Return the error for a connection that could not be opened."""
     if isinstance(error, ssl.SSLCertVerificationError):
         return CallError(
             "tls",
-            f"{where}: its certificate was not accepted: {error.verify_message or error} "
+            f"{where}: its certificate is not trusted: {error.verify_message or error} "
             "(is a ca_file missing in the statement?)",
         )
     if isinstance(error, ssl.SSLError):
@@ -51,28 +49,30 @@ def connect_error(error: OSError, where: str) -> CallError:
     return CallError("network", f"{where}: {error.strerror or error}")
 
 
-def is_success(status: int) -> bool:
-    """Whether a status is a success (RFC 9110 section 15.3)."""
-    return _OK <= status < _MULTIPLE_CHOICES
+def require_good(status: int, location: str | None, body: bytes, expects: bytes = b"") -> None:
+    """Accept a 2xx response whose body contains `expects`.
+
+    Raises:
+        CallError: any other response; the message says what is wrong with it.
+    """
+    if not (_OK <= status < _MULTIPLE_CHOICES and expects in body):
+        raise _error(status, location, body, expects)
 
 
-def answer_error(status: int, location: str | None, body: bytes, expects: bytes) -> CallError | None:
-    """Judge an answer: None when it is a 2xx that holds the octets that it `expects`, if any."""
-    if is_success(status):
-        if expects not in body:
-            return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {shown(body)}")
-        return None
+def _error(status: int, location: str | None, body: bytes, expects: bytes) -> CallError:
+    if _OK <= status < _MULTIPLE_CHOICES:
+        return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {shown(body)}")
     if HTTPStatus.MULTIPLE_CHOICES <= status < HTTPStatus.BAD_REQUEST:  # RFC 9110 section 15.4: redirection
-        return CallError("redirect", f"status {status} to {location!r}: give that address as the endpoint")
+        return CallError("redirect", f"status {status} to {location!r}: use that address as the endpoint")
     if _FAULT.search(body):
         found = _FAULT_STRING.search(body)
         reason = found.group(1).decode("utf-8", "replace")[:_SHOWN] if found else shown(body)
         return CallError("fault", f"status {status}, SOAP fault: {reason}")
-    hint = " (a token is needed: --token-file)" if status in {401, 403} else ""
+    hint = " (does it need a --token-file?)" if status in {401, 403} else ""
     return CallError("status", f"status {status}{hint}: {shown(body)}")
 
 
 def shown(body: bytes) -> str:
-    """The beginning of a body, for a message."""
+    """Return the beginning of a body, for a message."""
     text = body[:_SHOWN].decode("utf-8", "replace")
     return (text + " …" if len(body) > _SHOWN else text) or "(no body)"

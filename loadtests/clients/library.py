@@ -1,91 +1,99 @@
-"""The library clients: what a user's program would write, with its cost.
+"""The library clients: what a user's program would use, and what it costs.
 
-SOAP through zeep: one Document (the parsed WSDL) for each process, for it takes milliseconds to build, and a
-transport for each user. REST through `requests`. Both pass through one urllib3 adapter that counts what is put
-on the wire: a request that was sent twice for one call is a silent resend, and the run says so.
+SOAP goes through zeep: one Document (the parsed WSDL) for each process, because it takes milliseconds to build, and one
+transport for each user. REST goes through `requests`. Both use a urllib3 adapter that counts the requests on the wire:
+two requests for one call are a silent retry, which makes a run invalid.
 """
 
-from __future__ import annotations
-
-import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import requests
 import zeep
 from requests.adapters import HTTPAdapter
-from urllib3.connection import HTTPConnection, HTTPSConnection
 from zeep.transports import Transport
 from zeep.wsdl import Document
 
 from conformance.packs.table1.thresholds import Client
-from loadtests.clients.failures import CallError, answer_error, connect_error
+from loadtests.clients.failures import CallError, connect_error, require_good
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
+from loadtests.clients.robot import Robot
+from loadtests.clients.wire import now_ns
 
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-
-now_ns = time.monotonic_ns
-#: What options and results call it, after the library that speaks SOAP; over REST it is requests.
+#: Options and results call it after the library for SOAP; over REST it is requests.
 LIBRARY = Client.ZEEP
 
 
 @dataclass(slots=True)
 class Timed:
-    """A call's moments: request built, answer received; and the robot's Server-Timing header, if any."""
+    """When a call's request was built and its response received; and the Server-Timing header, if any."""
 
     built_ns: int
     received_ns: int
     timing: bytes | None
 
 
+@dataclass(slots=True)
 class Sent:
-    """Requests put on the wire by all library clients of this process, and calls that asked for them."""
+    """Counts the calls of library clients, and the requests that these put on the wire."""
 
-    requests = 0
-    calls = 0
+    requests: int = 0
+    calls: int = 0
 
-
-class _CountingHTTP(HTTPConnection):
-    def request(self, *args: Any, **kwargs: Any) -> None:
-        Sent.requests += 1
-        super().request(*args, **kwargs)
-
-
-class _CountingHTTPS(HTTPSConnection):
-    def request(self, *args: Any, **kwargs: Any) -> None:
-        Sent.requests += 1
-        super().request(*args, **kwargs)
+    @property
+    def resends(self) -> int:
+        """Return how many requests were sent beyond one for each call."""
+        return max(0, self.requests - self.calls)
 
 
 class _CountingAdapter(HTTPAdapter):
-    """Counts sends below urllib3's retrying."""
+    """Counts sends below urllib3's retries."""
+
+    def __init__(self, sent: Sent) -> None:
+        self._sent = sent
+        super().__init__()
 
     def init_poolmanager(self, *args: Any, **kwargs: Any) -> None:
         super().init_poolmanager(*args, **kwargs)
-        classes = self.poolmanager.pool_classes_by_scheme
-        http, https = classes["http"], classes["https"]
+        classes: dict[str, Any] = self.poolmanager.pool_classes_by_scheme
         self.poolmanager.pool_classes_by_scheme = {
-            "http": type("CountingHTTPPool", (http,), {"ConnectionCls": _CountingHTTP}),
-            "https": type("CountingHTTPSPool", (https,), {"ConnectionCls": _CountingHTTPS}),
+            scheme: type("CountingPool", (pool,), {"ConnectionCls": _counting(pool.ConnectionCls, self._sent)})
+            for scheme, pool in classes.items()
         }
 
 
+def _counting(base: Any, sent: Sent) -> Any:
+    """Return a class of connections that counts its requests."""
+
+    class Counting(base):  # type: ignore[misc]  # HTTPConnection or HTTPSConnection
+        def request(self, *args: Any, **kwargs: Any) -> None:
+            sent.requests += 1
+            super().request(*args, **kwargs)
+
+    return Counting
+
+
 class _Staying(requests.Session):
-    """A session that follows no redirect, for a request that goes elsewhere measures somebody else."""
+    """A session that follows no redirect: a redirected request would measure another server."""
 
     def get_redirect_target(self, resp: requests.Response) -> str | None:
-        """Nowhere."""
+        """Return None: there is no redirect to follow."""
         del resp
         return None
 
 
-def new_session(robot: Robot, *, staying: bool = False) -> requests.Session:
-    """A `requests` session as a user would set it up for this robot; `staying` where it answers itself."""
+def new_session(robot: Robot, sent: Sent | None = None, *, staying: bool = False) -> requests.Session:
+    """Return a `requests` session as a user would set it up for this robot.
+
+    Args:
+        robot: its credentials.
+        sent: counts the requests.
+        staying: follow no redirect.
+    """
     session = _Staying() if staying else requests.Session()
-    session.trust_env = False  # a proxy from the environment would be measured in the robot's place
-    session.mount("http://", _CountingAdapter())
-    session.mount("https://", _CountingAdapter())
+    session.trust_env = False  # a proxy from the environment would be measured instead of the robot
+    for scheme in ("http://", "https://"):
+        session.mount(scheme, _CountingAdapter(sent or Sent()))
     if robot.ca_file:
         session.verify = robot.ca_file
     if robot.token:
@@ -94,7 +102,7 @@ def new_session(robot: Robot, *, staying: bool = False) -> requests.Session:
 
 
 def request_error(error: requests.RequestException, where: str, timeout_s: float) -> CallError:
-    """What `requests` could not do, in our kinds."""
+    """Return the error of `requests` as one of our kinds."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and not isinstance(cause, requests.RequestException):
@@ -106,22 +114,22 @@ def request_error(error: requests.RequestException, where: str, timeout_s: float
     if isinstance(error, requests.ConnectTimeout):
         return connect_error(TimeoutError(), where)
     if isinstance(error, requests.ReadTimeout) or isinstance(cause, TimeoutError):
-        return CallError("timeout", f"no complete answer within {timeout_s:g} s")
+        return CallError("timeout", f"no complete response within {timeout_s:g} s")
     if isinstance(cause, ConnectionResetError | BrokenPipeError):
-        return CallError("closed", f"the robot broke the connection off: {cause}")
+        return CallError("closed", f"the robot reset the connection: {cause}")
     if isinstance(cause, OSError):
         return connect_error(cause, where)
     if "RemoteDisconnected" in repr(error) or "IncompleteRead" in repr(error):
-        return CallError("closed", "the robot closed the connection before its answer was complete")
+        return CallError("closed", "the robot closed the connection before its response was complete")
     return CallError("network", f"{where}: {error}")
 
 
 class _TimedTransport(Transport):
-    """zeep's transport, noting when a message leaves it and when the answer is back."""
+    """zeep's transport; notes when a message leaves it and when the response is back."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, sent: Sent) -> None:
         super().__init__(  # type: ignore[no-untyped-call]  # zeep annotates the class, not its constructor
-            session=new_session(robot, staying=True), timeout=robot.timeout_s, operation_timeout=robot.timeout_s
+            session=new_session(robot, sent, staying=True), timeout=robot.timeout_s, operation_timeout=robot.timeout_s
         )
         self.timed = Timed(0, 0, None)
 
@@ -130,9 +138,7 @@ class _TimedTransport(Transport):
         response = super().post(address, message, headers)  # type: ignore[no-untyped-call]  # as above
         self.timed.received_ns = now_ns()
         if response.is_redirect:
-            raise answer_error(
-                response.status_code, response.headers.get("Location"), response.content, b""
-            ) or CallError("redirect", f"status {response.status_code}")
+            require_good(response.status_code, response.headers.get("Location"), response.content)
         timing = response.headers.get("Server-Timing")
         self.timed.timing = timing.encode("latin-1") if timing else None
         return response
@@ -142,7 +148,7 @@ def read_document(location: str, robot: Robot) -> Document:
     """Parse a WSDL for zeep.
 
     Raises:
-        Exception: whatever zeep and lxml find wrong with it; the caller words it.
+        Exception: of any kind that zeep and lxml raise; the caller words it.
     """
     transport: Any = Transport(session=new_session(robot), timeout=robot.timeout_s)  # zeep annotates the class itself
     return Document(location, transport, settings=zeep.Settings())
@@ -151,9 +157,10 @@ def read_document(location: str, robot: Robot) -> Document:
 class LibrarySoap:
     """A user's zeep client, with parsed WSDLs by operation that the process shares."""
 
-    def __init__(self, robot: Robot, documents: dict[str, Document]) -> None:
+    def __init__(self, robot: Robot, documents: dict[str, Document], sent: Sent) -> None:
         self._robot = robot
-        self._transport = _TimedTransport(robot)
+        self._sent = sent
+        self._transport = _TimedTransport(robot, sent)
         self._methods = {}
         for operation, document in documents.items():
             client = zeep.Client(document, transport=self._transport)
@@ -165,9 +172,9 @@ class LibrarySoap:
         """Call an operation.
 
         Raises:
-            CallError: the robot answered with a fault, or not at all.
+            CallError: the response is a fault, or there is none.
         """
-        Sent.calls += 1
+        self._sent.calls += 1
         where = self._robot.address("soap", operation) or ""
         try:
             answer = self._methods[operation](**({"arg0": values} if values else {}))
@@ -178,9 +185,9 @@ class LibrarySoap:
         except zeep.exceptions.TransportError as error:
             raise CallError("status", f"status {error.status_code}: {error.message}") from None
         except zeep.exceptions.Error as error:
-            raise CallError("content", f"zeep cannot read the answer: {error}") from None
+            raise CallError("content", f"zeep cannot read the response: {error}") from None
         if not values and answer is None:
-            raise CallError("content", "zeep found nothing in the answer")
+            raise CallError("content", "zeep found nothing in the response")
         return self._transport.timed
 
     def close(self) -> None:
@@ -189,7 +196,7 @@ class LibrarySoap:
 
 
 def _binding(document: Document) -> str:
-    """The name of the contract's binding, whatever port names the robot chose."""
+    """Return the name of the contract's binding, whatever the robot calls its ports."""
     for name in document.bindings:
         if name.startswith(f"{{{NAMESPACE}}}"):
             return str(name)
@@ -197,20 +204,21 @@ def _binding(document: Document) -> str:
 
 
 class LibraryRest:
-    """A user's REST client: requests, and the answer's JSON."""
+    """A user's REST client: the requests library, and the response parsed as JSON."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, sent: Sent) -> None:
         self._robot = robot
-        self._session = new_session(robot, staying=True)
+        self._sent = sent
+        self._session = new_session(robot, sent, staying=True)
         self._base = (robot.rest or "").rstrip("/")
 
     def call(self, operation: str, values: Values) -> Timed:
         """Call an operation.
 
         Raises:
-            CallError: the answer is an error, or there is none.
+            CallError: the response is an error, or there is none.
         """
-        Sent.calls += 1
+        self._sent.calls += 1
         kind = CATALOGUE[operation]
         timed = Timed(0, 0, None)
         request = self._session.prepare_request(
@@ -222,16 +230,12 @@ class LibraryRest:
         except requests.RequestException as error:
             raise request_error(error, self._base, self._robot.timeout_s) from None
         timed.received_ns = now_ns()
-        failure = answer_error(
-            response.status_code, response.headers.get("Location"), response.content, kind.rest_expects
-        )
-        if failure is not None:
-            raise failure
+        require_good(response.status_code, response.headers.get("Location"), response.content, kind.rest_expects)
         if response.content:
             try:
                 response.json()
             except requests.JSONDecodeError as error:
-                raise CallError("content", f"the answer is no JSON: {error}") from None
+                raise CallError("content", f"the response is not JSON: {error}") from None
         timing = response.headers.get("Server-Timing")
         timed.timing = timing.encode("latin-1") if timing else None
         return timed

@@ -1,23 +1,17 @@
-"""What is sent: the same calls as octets for REST and for SOAP, built before the clock runs.
+"""What is sent: the same calls as bytes for REST and for SOAP, built before the measurement.
 
-Delivery is the paper's example (section on the delivery application) with its coordinates varied by lot; 64
-variants, so that no cache on the way answers for the robot.
+Delivery is the paper's example (section on the delivery application) with random coordinates. There are 64 variants, so
+that no cache on the way responds for the robot.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from conformance.packs.table1.delivery import COFFEE, COORDINATES, COURIER, EXAMPLE, PATH_NAMES, XSD_FIELDS
+from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.wire import Request
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from loadtests.clients.endpoint import Endpoint
 
 VARIANTS = 64
 NAMESPACE = "http://soap.turtlebot.mybot.org/"
@@ -28,14 +22,14 @@ Values = dict[str, float]
 
 @dataclass(frozen=True)
 class Operation:
-    """An operation's name on each side.
+    """One operation, as each interface knows it.
 
     Attributes:
         element: the SOAP request's wrapper element.
         code: message code of a delivery; None for a read.
         service: which SOAP service has it, `publishers` or `subscribers`.
         method: the REST method.
-        rest_expects, soap_expects: octets that a good answer holds.
+        rest_expects, soap_expects: bytes that a good response contains.
     """
 
     element: str
@@ -56,7 +50,7 @@ CATALOGUE = {
 
 
 def variants(operation: str, seed: int) -> list[Values]:
-    """The values of each variant; a read has none."""
+    """Return the values of each variant; a read has none."""
     code = CATALOGUE[operation].code
     if code is None:
         return [{} for _ in range(VARIANTS)]
@@ -68,7 +62,7 @@ def variants(operation: str, seed: int) -> list[Values]:
 
 
 def rest_path(values: Values) -> str:
-    """The resource's path below the base URL (Table 1 and the delivery application)."""
+    """Return the path of a resource below the base URL (Table 1 and the delivery application)."""
     if not values:
         return "/robot/pose/"
     places = "".join(f"/{name}/{values[field]!r}" for name, field in zip(PATH_NAMES, COORDINATES, strict=True))
@@ -76,7 +70,7 @@ def rest_path(values: Values) -> str:
 
 
 def soap_envelope(operation: str, values: Values) -> bytes:
-    """The SOAP 1.1 request, document/literal wrapped; the wrapper's child is the unqualified `arg0`."""
+    """Return a SOAP 1.1 request, document/literal wrapped, whose wrapper contains the unqualified `arg0`."""
     texts = {field: repr(int(value) if field == "message_code" else value) for field, value in values.items()}
     inner = "".join(f"<{field}>{texts[field]}</{field}>" for field in XSD_FIELDS if field in texts)
     argument = f"<arg0>{inner}</arg0>" if values else ""
@@ -92,7 +86,7 @@ def _authorization(token: str | None) -> str:
 
 
 def rest_request(endpoint: Endpoint, operation: str, values: Values, token: str | None) -> Request:
-    """A REST request as octets."""
+    """Return a REST request as bytes."""
     kind = CATALOGUE[operation]
     length = "Content-Length: 0\r\n" if kind.method == "PUT" else ""
     head = (
@@ -103,7 +97,7 @@ def rest_request(endpoint: Endpoint, operation: str, values: Values, token: str 
 
 
 def soap_request(endpoint: Endpoint, operation: str, values: Values, token: str | None) -> Request:
-    """A SOAP request as octets."""
+    """Return a SOAP request as bytes."""
     body = soap_envelope(operation, values)
     head = (
         f"POST {endpoint.path} HTTP/1.1\r\nHost: {endpoint.authority}\r\nAccept: text/xml\r\n"

@@ -1,29 +1,24 @@
-"""The robot under load, as far as the generator knows it: addresses, credentials, deadline."""
-
-from __future__ import annotations
+"""The robot under load, as the generator knows it: addresses, credentials, deadline."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.packs.table1.statement import Ros
 from loadtests.clients.endpoint import Endpoint, tls_context
 from loadtests.clients.payloads import BUILDERS, CATALOGUE, variants
 from loadtests.clients.rosbridge import Bridge, bridge_requests
-from loadtests.clients.wire import Connection
-
-if TYPE_CHECKING:
-    from loadtests.clients.wire import Request
+from loadtests.clients.wire import Connection, Request
 
 
 @dataclass(frozen=True)
 class Robot:
-    """Addresses are URLs; None where the robot offers no such service.
+    """The robot's addresses, as URLs; None for services that it does not offer.
 
     Attributes:
         publishers, subscribers: the SOAP services' addresses.
-        publishers_wsdl, subscribers_wsdl: URL or file of their descriptions, for the zeep client.
+        publishers_wsdl, subscribers_wsdl: URL or file of their WSDLs, for zeep.
         token: bearer token.
         rosbridge: the address of a rosbridge to the robot's ROS graph (ws or wss).
         delivery_topic: where deliveries are published on that graph.
@@ -42,14 +37,14 @@ class Robot:
 
     @cached_property
     def tls(self) -> Any:
-        """The TLS context, where an address needs one."""
+        """Return the TLS context, where an address needs one."""
         addresses = (self.rest, self.publishers, self.subscribers, self.rosbridge)
         if not any(address and address.startswith(("https:", "wss:")) for address in addresses):
             return None
         return tls_context(Path(self.ca_file) if self.ca_file else None)
 
     def address(self, interface: str, operation: str) -> str | None:
-        """Where an operation is called over an interface; None where it cannot be."""
+        """Return where an operation is called over an interface; None where the interface does not have it."""
         if interface == "rest":
             return self.rest
         if interface == "rosbridge":
@@ -57,11 +52,11 @@ class Robot:
         return self.publishers if CATALOGUE[operation].service == "publishers" else self.subscribers
 
     def wsdl(self, operation: str) -> str | None:
-        """The description of the SOAP service that has an operation."""
+        """Return the WSDL of the SOAP service that has an operation."""
         return self.publishers_wsdl if CATALOGUE[operation].service == "publishers" else self.subscribers_wsdl
 
     def offers(self, interface: str, client: str, operation: str) -> bool:
-        """Whether a client can call an operation over an interface: zeep needs the WSDL beside the address."""
+        """Return whether a client can call an operation over an interface; zeep needs the WSDL as well."""
         if self.address(interface, operation) is None:
             return False
         if interface == "rosbridge":
@@ -69,19 +64,19 @@ class Robot:
         return interface == "rest" or client == "wire" or self.wsdl(operation) is not None
 
     def http(self, interface: str, operation: str) -> Connection:
-        """A new connection to where REST or SOAP offer an operation; it opens at the first call."""
+        """Return a new connection for an operation over REST or SOAP; it opens at the first call."""
         return Connection(Endpoint.parse(self.address(interface, operation) or ""), self.timeout_s, self.tls)
 
     def bridge(self) -> Bridge:
-        """Likewise to rosbridge; only where there is one is it to be called."""
+        """Return a new connection to the rosbridge; it opens at the first call."""
         return Bridge(self.rosbridge or "", self.timeout_s, self.tls, self.token, self.delivery_topic)
 
     def requests(self, interface: str, operation: str, seed: int) -> list[Request]:
-        """The operation's variants as octets; empty where it is not offered."""
+        """Return the variants of an operation as bytes; empty where the robot does not offer it."""
         address = self.address(interface, operation)
         if address is None:
             return []
-        if interface == "rosbridge":  # values of its own: an echo of what another interface sent is not its own
+        if interface == "rosbridge":  # its own values: it must not take another interface's delivery for its echo
             return [*bridge_requests(variants(operation, seed + 1), self.delivery_topic)]
         endpoint = Endpoint.parse(address)
         return [BUILDERS[interface](endpoint, operation, values, self.token) for values in variants(operation, seed)]

@@ -1,22 +1,21 @@
-"""The third way to a robot: rosbridge, ROS messages as JSON over a WebSocket.
+"""The third interface: rosbridge, ROS messages as JSON over a WebSocket.
 
-By the rosbridge v2 protocol (github.com/RobotWebTools/rosbridge_suite, ROSBRIDGE_PROTOCOL.md, section 3.2). It has no
-answer to a publish, so that a delivery counts as done when its echo is back: the client subscribes to the topic that
-it publishes to, and an echo has been through ROS. A pose is a subscription until its first message, which waits for
-the robot's next odometry.
+It follows the rosbridge v2 protocol (github.com/RobotWebTools/rosbridge_suite, ROSBRIDGE_PROTOCOL.md, section 3.2),
+which has no response to a publish. So a delivery counts as done when its echo is back: the client subscribes to the
+topic that it publishes to, and an echo has been through ROS. A pose is a subscription until its first message, which
+waits for the robot's next odometry.
 
-A process has one connection that all its users share, as a program with rosbridge's own client library has: were each
-to subscribe for itself, rosbridge would send every echo to all of them. The WebSocket (RFC 6455) is `websockets`'
-protocol without its sockets, which are gevent's here; of the kept libraries it is the one that masks and parses in C.
+All users of a process share one connection, as in a program with rosbridge's own client library: if each subscribed for
+itself, rosbridge would send every echo to all of them. The WebSocket (RFC 6455) is the protocol of `websockets` on
+gevent's sockets; of the maintained libraries it is the one that masks and parses in C.
 """
-
-from __future__ import annotations
 
 import ssl
 from collections import defaultdict, deque
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 import gevent.socket
@@ -33,16 +32,13 @@ from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, connect_error, shown
 from loadtests.clients.wire import Answer, Request, now_ns
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
 ODOMETRY_TOPIC = "/odom"
 _DELIVERY_TYPE = "mybot_delivery_app/msg/DeliveryRequestMsg"
 _ODOMETRY_TYPE = "nav_msgs/msg/Odometry"
 _CHUNK = 65_536
 _MAX_MESSAGE = 16 * 1024 * 1024
-_STATUS_OK = 200  # what callers judge by; rosbridge has no status of its own
-#: DDS needs a moment to match a new publisher with a new subscription, and rosbridge has no word for "matched".
+_STATUS_OK = 200  # callers check it; rosbridge has no status of its own
+#: DDS needs a moment to match a new publisher with a new subscription; rosbridge does not say when they match.
 _MATCHING_S = 0.5
 
 Key = tuple[float, ...]
@@ -50,10 +46,10 @@ Key = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class BridgeRequest(Request):
-    """A request over rosbridge: the message to send as JSON, and what of ROS answers it.
+    """A request over rosbridge: the JSON message to send, and which ROS message answers it.
 
     Attributes:
-        topic: on which the answer comes.
+        topic: on which its answer arrives.
         echo: the values of a delivery in the order of the ROS message; empty for a read.
     """
 
@@ -62,7 +58,7 @@ class BridgeRequest(Request):
 
 
 def bridge_requests(values: list[dict[str, float]], topic: str) -> list[BridgeRequest]:
-    """The variants of an operation, deliveries to a topic; a variant without values asks for the pose."""
+    """Return the requests for deliveries to a topic; one without values reads the pose."""
     return [_publish(each, topic) if each else _READ for each in values]
 
 
@@ -76,11 +72,11 @@ _READ = BridgeRequest(b"", b'"pose"', ODOMETRY_TOPIC)
 
 
 class Bridge:
-    """A connection to rosbridge, for all users of a process; it is opened at the first call.
+    """A connection to rosbridge, shared by all users of a process; it opens at the first call.
 
     Args:
         url: ws or wss.
-        timeout_s: deadline of a whole request, connecting included.
+        timeout_s: deadline of a whole request, including the connection.
         tls: the context for wss.
         token: bearer token of the handshake, for a gateway in front of rosbridge.
         delivery_topic: full name.
@@ -108,10 +104,10 @@ class Bridge:
         """Send a request and wait for what answers it.
 
         Raises:
-            CallError: whatever went wrong; the request was sent at most once.
+            CallError: of any kind; the request was sent at most once.
         """
         if not isinstance(request, BridgeRequest):
-            raise TypeError(f"{type(request).__name__} is no request over rosbridge")
+            raise TypeError(f"{type(request).__name__} is not a request over rosbridge")
         with gevent.Timeout(self.timeout_s, CallError("timeout", f"no echo or message within {self.timeout_s:g} s")):
             with self._opening:
                 if self._socket is None:
@@ -147,7 +143,7 @@ class Bridge:
         return answer
 
     def _match(self) -> None:
-        """Before the first delivery: become a publisher and a subscriber, and wait until they are likely to match."""
+        """Before the first delivery, become publisher and subscriber, and wait until they are likely to match."""
         if self._matched_ns is None:
             about = {"topic": self._delivery_topic, "type": _DELIVERY_TYPE}
             self._say({"op": "advertise", "id": "delivery", **about})
@@ -192,7 +188,7 @@ class Bridge:
             self._flush()
 
     def _flush(self) -> None:
-        """Put on the wire what the protocol has to send."""
+        """Send what the protocol has to send."""
         try:
             for data in self._protocol.data_to_send():
                 if data:
@@ -217,7 +213,7 @@ class Bridge:
                     break
                 self._flush()  # answers to pings
         except (OSError, CallError) as error:
-            failure = CallError("closed", f"rosbridge broke the connection off: {error}")
+            failure = CallError("closed", f"rosbridge reset the connection: {error}")
         if not opened.ready():
             opened.set_exception(failure)
         if self._socket is plain:
@@ -234,7 +230,7 @@ class Bridge:
             message = msgspec.json.decode(octets)
             kind, topic = message["op"], message.get("topic")
         except (msgspec.DecodeError, TypeError, KeyError, AttributeError):
-            self._fail(CallError("malformed", f"no message of rosbridge's protocol: {shown(octets)}"))
+            self._fail(CallError("malformed", f"not a message of the rosbridge protocol: {shown(octets)}"))
             return
         answer = Answer(_STATUS_OK, {}, octets, received, len(octets))
         if kind == "publish" and topic == self._delivery_topic:
@@ -246,11 +242,11 @@ class Bridge:
             self._fail(CallError("fault", f"rosbridge: {shown(str(message.get('msg')).encode())}"))
 
     def _echoed(self, values: Any, answer: Answer) -> None:
-        """A delivery came back: whose it is, its values say. Those of other publishers are nobody's."""
+        """Hand a delivery that came back to the request with these values; ignore other publishers' deliveries."""
         try:
             key = tuple(float(values[name]) for name in MESSAGE_FIELDS)
         except (KeyError, TypeError, ValueError):
-            self._fail(CallError("content", f"no delivery on {self._delivery_topic}: {shown(answer.body)}"))
+            self._fail(CallError("content", f"not a delivery on {self._delivery_topic}: {shown(answer.body)}"))
             return
         waiting = self._echoes.get(key)
         if waiting:
@@ -262,7 +258,7 @@ class Bridge:
             yield from waiting
 
     def _fail(self, failure: CallError) -> None:
-        """All that wait have failed: a status or a message without their id could mean any of them."""
+        """Fail all waiting requests: a status or message without an id could concern any of them."""
         for waiter in list(self._waiters()):
             waiter.set_exception(failure)
 
@@ -281,10 +277,10 @@ class Bridge:
 
 
 def bridge_endpoint(url: str) -> Endpoint:
-    """Where rosbridge listens.
+    """Return the endpoint of a rosbridge.
 
     Raises:
-        EndpointError: no ws(s) URL, no host, a port out of range, or user information in it.
+        EndpointError: not a ws(s) URL, no host, a port out of range, or user information in it.
     """
     return Endpoint.parse(url, {"ws": 80, "wss": 443})
 

@@ -1,43 +1,39 @@
 """The wire client: one lean HTTP/1.1 client for both interfaces.
 
-It serves REST and SOAP by the same octet path: a request built beforehand goes out in one send, and the answer
-is fed as it comes to llhttp (httptools). Locust's FastHttpUser (geventhttpclient) was tried first: 190 us a
-request against 50 us here, and it resends GET and PUT on its own when a connection drops; both would be
-reported as the robot's. The gain comes from a read watcher that lives as long as the connection: no EAGAIN
-probe and no epoll_ctl for each request, and a close by the robot is seen while the connection is idle, so that
-the next request opens a new one instead of failing. A request is never sent twice.
+REST and SOAP take the same path: a request built beforehand is sent in one call, and llhttp (httptools) parses the
+response as it arrives. Locust's FastHttpUser (geventhttpclient) took 190 us a request where this client takes 50, and
+it retries GET and PUT when a connection drops; both would be reported as the robot's. The gain comes from a read
+watcher that lives as long as the connection: no EAGAIN probe and no epoll_ctl for each request. When the robot closes
+an idle connection, the watcher notices, so that the next request opens a new one instead of failing. A request is never
+sent twice.
 """
-
-from __future__ import annotations
 
 import ssl
 import time
 from dataclasses import dataclass
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 import gevent.socket
 import httptools
 from gevent.hub import Waiter, get_hub
 
-from loadtests.clients.failures import CallError, connect_error
-
-if TYPE_CHECKING:
-    from loadtests.clients.endpoint import Endpoint
+from loadtests.clients.endpoint import Endpoint
+from loadtests.clients.failures import CallError, connect_error, require_good
 
 _READ = 1  # libev's EV_READ
 _CHUNK = 65_536
 _IDLE_NS = 500_000_000  # servers close idle connections after seconds: look before sending into one
 _FINAL = int(HTTPStatus.OK)  # RFC 9110 section 15.2: what is below is interim
-_MAX_ANSWER = 16 * 1024 * 1024  # a robot that streams without end must not fill the generator's memory
+_MAX_ANSWER = 16 * 1024 * 1024  # an endless response must not fill the generator's memory
 
 now_ns = time.monotonic_ns  # CLOCK_MONOTONIC, the clock of timerfd
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request as octets, and what a good answer's body holds."""
+    """A request as bytes, and what the body of a good response contains."""
 
     octets: bytes
     expects: bytes = b""
@@ -45,11 +41,11 @@ class Request:
 
 @dataclass(slots=True)
 class Answer:
-    """An answer and its moments.
+    """A response, and when it arrived.
 
     Attributes:
-        received_ns: the last octet was read.
-        octets: size of head and body.
+        received_ns: when the last byte was read.
+        octets: size of headers and body.
     """
 
     status: int
@@ -58,13 +54,22 @@ class Answer:
     received_ns: int
     octets: int
 
+    def require_good(self, expects: bytes) -> None:
+        """Accept a 2xx response whose body contains `expects`.
+
+        Raises:
+            CallError: any other response.
+        """
+        location = self.headers.get(b"location")
+        require_good(self.status, location.decode("latin-1") if location else None, self.body, expects)
+
 
 class Connection:
-    """A persistent connection to one endpoint; one request at a time.
+    """A persistent connection to one endpoint, for one request at a time.
 
     Args:
-        endpoint: where to.
-        timeout_s: deadline of a whole request, connecting included.
+        endpoint: the server.
+        timeout_s: deadline of a whole request, including the connection.
         tls: the context for https endpoints.
     """
 
@@ -89,10 +94,10 @@ class Connection:
         self._framed = False
 
     def call(self, request: Request) -> Answer:
-        """Send a request and wait for the whole answer.
+        """Send a request and wait for the complete response.
 
         Raises:
-            CallError: whatever went wrong; the request was sent at most once.
+            CallError: of any kind; the request was sent at most once.
         """
         deadline = gevent.Timeout.start_new(self.timeout_s)
         try:
@@ -104,7 +109,7 @@ class Connection:
                 raise
             if not connected:
                 raise connect_error(TimeoutError(), self.endpoint.url) from None
-            raise CallError("timeout", f"no complete answer within {self.timeout_s:g} s") from None
+            raise CallError("timeout", f"no complete response within {self.timeout_s:g} s") from None
         except BaseException:
             self.close()
             raise
@@ -132,7 +137,7 @@ class Connection:
         return answer
 
     def _is_closed(self) -> bool:
-        """Whether the robot has closed an idle connection, unseen yet because the loop was busy."""
+        """Return whether the robot has closed an idle connection, which the busy loop has not noticed yet."""
         try:
             return not self._socket.recv(1, gevent.socket.MSG_PEEK) if self.endpoint.scheme == "http" else False
         except BlockingIOError:
@@ -182,11 +187,11 @@ class Connection:
         try:
             failure = self._take_in()
         except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
-            pass  # TLS had something of its own to say
+            pass  # a TLS record without data
         except httptools.HttpParserError as error:
-            failure = CallError("malformed", f"the answer is no HTTP: {error}")
+            failure = CallError("malformed", f"the response is not HTTP: {error}")
         except OSError as error:
-            failure = CallError("closed", f"the robot broke the connection off: {error.strerror or error}")
+            failure = CallError("closed", f"the robot reset the connection: {error.strerror or error}")
         waiter = self._waiter
         if failure is not None:
             self.close()
@@ -195,28 +200,28 @@ class Connection:
             waiter.switch(failure)
 
     def _take_in(self) -> CallError | None:
-        """Feed the parser; returns what is wrong, if anything."""
+        """Feed the parser; returns what is wrong with the response, if anything."""
         while True:
             data = self._socket.recv(_CHUNK)
             self._received = now_ns()
             if self._waiter is None:
-                return CallError("closed", "closed while idle, or octets that nobody asked for")
+                return CallError("closed", "the robot closed an idle connection, or sent bytes without a request")
             if not data:
                 return self._ended()
             self._octets += len(data)
             if self._octets > _MAX_ANSWER:
-                return CallError("malformed", f"the answer is longer than {_MAX_ANSWER} octets")
+                return CallError("malformed", f"the response is longer than {_MAX_ANSWER} bytes")
             self._parser.feed_data(data)
             if self._complete or self.endpoint.scheme == "http":  # TLS may hold more than the socket shows
                 return None
 
     def _ended(self) -> CallError | None:
-        """The robot closed its side: an answer without length ends here (RFC 9112 section 6.3), else it is cut."""
+        """Handle the robot's close: a response without a length ends here (RFC 9112 section 6.3), any other is cut."""
         if self._octets and self._headers and not self._framed and not self._complete:
             self._complete = True
             self._drop_after = True
             return None
-        return CallError("closed", f"the robot closed the connection after {self._octets} octets of an answer")
+        return CallError("closed", f"the robot closed the connection after {self._octets} bytes of a response")
 
     # What llhttp calls.
 

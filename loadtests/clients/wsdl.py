@@ -1,11 +1,9 @@
-"""Reading a service's address from its WSDL (WSDL 1.1 section 3.8, soap:address)."""
-
-from __future__ import annotations
+"""The address of a service, read from its WSDL (WSDL 1.1 section 3.8, soap:address)."""
 
 from dataclasses import replace
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
 import requests
@@ -13,10 +11,8 @@ import requests
 from loadtests.clients.endpoint import Endpoint, EndpointError
 from loadtests.clients.library import new_session, request_error
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE
+from loadtests.clients.robot import Robot
 from loadtests.clients.xml_reader import XmlError, parse_xml
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
 
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _SOAP = "http://schemas.xmlsoap.org/wsdl/soap/"
@@ -28,11 +24,11 @@ class WsdlError(ValueError):
 
 
 def fetch(location: str, robot: Robot) -> bytes:
-    """A WSDL's octets, from a file or a URL.
+    """Return the content of a WSDL, from a file or a URL.
 
     Raises:
-        WsdlError: no such file, or the answer is no document.
-        CallError: nobody answers at the URL.
+        WsdlError: no such file, or the response is not a document.
+        CallError: the URL does not respond.
     """
     if not location.startswith(("http://", "https://")):
         try:
@@ -50,19 +46,19 @@ def fetch(location: str, robot: Robot) -> bytes:
 
 
 def address_in(content: bytes, location: str, element: str) -> str:
-    """The address of the service whose port type offers an operation; `location` gives messages, and the host.
+    """Return the address of the service whose port type offers an operation.
 
     Raises:
-        WsdlError: no XML, no WSDL, another service's WSDL, or no address in it.
+        WsdlError: not XML, not a WSDL, another service's WSDL, or no address in it.
     """
     if len(content) > _MOST:
-        raise WsdlError(f"WSDL {location!r} is longer than {_MOST} octets")
+        raise WsdlError(f"WSDL {location!r} is longer than {_MOST} bytes")
     try:
         root = parse_xml(content)
     except XmlError as error:
         raise WsdlError(f"WSDL {location!r} {error}") from None
     if root.tag != f"{{{_WSDL}}}definitions":
-        raise WsdlError(f"{location!r} is no WSDL 1.1: its root element is {root.tag!r}")
+        raise WsdlError(f"{location!r} is not a WSDL 1.1: its root element is {root.tag!r}")
     offered = {found.get("name") for found in root.iter(f"{{{_WSDL}}}operation")}
     imports = root.findall(f"{{{_WSDL}}}import")
     if element not in offered and not imports:
@@ -80,15 +76,15 @@ def address_in(content: bytes, location: str, element: str) -> str:
         except EndpointError as error:
             raise WsdlError(f"WSDL {location!r}: its soap:address cannot be used: {error}") from None
         return _reachable(url, location)
-    raise WsdlError(f"WSDL {location!r} holds no soap:address: say where the service is with --…-endpoint URL")
+    raise WsdlError(f"WSDL {location!r} has no soap:address: give the address with --…-endpoint URL")
 
 
 def with_addresses(robot: Robot) -> Robot:
-    """The robot with the addresses that only its WSDLs know.
+    """Return the robot with the addresses that only its WSDLs contain.
 
     Raises:
         WsdlError: a WSDL cannot be used.
-        CallError: nobody answers at a WSDL's URL.
+        CallError: a WSDL's URL does not respond.
     """
     found: dict[str, Any] = {}
     for name, operation in CATALOGUE.items():
@@ -100,7 +96,7 @@ def with_addresses(robot: Robot) -> Robot:
 
 
 def _reachable(url: str, location: str) -> str:
-    """An address that names the robot's own loopback, in a WSDL fetched from elsewhere, means that elsewhere."""
+    """Replace the loopback host in a WSDL that was fetched from another machine by that machine."""
     there, here = urlsplit(url), urlsplit(location)
     if here.scheme in {"http", "https"} and _is_own(there.hostname) and not _is_own(here.hostname):
         host = f"[{here.hostname}]" if ":" in (here.hostname or "") else here.hostname
@@ -109,7 +105,7 @@ def _reachable(url: str, location: str) -> str:
 
 
 def _is_own(host: str | None) -> bool:
-    """Whether a host can only mean the machine that names it: its loopback, or any of its addresses."""
+    """Return whether a host can only mean the machine that uses it: loopback, or any address."""
     if host is None or host == "localhost":
         return host is not None
     try:

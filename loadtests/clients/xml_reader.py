@@ -1,21 +1,15 @@
-"""The one XML parser of the load tests: it refuses a DOCTYPE, expands no entity and fetches nothing."""
-
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+"""The XML parser of the load tests: it refuses a DOCTYPE, expands no entity and fetches nothing."""
 
 from lxml import etree
-
-if TYPE_CHECKING:
-    from lxml.etree import _Element
+from lxml.etree import _Element
 
 
 class XmlError(ValueError):
-    """Octets that are no XML, or XML with a document type declaration; the message says which."""
+    """Content that is not XML, or XML with a document type declaration; the message says which."""
 
 
 def parse_xml(content: bytes) -> _Element:
-    """The root element.
+    """Return the root element.
 
     Raises:
         XmlError: not well-formed, or with a DOCTYPE (WS-I Basic Profile 1.1, R1008).
@@ -24,7 +18,7 @@ def parse_xml(content: bytes) -> _Element:
     try:
         root = etree.fromstring(content, parser)
     except etree.XMLSyntaxError as error:
-        raise XmlError(f"is no XML: {error}") from None
+        raise XmlError(f"is not XML: {error}") from None
     if root.getroottree().docinfo.internalDTD is not None:
-        raise XmlError("holds a document type declaration (DOCTYPE), which is refused")
+        raise XmlError("has a document type declaration (DOCTYPE), which is refused")
     return root

@@ -1,6 +1,4 @@
-"""When a robot counts as dead: nothing has succeeded for seconds, though much was tried."""
-
-from __future__ import annotations
+"""When a robot counts as dead: no request has succeeded for seconds, although many were sent."""
 
 _DEAD_S = 3.0
 _DEAD_REQUESTS = 10
@@ -8,7 +6,7 @@ _LOOK_S = 0.5
 
 
 class Liveness:
-    """Judges by what a run has counted so far.
+    """Decides by the counts of a run whether the robot is dead.
 
     Args:
         report_s: how late the counts may be, in seconds: workers report once a second.
@@ -20,11 +18,11 @@ class Liveness:
         self._alive = (0.0, 0)  # when something had last succeeded, and how much in all
 
     def is_due(self, elapsed_s: float) -> bool:
-        """Whether it is time to look; counting costs the generator something."""
+        """Return whether it is time to count again; counting costs the generator time."""
         return elapsed_s - self._looked_s >= _LOOK_S
 
     def dead_since(self, elapsed_s: float, succeeded: int, failed: int) -> float | None:
-        """Since when the robot is silent, in seconds from the start; None while it is not, or not for long enough."""
+        """Return since when the robot has been silent, in seconds from the start; None unless that is long enough."""
         self._looked_s = elapsed_s
         since, before = self._alive
         if succeeded > before or failed < _DEAD_REQUESTS:

@@ -1,29 +1,24 @@
-"""From settings and robot to the plan that is carried out first."""
-
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+"""The first plan of a run, from settings and robot."""
 
 from conformance.packs.table1.thresholds import ApiStyle
 from loadtests.clients.library import LIBRARY
+from loadtests.clients.robot import Robot
 from loadtests.schedule.plan import LIBRARY_RATE, Plan
+from loadtests.settings.settings import Settings
 
 ROSBRIDGE = ApiStyle.ROSBRIDGE
 
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.settings.settings import Settings
 
 _BRIDGE_NOTE = (
-    "rosbridge has no answer to a publish: a delivery is timed until its echo is back, which has been through ROS, "
+    "rosbridge does not answer a publish: a delivery is timed until its echo is back, which has been through ROS, "
     "and a pose from subscribing until the robot's next odometry"
 )
 _LEAST_USERS, _MOST_USERS = 32, 512
-_STALL_S = 3.0  # the stall that the users of an open model outlast before arrivals queue for one
+_STALL_S = 3.0  # users of an open model suffice for a stall of this length before arrivals wait for a user
 
 
 def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
-    """The plan of the duel, between interfaces or two robots, and notes on what cannot be measured."""
+    """Return the plan of the duel, between interfaces or two robots, and notes on what cannot be measured."""
     wanted = settings.selection
     workers = max(1, settings.generator.expect)
     interfaces, offers, missing = [], {}, set()
@@ -75,7 +70,7 @@ def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
 
 
 def users(settings: Settings, workers: int) -> int:
-    """How many users come up in all."""
+    """Return how many users to start in total."""
     load, steps = settings.load, settings.steps
     if load.users is not None and not steps.rates:
         return max(load.users, *steps.connections, 0)

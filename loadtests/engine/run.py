@@ -1,6 +1,4 @@
-"""Carries a run out, from looking at the robot to the written result."""
-
-from __future__ import annotations
+"""One run, from the first call to the written result."""
 
 import logging
 import os
@@ -11,7 +9,6 @@ from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import gevent
 import locust  # patches the standard library, which has to come before our modules that use it
@@ -19,6 +16,7 @@ import locust  # patches the standard library, which has to come before our modu
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
 from loadtests.clients.failures import CallError
+from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.engine.liveness import Liveness
 from loadtests.engine.planning import duel_plan
@@ -37,17 +35,13 @@ from loadtests.result.document import compose
 from loadtests.result.files import write
 from loadtests.result.outcome import Carried, Outcome, RunAborted
 from loadtests.result.terminal import summary
-from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import Plan
-    from loadtests.settings.settings import Settings
-    from loadtests.statistics.recorder import Recorder
+from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
+from loadtests.settings.settings import Settings
+from loadtests.statistics.recorder import Recorder
 
 
 def tell(message: str) -> None:
-    """A line for the person who waits."""
+    """Write a line of progress to standard error."""
     sys.stderr.write(message + "\n")
     sys.stderr.flush()
 
@@ -60,25 +54,25 @@ class Run:
         other = () if settings.against is None else (settings.against.robot,)
         self.robots: tuple[Robot, ...] = (settings.robot, *other)
         self.outcome = Outcome(settings, self.robots, datetime.now(UTC))
-        self.plan, _ = duel_plan(settings, *self.robots)  # as far as can be said before the WSDLs are read
+        self.plan, _ = duel_plan(settings, *self.robots)  # preliminary: the WSDLs have not been read
         self.collector: Collector | None = None
         self._liveness = Liveness(REPORT_S if settings.generator.expect else 0.0)
         self._told = 0.0
         self._parent = os.getppid()
 
     def interrupt(self) -> None:
-        """Ctrl-C: end, keeping what there is."""
+        """End the run on Ctrl-C and keep what was measured; a second Ctrl-C ends at once."""
         if self.outcome.interrupted:
-            os._exit(ExitCode.INTERRUPTED)  # asked for twice: not even for the result
+            os._exit(ExitCode.INTERRUPTED)  # the second Ctrl-C: do not wait for the result
         self.outcome.interrupted = True
 
     # Before the measurement.
 
     def resolve(self) -> None:
-        """Read the addresses that only a WSDL knows, and make the plan.
+        """Read the addresses that only a WSDL contains, and make the plan.
 
         Raises:
-            RunAborted: a WSDL is wrong, or nobody answers.
+            RunAborted: a WSDL is wrong, or the robot does not respond.
         """
         try:
             self.robots = self.outcome.robots = tuple(map(with_addresses, self.robots))
@@ -93,7 +87,7 @@ class Run:
         """Call everything once.
 
         Raises:
-            RunAborted: the robot does not answer as it should; what it did answer is kept for the result.
+            RunAborted: a response is wrong or missing; the others are kept for the result.
         """
         names = self.plan.series_names()
         if not names:
@@ -110,7 +104,7 @@ class Run:
             if findings.unreachable:
                 raise RunAborted(ExitCode.UNREACHABLE, f"{whose} cannot be reached: {told}")
             if findings.failures:
-                raise RunAborted(ExitCode.INCONCLUSIVE, f"{whose} does not answer as it should: {told}")
+                raise RunAborted(ExitCode.INCONCLUSIVE, f"{whose} does not respond as the contract says: {told}")
             self.outcome.invalid += [
                 f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
             ]
@@ -121,7 +115,7 @@ class Run:
     # The measurement.
 
     def measure(self) -> None:
-        """Come up, warm up, duel, step.
+        """Start the users, warm up, and carry out the duel and whatever else was asked for.
 
         Raises:
             RunAborted: the generator cannot work.
@@ -146,7 +140,7 @@ class Run:
             plan = self._repeat(plan, executor)
             if self._over:
                 return
-            tell("measuring what requests cost after a pause")
+            tell("measuring requests after a pause")
             self.outcome.paused = after_pauses(
                 self.robots[0],
                 plan.series_names(),
@@ -160,7 +154,7 @@ class Run:
                 self._load_more(plan, executor)
 
     def _load_more(self, plan: Plan, executor: Executor) -> None:
-        """What comes after the duel: the stepped load, the searches for the knee, more and more connections."""
+        """Carry out what follows the duel: steps, searches for the knee, more and more connections."""
         outcome = self.outcome
         load = RisingLoad(plan, executor, self.settings, lambda: outcome.interrupted, self._number, tell)
         outcome.steps += load.steps()
@@ -169,11 +163,11 @@ class Run:
 
     @property
     def _over(self) -> bool:
-        """Whether nothing more is to be measured."""
+        """Return whether the measurement has to end."""
         return self.outcome.interrupted or self.outcome.dead_at is not None
 
     def _repeat(self, plan: Plan, executor: Executor) -> Plan:
-        """Carry the duel out as often as asked for; returns the last one's plan."""
+        """Carry the duel out as often as asked for; returns the last plan."""
         repeats = self.settings.repeats
         for number in range(repeats.number):
             if number:
@@ -187,7 +181,7 @@ class Run:
         return plan
 
     def _start_anew(self, command: str | None, plan: Plan) -> None:
-        """Start the robot anew, where there is a command for it, and wait until it answers."""
+        """Restart the robot, where there is a command for it, and wait until it responds."""
         if command is None:
             return
         names, seed = plan.series_names(), self.settings.load.seed
@@ -197,7 +191,7 @@ class Run:
             raise RunAborted(ExitCode.UNREACHABLE, str(error)) from None
 
     def _follow_deliveries(self) -> None:
-        """Time deliveries until the application has them, where that was asked for."""
+        """Measure the time from request to application, where that was asked for."""
         wanted, outcome = self.settings.end_to_end, self.outcome
         if wanted is None or self._over:
             return
@@ -220,7 +214,7 @@ class Run:
 
     @staticmethod
     def _web(executor: Executor, host: str, port: int) -> None:
-        """Locust's web UI, watching; it starts and stops nothing here."""
+        """Show Locust's web UI, which only watches the run."""
         web = executor.environment.create_web_ui(host, port)
         gevent.sleep(0.2)
         if web.greenlet.ready():
@@ -228,7 +222,7 @@ class Run:
         tell(f"Locust's web UI: http://{host}:{port}")
 
     def _carry_out(self, plan: Plan, executor: Executor) -> None:
-        """Run a plan, watching for its end, Ctrl-C and the robot's death."""
+        """Carry out a plan until its end, Ctrl-C or the robot's death."""
         self._number(plan)
         carried = Carried(plan)
         self.outcome.carried.append(carried)
@@ -236,11 +230,11 @@ class Run:
         executor.run(plan, ceiling, lambda elapsed: self._watch(carried, executor.recorder, elapsed))
 
     def _watch(self, carried: Carried, recorder: Recorder, elapsed: float) -> bool:
-        """Whether to end now."""
+        """Report progress; returns whether to end now."""
         plan = carried.plan
         carried.elapsed_s = max(0.0, min(elapsed, plan.length_s))
         elapsed += plan.offset_s
-        if os.getppid() != self._parent:  # whoever started us is gone
+        if os.getppid() != self._parent:  # the parent process has ended
             self.outcome.interrupted = True
         if self.outcome.dead_at is None and self._liveness.is_due(elapsed):
             succeeded = sum(cell.service.total for cell in recorder.cells.values())
@@ -255,7 +249,7 @@ class Run:
         return self.outcome.interrupted or self.outcome.dead_at is not None
 
     def _number(self, plan: Plan) -> None:
-        """Have the metrics know a plan's segments."""
+        """Tell the metrics which series a plan's segments belong to."""
         if self.collector is not None:
             self.collector.series_of.update(plan.series_of())
 
@@ -270,8 +264,8 @@ class Run:
 
 
 def carry_out(settings: Settings) -> CommandResult:
-    """Do a run and write its result."""
-    logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of spawning fast, which is what we want
+    """Carry out a run and write its result."""
+    logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of fast spawning, which we want
     run = Run(settings)
     for number in (signal.SIGINT, signal.SIGTERM):
         gevent.signal_handler(number, run.interrupt)

@@ -1,1 +1,1 @@
-"""Carrying a run out: users, recorder, executors on this machine and on others, preflight and environment."""
+"""What carries a run out: users, executors on this machine and on others, preflight and environment."""

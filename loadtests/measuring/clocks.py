@@ -1,22 +1,18 @@
-"""Workers' clocks against the master's, by messages over the channel that they have anyway.
+"""Workers' clocks compared with the master's, by messages over the channel that they already have.
 
-An exchange gives the offset as NTP does (RFC 5905, section 8), with one moment of the worker's in place of two,
-because it answers at once: the worker's clock less the middle between sending and receiving. Of several exchanges the
-one with the shortest round trip counts, for it waited least in queues; it is wrong by half its round trip at most,
-where the whole of it was spent on one way. Clocks are CLOCK_MONOTONIC, in ns, which no administrator sets.
+An exchange gives the offset as in NTP (RFC 5905, section 8), with one moment of the worker's instead of two, because it
+answers at once: the worker's clock less the middle between sending and receiving. Of several exchanges the one with the
+shortest round trip counts, because it waited least in queues; its error is at most half its round trip. Clocks are
+CLOCK_MONOTONIC, in ns, which no administrator sets.
 """
 
-from __future__ import annotations
-
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import gevent
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 #: How many exchanges a reading chooses from, and how long they may take in all.
 EXCHANGES = 8
@@ -25,7 +21,7 @@ _MESSAGE = "roaas_clock"
 
 
 def clock_id() -> str:
-    """Which monotonic clock this process reads: running system and time namespace. Empty where unknown."""
+    """Return which monotonic clock this process reads: running system and time namespace; empty where unknown."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip()
     except OSError:
@@ -37,29 +33,29 @@ def clock_id() -> str:
 
 
 class Reading(NamedTuple):
-    """What one exchange says: the worker's clock less the master's, and the round trip that it took, in ns."""
+    """One exchange: the worker's clock less the master's, and the round trip, in ns."""
 
     offset_ns: int
     round_trip_ns: int
 
     @classmethod
-    def of(cls, sent_ns: int, worker_ns: int, received_ns: int) -> Reading:
-        """Read the moments at which the master sent, the worker answered, and the master had the answer."""
+    def of(cls, sent_ns: int, worker_ns: int, received_ns: int) -> Self:
+        """Return the reading from when the master sent, the worker answered and the master received."""
         return cls(worker_ns - (sent_ns + received_ns) // 2, received_ns - sent_ns)
 
 
 def best(readings: Iterable[Reading]) -> Reading | None:
-    """The reading with the shortest round trip."""
+    """Return the reading with the shortest round trip."""
     return min(readings, key=lambda reading: reading.round_trip_ns, default=None)
 
 
 @dataclass(slots=True)
 class WorkerClock:
-    """A worker's clock, as it was read over the run.
+    """A worker's clock, as read over the run.
 
     Attributes:
-        shared: it is the master's own.
-        first, last: None until it answered.
+        shared: the worker uses the master's clock.
+        first, last: readings; None until the worker answered.
     """
 
     shared: bool = False
@@ -67,23 +63,23 @@ class WorkerClock:
     last: Reading | None = None
 
     def add(self, reading: Reading) -> None:
-        """Take a further reading."""
+        """Add a further reading."""
         self.first = self.first or reading
         self.last = reading
 
     def of_master(self, moment_ns: int) -> int | None:
-        """A moment of the master's clock by the worker's; None where that is not known."""
+        """Return a moment of the master's clock on the worker's clock; None where the offset is unknown."""
         if self.shared:
             return moment_ns
         return moment_ns + self.last.offset_ns if self.last is not None else None
 
     @property
     def uncertainty_ns(self) -> int:
-        """By how much the offset may be wrong: half a round trip."""
+        """Return by how much the offset may be wrong: half a round trip."""
         return self.last.round_trip_ns // 2 if self.last is not None else 0
 
     def figures(self) -> dict[str, Any] | None:
-        """The `clock` of a worker in latency.json; None where it never answered."""
+        """Return the `clock` of a worker in latency.json; None where it never answered."""
         if self.first is None or self.last is None:
             return None
         return {
@@ -96,7 +92,7 @@ class WorkerClock:
 
 
 class Clocks:
-    """Reads workers' clocks, from the master."""
+    """Reads the workers' clocks, for the master."""
 
     def __init__(self, runner: Any) -> None:
         self._runner = runner
@@ -104,7 +100,7 @@ class Clocks:
         runner.register_message(_MESSAGE, self._on_answer)
 
     def read(self, clients: Iterable[str]) -> dict[str, Reading]:
-        """Exchange messages with all clients side by side; one that answers not once in time is not in the result."""
+        """Exchange messages with all clients in parallel; the result lacks those that did not answer in time."""
         self._asked = {client: [] for client in clients}
         for client in self._asked:
             self._ask(client)
@@ -130,7 +126,7 @@ class Clocks:
 
 
 def answer_clock(runner: Any) -> None:
-    """Have a worker answer the master's exchanges, at once."""
+    """Make a worker answer the master's exchanges at once."""
 
     def on_asked(environment: Any, msg: Any) -> None:
         del environment

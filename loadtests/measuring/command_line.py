@@ -1,7 +1,5 @@
 """Command lines as a result may show them."""
 
-from __future__ import annotations
-
 import re
 
 #: The folders of an absolute path, wherever in a word it begins; addresses such as http://host/path are none.
@@ -9,5 +7,5 @@ _FOLDERS = re.compile(r"(?<![\w:/.~-])(?:file://)?~?/(?:[^\s/]+/)*")
 
 
 def without_folders(word: str) -> str:
-    """A word of a command line without the folders of this machine: `--out=/home/me/out` becomes `--out=out`."""
+    """Return a word of a command line without this machine's folders: `--out=/home/me/out` becomes `--out=out`."""
     return _FOLDERS.sub("", word)

@@ -1,31 +1,27 @@
-"""A Locust master and its workers as an executor: processes of this machine, or of others."""
-
-from __future__ import annotations
+"""An executor of worker processes, on this machine or on others, led by a Locust master."""
 
 import json
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 from locust.exception import RPCError
 from locust.runners import STATE_MISSING, STATE_RUNNING, MasterRunner
 
 from loadtests.clients.library import LIBRARY
+from loadtests.clients.robot import Robot
+from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import Clocks, WorkerClock, clock_id
 from loadtests.measuring.errors import GeneratorError
-from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, new_environment, now_ns
+from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, new_environment
 from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.plan import Plan
+from loadtests.settings.settings import Generator
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import Plan
-    from loadtests.settings.settings import Generator
 
 _NS = 1_000_000_000
 _READY_S = 60.0
@@ -34,14 +30,14 @@ _GRACE_S = 15.0
 
 
 class _Master(MasterRunner):
-    """Deals the users out once.
+    """A master that distributes the users once.
 
-    Locust would do so anew whenever a worker comes, in mid-run: users of the others would be killed with the requests
-    that they had under way, which nobody would count.
+    Locust distributes them again whenever a worker comes, in mid-run: that kills users of other workers with their
+    requests under way, which would not be counted.
     """
 
     def start(self, *args: Any, **kwargs: Any) -> None:
-        """Have the workers' users come up, unless they are."""
+        """Start the workers' users, unless they are running."""
         if self.state != STATE_RUNNING:
             super().start(*args, **kwargs)
 
@@ -51,9 +47,9 @@ class DistributedExecutor:
 
     Args:
         generator: where the master listens; how many workers to start here, and how many to wait for in all.
-        folder: where workers of this machine leave what they recorded, should the master die.
-        tell: says how things stand, for the terminal.
-        stopped: whether somebody wants an end; asked while waiting for workers.
+        folder: where workers of this machine leave what they recorded if the master dies.
+        tell: writes progress to the terminal.
+        stopped: returns whether to stop waiting for workers.
     """
 
     def __init__(
@@ -90,7 +86,7 @@ class DistributedExecutor:
         self.environment.events.worker_report.add_listener(self._on_report)
 
     def prepare(self, robots: Sequence[Robot], plan: Plan) -> None:
-        """Start the workers of this machine, wait for all, and have their users come up.
+        """Start the workers of this machine, wait for all workers, and start their users.
 
         Raises:
             GeneratorError: a worker could not get ready.
@@ -132,28 +128,28 @@ class DistributedExecutor:
                 raise GeneratorError("interrupted while waiting for workers")
             dead = [child.returncode for child in self._children.values() if child.poll() is not None]
             if dead:
-                raise GeneratorError(f"a worker process ended at once, with exit code {dead[0]}")
+                raise GeneratorError(f"a worker process ended early, with exit code {dead[0]}")
             if time.monotonic() > deadline:
-                raise GeneratorError(f"{self.runner.worker_count} of {self._expected} {what} in time")
+                raise GeneratorError(f"only {self.runner.worker_count} of {self._expected} {what} in time")
 
     def _is_there(self, client: str) -> bool:
-        """Whether a worker has not quit, and its heart beats."""
+        """Return whether a worker has not quit and still sends heartbeats."""
         node = self.runner.clients.get(client)
         return node is not None and node.state != STATE_MISSING
 
     def _on_listening(self, environment: Any, msg: Any) -> None:
-        """A worker is there: one of those that are awaited, or one that comes when all has been dealt out."""
+        """Note a worker that is expected; send away one that comes after the users were distributed."""
         del environment
         if not self._dealt_out:
             self._listening.add(msg.node_id)
             return
         late = max(0.0, (now_ns() - self._began) / _NS) if self._began else 0.0
         member = self._new_member(msg.data, state="late", joined_at_s=late)
-        self.tell(f"worker {member.id} ({member.host}) came {late:.1f} s into the run, too late to take part")
+        self.tell(f"worker {member.id} ({member.host}) joined {late:.1f} s into the run, too late to take part")
         self.runner.send_message("roaas_late", None, msg.node_id)
 
     def _new_member(self, told: dict[str, Any], **known: Any) -> Member:
-        """Number a worker, which told of itself."""
+        """Give a worker its number."""
         member = Member(str(len(self.members) + 1), host=told["host"], pid=told["pid"], **known)
         self.members.append(member)
         return member
@@ -185,11 +181,11 @@ class DistributedExecutor:
         del environment
         self._on_report(msg.node_id, msg.data)
         member = self._by_client.get(msg.node_id)
-        if member is not None:  # one that was given up and has done its part all the same is not lost
+        if member is not None:  # a worker that was given up and reports all the same is not lost
             member.state, member.done, member.lost_at_s, member.share = "finished", True, None, None
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
-        """Carry out a plan with the workers that are left; returns with what they reported."""
+        """Carry out a plan with the workers that are left; returns when they have reported."""
         present = [(client, member) for client, member in self._by_client.items() if member.state != "lost"]
         if not present:
             return
@@ -211,7 +207,7 @@ class DistributedExecutor:
         self._read_clocks()
 
     def _read_clocks(self) -> None:
-        """Read the clocks of all workers that are there, while nobody sends requests."""
+        """Read the clocks of all workers that are there, while no requests are sent."""
         there = [client for client, member in self._by_client.items() if member.state != "lost"]
         for client, reading in self._clocks.read(filter(self._is_there, there)).items():
             clock = self._by_client[client].clock
@@ -219,7 +215,7 @@ class DistributedExecutor:
                 clock.add(reading)
 
     def _send_off(self, present: list[tuple[str, Member]], plan: Plan, ceiling: float | None) -> int:
-        """Tell workers to begin; returns when, in ns of this clock."""
+        """Tell the workers to begin; returns the start, in ns of this clock."""
         clocks = [member.clock for _, member in present if member.clock is not None]
         lead_ns = int(LEAD_S * _NS) + 4 * max((clock.uncertainty_ns for clock in clocks), default=0)
         origin = now_ns() + lead_ns
@@ -237,9 +233,9 @@ class DistributedExecutor:
         return origin
 
     def _look_for_lost(self, present: list[tuple[str, Member]], plan: Plan, *, overdue: bool) -> None:
-        """Give up members whose process has ended, whose heartbeat has stopped, or that are overdue.
+        """Give up workers whose process has ended, whose heartbeat has stopped, or that are overdue.
 
-        A heart that beats again takes the word back: a busy machine silences workers that go on with their part.
+        A worker whose heartbeat returns is no longer lost: a busy machine delays heartbeats of workers that still work.
         """
         for number, (client, member) in enumerate(present):
             child = self._children.get(member.pid)
@@ -255,7 +251,7 @@ class DistributedExecutor:
                 self.tell(f"worker {member.id} ({member.host}) was lost {member.lost_at_s:.1f} s into the run")
 
     def close(self) -> None:
-        """Let the workers go."""
+        """Stop the workers."""
         self.runner.quit()
         for child in self._children.values():
             try:

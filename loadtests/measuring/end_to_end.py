@@ -1,39 +1,30 @@
-"""From the request to the message in the application: what an operator waits for is not the 204.
+"""The time from a request to the message in the application: what an operator waits for is not the 204.
 
-Deliveries are sent one at a time over every way that there is, in rounds whose order is drawn by lot, and a probe in
-the application's place says when each arrived. Its clock is the generator's: both run on one machine, wherever the
-robot is. Publishing with rclpy, without any web service, is the floor.
+Deliveries are sent one at a time over every way, in rounds in random order, and a probe in the application's place says
+when each arrived. The probe shares the generator's clock: both run on one machine, wherever the robot is. Publishing
+with rclpy, without any web service, is the floor.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import gevent
 import numpy as np
 
 from conformance.packs.table1.delivery import COURIER, EXAMPLE, MESSAGE_FIELDS
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, answer_error
-from loadtests.clients.payloads import BUILDERS
-from loadtests.clients.rosbridge import bridge_requests
-from loadtests.clients.wire import now_ns
+from loadtests.clients.failures import CallError
+from loadtests.clients.payloads import BUILDERS, Values
+from loadtests.clients.robot import Robot
+from loadtests.clients.rosbridge import Bridge, bridge_requests
+from loadtests.clients.wire import Connection, Request, now_ns
 from loadtests.probe.client import Probe
+from loadtests.settings.settings import EndToEnd
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from loadtests.clients.payloads import Values
-    from loadtests.clients.robot import Robot
-    from loadtests.clients.rosbridge import Bridge
-    from loadtests.clients.wire import Connection, Request
-    from loadtests.settings.settings import EndToEnd
-
-#: What has not arrived by then is lost.
+#: A delivery that has not arrived by then is lost.
 LOST_S = 2.0
-#: What publishes without a web service.
+#: The way without a web service.
 NATIVE = "ros"
 _DELIVERY = "delivery"
 _NS = 1_000_000_000
@@ -44,12 +35,12 @@ _MOST_RATE = 50.0  # deliveries per second
 
 @dataclass
 class Journeys:
-    """The deliveries over one way that were counted, in their rounds.
+    """The deliveries over one way, by round.
 
     Attributes:
         to_application_ns: from the request's start to the message in the application; None where it never came.
-        answer_ns: from the request's start to its answer; None where the way has none.
-        errors: of requests that brought no good answer.
+        answer_ns: from the request's start to its response; None where the way has none.
+        errors: of requests without a good response.
     """
 
     to_application_ns: list[int | None] = field(default_factory=list)
@@ -58,7 +49,7 @@ class Journeys:
 
 
 class Courier:
-    """Sends deliveries over each way, one at a time."""
+    """Sends deliveries, one at a time, over each way."""
 
     def __init__(self, robot: Robot, ways: tuple[str, ...], publisher: Probe) -> None:
         self._robot = robot
@@ -68,10 +59,10 @@ class Courier:
         }
 
     def send(self, way: str, values: Values) -> tuple[int, int | None]:
-        """Send a delivery; returns when that began, and when its answer was there.
+        """Send a delivery; returns when that began, and when its response was received.
 
         Raises:
-            CallError: there is no good answer.
+            CallError: there is no good response.
             ProbeError: the publisher has ended.
         """
         if way == NATIVE:
@@ -79,9 +70,7 @@ class Courier:
         request = self._request(way, values)
         began = now_ns()
         answer = self._connections[way].call(request)
-        failure = answer_error(answer.status, None, answer.body, request.expects)
-        if failure is not None:
-            raise failure
+        answer.require_good(request.expects)
         return began, answer.received_ns
 
     def _request(self, way: str, values: Values) -> Request:
@@ -97,7 +86,7 @@ class Courier:
 
 
 def in_order(values: Values) -> tuple[float, ...]:
-    """A delivery's values in the order of the ROS message."""
+    """Return a delivery's values in the order of the ROS message."""
     return tuple(float(values[name]) for name in MESSAGE_FIELDS)
 
 
@@ -109,15 +98,15 @@ def end_to_end(
     stopped: Callable[[], bool],
     tell: Callable[[str], None],
 ) -> dict[str, Journeys]:
-    """Measure every way, the native one too; returns their journeys.
+    """Measure every way, publishing with rclpy included; returns their journeys.
 
     Raises:
-        ProbeError: there is no ROS here, or nobody publishes deliveries in the domain.
+        ProbeError: this machine has no ROS, or the domain has no publisher of deliveries.
     """
     with ExitStack() as stack:
         listener = Probe("listen", settings.domain_id, robot.delivery_topic)
         stack.callback(listener.close)
-        listener.await_ready()  # before there is a publisher of ours, which it would take for the robot's
+        listener.await_ready()  # before our own publisher exists, which it would take for the robot's
         publisher = Probe("publish", settings.domain_id, robot.delivery_topic)
         stack.callback(publisher.close)
         publisher.await_ready()

@@ -1,22 +1,17 @@
 """What the figures depend on besides the robot: machine, kernel, versions, command lines."""
 
-from __future__ import annotations
-
 import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import psutil
 
-from loadtests.measuring.robot_process import same_machine
+from loadtests.clients.robot import Robot
+from loadtests.measuring.robot_process import RobotProcess, same_machine
+from loadtests.settings.settings import Output
 from loadtests.statistics.figures import rounded
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.measuring.robot_process import RobotProcess
-    from loadtests.settings.settings import Output
 
 _PACKAGES = ("roaas", "locust", "gevent", "httptools", "zeep", "requests", "urllib3", "lxml", "numpy", "hdrhistogram")
 
@@ -24,13 +19,13 @@ _PACKAGES = ("roaas", "locust", "gevent", "httptools", "zeep", "requests", "urll
 def describe(
     robot: Robot, output: Output, servers: dict[str, str | None], process: RobotProcess | None
 ) -> dict[str, Any]:
-    """The `environment` of latency.json.
+    """Return the `environment` of latency.json.
 
     Args:
         robot: addresses.
         output: the robot's name, vendor and version as the statement gives them, and our command line.
         servers: Server header by interface.
-        process: who listens at the robot's address, where that is known.
+        process: the process at the robot's address, where that is known.
     """
     return {
         "cpu": _cpu_model(),

@@ -1,31 +1,26 @@
-"""Do both interfaces carry the same? Judgements on octets sent and answers received; nothing here talks to a robot."""
-
-from __future__ import annotations
+"""Whether both interfaces carry the same, judged on bytes sent and received; nothing here talks to a robot."""
 
 import json
 import struct
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from lxml import etree
 
 from conformance.packs.table1.delivery import COORDINATES, XSD_FIELDS
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values
+from loadtests.clients.wire import Request
 from loadtests.clients.xml_reader import XmlError, parse_xml
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from loadtests.clients.wire import Request
-
-#: Leaves of nav_msgs/Odometry that have to be in both interfaces' answers, in the same number.
+#: Leaves of nav_msgs/Odometry that both interfaces' responses must contain, equally often.
 _ODOMETRY = ("frame_id", "child_frame_id", "x", "y", "z", "w", "covariance", "sec")
 
 
 def request_difference(operation: str, rest: Request, soap: Request) -> str | None:
-    """Whether two requests, read back from their octets, ask for the same: None, or what differs.
+    """Return how two requests, read back from their bytes, differ; None where they ask for the same.
 
-    Doubles are compared bit for bit, after each has been through its own text form.
+    Doubles are compared bit for bit, each read back from its own text.
     """
     if CATALOGUE[operation].code is None:
         return None
@@ -43,7 +38,7 @@ def request_difference(operation: str, rest: Request, soap: Request) -> str | No
 
 
 def requests_difference(operation: str, rest: Sequence[Request], soap: Sequence[Request]) -> str | None:
-    """The first variant in which the interfaces' requests differ; None too where an interface has none."""
+    """Return the first variant in which the interfaces' requests differ; None where one interface has none."""
     if not rest or not soap:
         return None
     for number, (over_rest, over_soap) in enumerate(zip(rest, soap, strict=True)):
@@ -54,14 +49,14 @@ def requests_difference(operation: str, rest: Sequence[Request], soap: Sequence[
 
 
 def pose_difference(rest: bytes, soap: bytes) -> str | None:
-    """Both answers have to carry a whole Odometry: a shorter one would win the duel by leaving out."""
+    """Return how two poses differ: both must be whole Odometry messages, or the shorter one would win the duel."""
     try:
         over_rest = Counter(_json_leaves(json.loads(rest)))
         found = parse_xml(soap).find(f".//{{{NAMESPACE}}}GetPoseResponse")
     except XmlError as error:
-        return f"pose: an answer cannot be read: it {error}"
+        return f"pose: a response cannot be read: it {error}"
     except ValueError as error:
-        return f"pose: an answer cannot be read: {error}"
+        return f"pose: a response cannot be read: {error}"
     over_soap = Counter(_xml_leaves(found)) if found is not None else Counter()
     for leaf in _ODOMETRY:
         if over_rest[leaf] != over_soap[leaf]:
@@ -70,7 +65,7 @@ def pose_difference(rest: bytes, soap: bytes) -> str | None:
 
 
 def deliveries_missing(listed: list[Any], operation: str, sent: Values) -> list[str]:
-    """What was sent and is not in the robot's own list of the requests that it accepted."""
+    """Return what was sent and is missing from the robot's list of accepted requests."""
     return [
         f"{operation}: the robot does not list the request that was sent over {interface}"
         for interface in ("rest", "soap")

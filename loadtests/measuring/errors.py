@@ -1,5 +1,5 @@
-"""What keeps the load generator itself from working."""
+"""Errors of the load generator itself."""
 
 
 class GeneratorError(Exception):
-    """The load generator cannot work: a port in use, workers that do not come up."""
+    """The load generator cannot work: a port is in use, or workers do not start."""

@@ -1,15 +1,13 @@
-"""Who does the work: this process, or workers that a Locust master leads.
+"""What generates the load: this process, or workers that a Locust master leads.
 
-Both carry out plans one after the other and end up with one recorder. Workers rebuild the plan from a message,
-take their share of its schedule, and report what they recorded once a second; a worker that is lost takes with
-it what it had not yet reported, and the result says so.
+Both carry out plans one after the other and end up with one recorder. Workers rebuild the plan from a message, take
+their share of its schedule, and report what they recorded once a second. When a worker is lost, what it had not
+reported is lost too, and the result says so.
 """
 
-from __future__ import annotations
-
-import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gevent
 from locust import User, task
@@ -17,25 +15,21 @@ from locust.env import Environment
 from locust.event import Events
 
 from loadtests.clients.library import LIBRARY
+from loadtests.clients.robot import Robot
+from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import WorkerClock
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.user_session import Session
+from loadtests.schedule.plan import Plan
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import Plan
 
 _NS = 1_000_000_000
 LEAD_S = 0.3  # from the message to the plan's beginning
 REPORT_S = 1.0  # how often workers report
-now_ns = time.monotonic_ns
 
 
 class RobotUser(User):
-    """A user of the robot: takes requests from the pacer of its process and makes them."""
+    """A user that takes requests from its process's pacer and sends them."""
 
     @task
     def work(self) -> None:
@@ -45,12 +39,12 @@ class RobotUser(User):
 
 @dataclass(slots=True)
 class Member:
-    """A process of the executor, as the result tells of it.
+    """A process that generates load, as the result describes it.
 
     Attributes:
-        state: `finished`, `lost`, or `late`: come when the schedule had been dealt out.
-        accounted: arrivals of the plan under way that its reports speak of.
-        share: arrivals of the plan in which it was lost; None while it is not, and in the closed model.
+        state: `finished`, `lost`, or `late`: joined after the schedule was distributed.
+        accounted: arrivals of the current plan in its reports.
+        share: its arrivals in the plan in which it was lost; None unless it was, and in the closed model.
         clock: None in the master's own process.
     """
 
@@ -70,17 +64,17 @@ class Member:
 
 
 def new_environment() -> Any:
-    """Locust's environment with our user."""
+    """Return Locust's environment with our user."""
     return Environment(user_classes=[RobotUser], events=Events(), stop_timeout=0)
 
 
 def busiest(members: list[Member]) -> float | None:
-    """The busiest process's share of a core in the plan that was carried out last."""
+    """Return the busiest process's share of a core in the last plan."""
     return max((member.cpu_share for member in members if member.cpu_share is not None), default=None)
 
 
 class LocalExecutor:
-    """This process alone."""
+    """Generates the load in this process alone."""
 
     def __init__(self) -> None:
         self.environment = new_environment()
@@ -91,18 +85,18 @@ class LocalExecutor:
         self._session: Session | None = None
 
     def prepare(self, robots: Sequence[Robot], plan: Plan) -> None:
-        """Get ready: clients built, users waiting."""
+        """Build the clients and start the users."""
         session = Session(self.environment, robots, plan.operations, plan.load.seed, library=LIBRARY in plan.clients)
         self._session = self.environment.roaas_session = session
         self.recorder, self.pacing = session.recorder, session.pacer.pacing
         users = plan.connections
         self.runner.start(users, spawn_rate=users)
-        with gevent.Timeout(30, GeneratorError(f"only {session.pacer.waiting} of {users} users came up within 30 s")):
+        with gevent.Timeout(30, GeneratorError(f"only {session.pacer.waiting} of {users} users started within 30 s")):
             while session.pacer.waiting < users:
                 gevent.sleep(0.01)
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
-        """Carry out a plan; `watch` is called with the seconds since its start, and True from it ends the plan."""
+        """Carry out a plan; `watch` receives the seconds since its start, and ends the plan by returning True."""
         session = self._session
         if session is None:
             raise GeneratorError("run before prepare")
@@ -124,7 +118,7 @@ class LocalExecutor:
             member.requests = sum(cell.service.total + cell.errors for cell in cells)
 
     def close(self) -> None:
-        """Let the users go."""
+        """Stop the users."""
         if self._session is not None:
             self._session.pacer.close()
         self.runner.quit()

@@ -1,28 +1,26 @@
-"""What a worker leaves in a file when its master is gone: the figures of its own share, for people to look at.
+"""The file that a worker leaves when its master is gone: the figures of its own share, for people to read.
 
-Nothing reads the file, and no verdict is in it: the other workers' shares are missing. But a long run that ends so has
-not been for nothing.
+Nothing reads the file, and it contains no verdict, because the other workers' shares are missing. But the figures of a
+long run are not lost.
 """
-
-from __future__ import annotations
 
 import json
 import os
 import platform
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import msgspec
 
 from conformance.commandline.atomic_write import write_atomically
+from loadtests.schedule.plan import Plan
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from loadtests.schedule.plan import Plan
 
 FORMAT = "roaas-worker/1"
 
 
 class LeftBehind:
-    """Keeps all that a worker has reported, which is the master's no longer when it dies."""
+    """Keeps what a worker has reported, in case the master dies."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -31,7 +29,7 @@ class LeftBehind:
         self._place = (0, 0)
 
     def begin(self, plan: Plan, worker: int) -> None:
-        """Know the plan that what follows belongs to; steps are not among the figures."""
+        """Note the plan that the next reports belong to; steps are not among the figures."""
         self._place = (worker, plan.workers)
         if plan.step_rate is None:
             self.plans.append(plan)
@@ -42,14 +40,14 @@ class LeftBehind:
 
     @property
     def requests(self) -> int:
-        """How many requests are kept."""
+        """Return how many requests are kept."""
         return sum(cell.service.total + cell.errors for cell in self.recorder.cells.values())
 
     def write(self, why: str) -> Path | None:
-        """Write the file; None where there is nothing to write.
+        """Write the file; returns None where there is nothing to write.
 
         Raises:
-            OSError: the folder does not take it.
+            OSError: the folder cannot be written to.
         """
         if not self.plans or not self.requests:
             return None
@@ -67,7 +65,7 @@ class LeftBehind:
             "pid": os.getpid(),
             "requests": self.requests,
             "plan": self.plans[0].as_message(),
-            "series": figures.series(Measured(self.plans, self.recorder), {}),
+            "series": msgspec.to_builtins(figures.series(Measured(self.plans, self.recorder), {})),
             "errors": over_time.errors(self.recorder, self.plans[0].operations),
         }
         self.folder.mkdir(parents=True, exist_ok=True)

@@ -1,32 +1,28 @@
-"""Feeds Locust's own statistics, so that its web UI shows what our histograms hold.
+"""Locust's own statistics, fed so that its web UI shows what our histograms contain.
 
-Locust rounds to milliseconds when it logs a request by itself, and its request event costs some 8 us. Here whole
-buffers of successful requests go in at once, with the histogram's microseconds as keys; failures, which are few or
-make timing moot, go through the event, where other listeners expect them.
+Locust itself rounds to milliseconds, and its request event costs some 8 us. Here whole buffers of successful requests
+go in at once, with the histogram's microseconds as keys. Failures, which are rare, go through the event, where other
+listeners expect them.
 """
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import CATALOGUE
 from loadtests.schedule.plan import SERIES
 from loadtests.statistics.histogram import Histogram, edges_us
 
-if TYPE_CHECKING:
-    from loadtests.clients.failures import CallError
-
 
 class LocustFeed:
-    """Adds to an environment's statistics."""
+    """Adds our requests to the statistics of a Locust environment."""
 
     def __init__(self, environment: Any, operations: tuple[str, ...]) -> None:
         self._environment = environment
         self._operations = operations
 
     def _entry(self, series: int, operation: int) -> tuple[str, str]:
-        """The method and the name under which Locust shows a series."""
+        """Return the method and the name under which Locust shows a series."""
         _, interface, client = SERIES[series]
         name = self._operations[operation]
         method = CATALOGUE[name].method if interface == "rest" else interface.upper()
@@ -55,7 +51,7 @@ class LocustFeed:
                 entry.response_times[time_ms] += count
 
     def failed(self, series: int, operation: int, error: CallError) -> None:
-        """Tell of a failed request."""
+        """Report a failed request."""
         if series >= 0:
             method, name = self._entry(series, operation)
             self._environment.events.request.fire(

@@ -1,17 +1,15 @@
-"""What else went on on the generator's machine: time stolen by its host, quota, governor, load."""
-
-from __future__ import annotations
+"""What else happened on the generator's machine: time stolen by its host, quota, governor, load."""
 
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import psutil
 
 _GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
 _GROUPS = Path("/sys/fs/cgroup")
-#: From these shares on it is worth a word.
+#: From these shares on there is a remark.
 _NOTED_STEAL = 0.02
 _NOTED_THROTTLED = 0.01
 _STEADY = frozenset({"performance"})
@@ -19,7 +17,7 @@ _STEADY = frozenset({"performance"})
 
 @dataclass(frozen=True)
 class Moment:
-    """The machine's counters at one time, in seconds since it started; `at_s` is the sum over its processors."""
+    """The machine's counters at one time, in seconds since boot; `at_s` is the sum over all processors."""
 
     at_s: float
     steal_s: float
@@ -27,14 +25,14 @@ class Moment:
     load: tuple[float, float, float] | None
 
     @classmethod
-    def now(cls) -> Moment:
-        """Look."""
+    def now(cls) -> Self:
+        """Read the counters."""
         times = psutil.cpu_times()
         return cls(sum(times), getattr(times, "steal", 0.0), _throttled_s(), psutil.getloadavg())
 
 
 def conditions(before: Moment, after: Moment) -> tuple[dict[str, Any], list[str]]:
-    """The `machine` of latency.json's environment between two moments, and remarks on what spoils a run."""
+    """Return the `machine` of latency.json's environment between two moments, and remarks on disturbances."""
     passed = max(after.at_s - before.at_s, 1e-9)
     cpus = os.cpu_count() or 1
     steal = (after.steal_s - before.steal_s) / passed
@@ -43,7 +41,9 @@ def conditions(before: Moment, after: Moment) -> tuple[dict[str, Any], list[str]
     load = before.load[0] if before.load else None
     remarks = []
     if steal > _NOTED_STEAL:
-        remarks.append(f"the machine's host took {steal:.1%} of its time (steal): a virtual machine measures its host")
+        remarks.append(
+            f"the machine's host took {steal:.1%} of its time (steal), so that the figures depend on the host"
+        )
     if throttled > _NOTED_THROTTLED:
         remarks.append(
             f"the generator's control group was throttled for {throttled:.1%} of the run: its quota is {quota:g} CPUs"
@@ -73,7 +73,7 @@ def _read(path: Path) -> str | None:
 
 
 def _groups() -> list[Path]:
-    """The folders of this process's control group (cgroup v2) and of those above it."""
+    """Return the folders of this process's control group (cgroup v2) and of its parents."""
     text = _read(Path("/proc/self/cgroup")) or ""
     own = next((line[3:] for line in text.splitlines() if line.startswith("0::")), None)
     if own is None:
@@ -83,7 +83,7 @@ def _groups() -> list[Path]:
 
 
 def cpu_quota() -> float | None:
-    """The least number of CPUs that a control group of ours may use (cpu.max); None where there is no limit."""
+    """Return the lowest CPU quota of our control groups (cpu.max); None without one."""
     found = []
     for folder in _groups():
         words = (_read(folder / "cpu.max") or "").split()
@@ -93,7 +93,7 @@ def cpu_quota() -> float | None:
 
 
 def _throttled_s() -> float:
-    """For how long our control groups have been held back, at most."""
+    """Return for how long our control groups have been throttled, at most."""
     found = [0.0]
     for folder in _groups():
         for line in (_read(folder / "cpu.stat") or "").splitlines():

@@ -1,8 +1,6 @@
 """The histograms while they grow, for Prometheus: `--metrics-port`."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from gevent.pywsgi import WSGIServer
@@ -13,9 +11,6 @@ from loadtests.measuring.errors import GeneratorError
 from loadtests.schedule.plan import SERIES
 from loadtests.statistics.histogram import Histogram, edges_us
 from loadtests.statistics.recorder import Cell, Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 #: Upper bounds in microseconds, 1-2-5 from 10 us to 10 s.
 BOUNDS_US = (*tuple(digit * 10**power for power in range(1, 7) for digit in (1, 2, 5)), 10000000)
@@ -33,7 +28,7 @@ def buckets(histogram: Histogram) -> list[tuple[str, float]]:
 
 
 class Collector:
-    """Reads a recorder whenever Prometheus asks."""
+    """Reads a recorder whenever Prometheus scrapes."""
 
     def __init__(self, recorder: Callable[[], Recorder], operations: tuple[str, ...]) -> None:
         self._recorder = recorder
@@ -41,7 +36,7 @@ class Collector:
         self.series_of: dict[int, int] = {}
 
     def collect(self) -> Iterator[Metric]:
-        """What prometheus_client calls."""
+        """Yield the metrics, for prometheus_client."""
         recorder = self._recorder()
         recorder.flush()
         sums: dict[tuple[int, int], Cell] = {}

@@ -1,29 +1,21 @@
-"""Cold and warm: what a request costs after a pause, and what one costs right behind another.
+"""Cold and warm: what a request costs after a pause, and right behind another.
 
-A robot that nobody has asked for a while has lost its caches, its processor its clock rate; a figure from an even
-stream of requests lies somewhere between the two. Here one connection of one series at a time is left alone for a
-tenth of a second, asked once, and then asked at once again and again. Our own process pauses as well: what that
-costs is in the cold figure, for both interfaces alike.
+An idle robot loses its caches, and its processor its clock rate; a figure from an even stream of requests lies between
+cold and warm. Here one connection of one series at a time is idle for a tenth of a second, sends one request, and then
+sends others without a pause. Our own process idles as well: what that costs is in the cold figure of both interfaces.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import gevent
 import numpy as np
 
-from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, is_success
+from loadtests.clients.failures import CallError
+from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Connection, now_ns
+from loadtests.schedule.plan import SeriesName
 from loadtests.statistics.histogram import Histogram
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import SeriesName
 
 PAUSE_S = 0.1
 _BEHIND = 10  # requests right behind one another, after the one that follows the pause
@@ -34,11 +26,11 @@ _SHARE = 0.2
 
 @dataclass
 class Paused:
-    """A series' service times after a pause and behind one another.
+    """A series' service times after a pause, and right behind one another.
 
     Attributes:
-        spacing_s: the least time between two starts behind one another, where a limit asks for one.
-        failed: requests that brought no good answer.
+        spacing_s: the least time between two requests, where the rate is limited.
+        failed: requests without a good response.
     """
 
     spacing_s: float
@@ -55,9 +47,9 @@ def after_pauses(
     ceiling: float | None,
     stopped: Callable[[], bool],
 ) -> dict[SeriesName, Paused]:
-    """Measure the wire series after pauses and without, in turn; empty where a run of so many seconds is too short.
+    """Measure the wire series after pauses and without, alternately; empty where the run is too short for that.
 
-    `ceiling` is the most requests per second that the robot may be given.
+    `ceiling` is the highest rate allowed, in requests per second.
     """
     names = [name for name in names if name[2] == "wire" and name[1] in {"rest", "soap"}]
     turns = min(_MOST, int(_SHARE * duration_s / (PAUSE_S * 1.1) / max(1, len(names))))
@@ -65,10 +57,7 @@ def after_pauses(
         return {}
     spacing = 1 / ceiling if ceiling else 0.0
     found = {name: Paused(spacing) for name in names}
-    connections = {
-        name: Connection(Endpoint.parse(robot.address(name[1], name[0]) or ""), robot.timeout_s, robot.tls)
-        for name in names
-    }
+    connections = {name: robot.http(name[1], name[0]) for name in names}
     rng = np.random.default_rng([seed, 8])
     try:
         for turn in range(turns):
@@ -86,7 +75,7 @@ def after_pauses(
 def _one_turn(
     robot: Robot, name: SeriesName, connection: Connection, turn: int, paused: Paused, *, first: bool
 ) -> None:
-    """A pause, a request, and others behind it; the first turn only opens the connection."""
+    """Pause, then send requests right behind one another; the first turn only opens the connection."""
     requests = robot.requests(name[1], name[0], turn)
     gevent.sleep(max(PAUSE_S, paused.spacing_s))
     for number in range(_BEHIND + 1):
@@ -94,11 +83,9 @@ def _one_turn(
         start = now_ns()
         try:
             answer = connection.call(request)
+            took = np.array([now_ns() - start])
+            answer.require_good(request.expects)
         except CallError:
-            paused.failed += 1
-            return
-        took = np.array([now_ns() - start])
-        if not (is_success(answer.status) and request.expects in answer.body):
             paused.failed += 1
             return
         if not first:

@@ -1,34 +1,30 @@
-"""One call of every kind before the run: does the robot answer, and do both interfaces carry the same?"""
-
-from __future__ import annotations
+"""One call of every kind before the run: does the robot respond, and do both interfaces carry the same?"""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import requests
 
-from loadtests.clients.failures import UNREACHABLE, CallError, answer_error
-from loadtests.clients.library import LibraryRest, LibrarySoap, new_session, read_document
+from loadtests.clients.failures import UNREACHABLE, CallError
+from loadtests.clients.library import LibraryRest, LibrarySoap, Sent, new_session, read_document
 from loadtests.clients.payloads import CATALOGUE, variants
+from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Answer, now_ns
 from loadtests.measuring.equivalence import deliveries_missing, pose_difference, requests_difference
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import SeriesName
+from loadtests.schedule.plan import SeriesName
 
 
 @dataclass
 class Findings:
-    """What the calls before the run brought.
+    """The results of the calls before the run.
 
     Attributes:
-        sizes: octets of request and response of each wire series.
+        sizes: bytes of request and response of each wire series.
         servers: Server header by interface.
         failures: what failed, by series.
         unequal: how the interfaces' payloads differ.
         notes: what could not be compared.
-        slowest_s: the longest that the wire client waited for an answer, connecting included.
+        slowest_s: the longest time that the wire client waited for a response, including the connection.
     """
 
     sizes: dict[SeriesName, tuple[int, int]] = field(default_factory=dict)
@@ -40,17 +36,17 @@ class Findings:
 
     @property
     def unreachable(self) -> bool:
-        """Somebody who should be called cannot be reached."""
+        """Return whether a service could not be reached."""
         return any(failure.kind in UNREACHABLE for failure in self.failures.values())
 
     def messages(self) -> list[str]:
-        """The failures in words, each once."""
+        """Return the failures as sentences, each once."""
         worded = [f"{name[0]} over {name[1]} ({name[2]}): {failure}" for name, failure in self.failures.items()]
         return list(dict.fromkeys(worded))
 
 
 def preflight(robot: Robot, names: list[SeriesName], seed: int) -> Findings:
-    """Call each series once; compare what the interfaces send and get."""
+    """Call each series once, and compare what the interfaces send and receive."""
     findings = Findings()
     answers: dict[tuple[str, str], Answer] = {}
     for name in names:
@@ -71,7 +67,7 @@ def preflight(robot: Robot, names: list[SeriesName], seed: int) -> Findings:
 def _compare(
     robot: Robot, answers: dict[tuple[str, str], Answer], operations: list[str], seed: int, findings: Findings
 ) -> None:
-    """Note how what the interfaces send and get differs."""
+    """Note how the requests and responses of the interfaces differ."""
     differences = [
         requests_difference(name, robot.requests("rest", name, seed), robot.requests("soap", name, seed))
         for name in operations
@@ -85,7 +81,9 @@ def _compare(
             continue
         listed = _listed_deliveries(robot)
         if listed is None:
-            findings.notes.append("the robot does not list the requests it accepted, so what arrived was not compared")
+            findings.notes.append(
+                "the robot does not list the requests it accepted, so that their arrival was not checked"
+            )
         else:
             findings.unequal += deliveries_missing(listed, operation, variants(operation, seed)[0])
 
@@ -102,12 +100,7 @@ def _wire_call(robot: Robot, name: SeriesName, seed: int, findings: Findings) ->
     findings.slowest_s = max(findings.slowest_s, (answer.received_ns - began) / 1e9)
     server = answer.headers.get(b"server")
     findings.servers[interface] = server.decode("latin-1") if server else None
-    location = answer.headers.get(b"location")
-    failure = answer_error(
-        answer.status, location.decode("latin-1") if location else None, answer.body, request.expects
-    )
-    if failure is not None:
-        raise failure
+    answer.require_good(request.expects)
     findings.sizes[name] = (len(request.octets), answer.octets)
     return answer
 
@@ -115,12 +108,12 @@ def _wire_call(robot: Robot, name: SeriesName, seed: int, findings: Findings) ->
 def _library_call(robot: Robot, operation: str, interface: str, seed: int) -> None:
     values = variants(operation, seed)[0]
     if interface == "rest":
-        LibraryRest(robot).call(operation, values)
+        LibraryRest(robot, Sent()).call(operation, values)
         return
     location = robot.wsdl(operation) or ""
     try:
         document = read_document(location, robot)
-        client = LibrarySoap(robot, {operation: document})
+        client = LibrarySoap(robot, {operation: document}, Sent())
     except requests.RequestException as error:
         raise CallError("network", f"WSDL {location!r}: {error}") from None
     except CallError:
@@ -131,7 +124,7 @@ def _library_call(robot: Robot, operation: str, interface: str, seed: int) -> No
 
 
 def _listed_deliveries(robot: Robot) -> list[Any] | None:
-    """What the robot says that it accepted, where it tells (GET /robot/app/delivery/, an extension)."""
+    """Return the robot's list of accepted requests, where it has one (GET /robot/app/delivery/, an extension)."""
     try:
         with new_session(robot) as session:
             answer = session.get(

@@ -1,30 +1,26 @@
-"""First in line for a processor while requests are sent, where the system allows it.
+"""Real-time priority for the generator while it sends requests, where the system allows it.
 
-On a machine that others use too a woken process waits for the end of another's time slice, milliseconds at times: the
-request starts late, and its answer is read late. A process of the lowest real-time class does not wait (sched(7)). It
-takes CAP_SYS_NICE, and is done only where the generator needs a small part of one processor of several: it must not
-take the robot's.
+On a shared machine a woken process waits for the end of another's time slice, sometimes for milliseconds: the request
+starts late, and its response is read late. A process of the lowest real-time class does not wait (sched(7)). That needs
+CAP_SYS_NICE, and is used only where the generator needs a small part of one of several processors: it must not take the
+robot's.
 """
-
-from __future__ import annotations
 
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from loadtests.schedule.plan import Plan
+from loadtests.schedule.plan import Plan
 
 #: Requests a second, of one process, up to which it is idle most of the time.
 MOST_RATE = 1000.0
 
 
 def leaves_the_robot_room(plan: Plan, processors: int) -> bool:
-    """Whether a plan's workers may come first: an open model at a moderate rate, and a processor that none of them has.
+    """Return whether the workers may run first: open model, moderate rate, and a processor left for the robot.
 
-    The workers are taken to be all on this machine: of those elsewhere they do not know.
+    It assumes that all workers are on this machine.
     """
     moderate = plan.load.rate is not None and plan.load.rate / plan.workers <= MOST_RATE
     return moderate and plan.open_model and plan.step_rate is None and plan.workers < processors
@@ -32,9 +28,9 @@ def leaves_the_robot_room(plan: Plan, processors: int) -> bool:
 
 @contextmanager
 def first_in_line(*, wanted: bool) -> Iterator[bool]:
-    """This thread is scheduled before all usual ones while the context lasts; yields whether that was allowed.
+    """Run this thread before all ordinary ones while the context lasts; yields whether that was allowed.
 
-    Processes that are started meanwhile do not inherit it.
+    Child processes do not inherit the priority.
     """
     if not wanted or sys.platform != "linux":
         yield False

@@ -1,20 +1,14 @@
-"""Starting the robot anew between repeats, by a command of its owner's."""
-
-from __future__ import annotations
+"""Restarting the robot between repeats, with a command of its owner."""
 
 import shlex
 import subprocess
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import gevent
 
 from loadtests.measuring.errors import GeneratorError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from loadtests.measuring.preflight import Findings
+from loadtests.measuring.preflight import Findings
 
 _COMMAND_S = 60.0
 _READY_S = 60.0
@@ -23,7 +17,7 @@ _SHOWN = 300
 
 
 def start_anew(command: str, look: Callable[[], Findings], stopped: Callable[[], bool]) -> None:
-    """Run the command, and wait until everything that `look` calls is answered.
+    """Run the restart command, and wait until everything that `look` calls responds.
 
     Raises:
         GeneratorError: the robot did not come back; the message says why.
@@ -33,7 +27,7 @@ def start_anew(command: str, look: Callable[[], Findings], stopped: Callable[[],
 
 
 def _run(command: str) -> None:
-    """Run a command without a shell, and wait for its end."""
+    """Run a command without a shell, and wait until it ends."""
     words = shlex.split(command)
     try:
         done = subprocess.run(  # noqa: S603 -- the user's own command, given for this
@@ -48,7 +42,7 @@ def _run(command: str) -> None:
         raise GeneratorError(f"--restart-command {command!r}: {error.strerror or error}") from None
     except subprocess.TimeoutExpired:
         raise GeneratorError(
-            f"--restart-command {command!r} did not end within {_COMMAND_S:g} s: it has to leave the robot running "
+            f"--restart-command {command!r} did not end within {_COMMAND_S:g} s: it must leave the robot running "
             "in the background"
         ) from None
     if done.returncode:
@@ -57,7 +51,7 @@ def _run(command: str) -> None:
 
 
 def _until_ready(look: Callable[[], Findings], stopped: Callable[[], bool]) -> None:
-    """Call everything once, again and again, until all of it is answered."""
+    """Call everything repeatedly, until all of it responds."""
     deadline = time.monotonic() + _READY_S
     while True:
         findings = look()

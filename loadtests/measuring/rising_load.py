@@ -1,23 +1,16 @@
-"""Offers rates until it is known where a robot gives way, and connections to see how latency grows with them."""
-
-from __future__ import annotations
+"""Raises the rate until the robot breaks down, and the connections to see how latency grows with them."""
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.executor import busiest
-from loadtests.schedule.arrivals import arrivals_due
-from loadtests.schedule.plan import BOTH, step_operation
-from loadtests.statistics import steps
+from loadtests.schedule.plan import BOTH, Plan, step_operation
+from loadtests.settings.settings import Settings
 from loadtests.statistics.knee import knee_search, search_again
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.measuring.distributed_executor import Executor
-    from loadtests.schedule.plan import Plan
-    from loadtests.settings.settings import Settings
+from loadtests.statistics.steps import Criterion, Step, step_result
 
 _LOWEST_RATE, _HIGHEST_RATE = 50.0, 50_000.0
 _MOST_S = 600.0  # for all searches together
@@ -29,9 +22,9 @@ class RisingLoad:
 
     Args:
         first: the duel's plan.
-        stopped: whether somebody wants an end.
-        announce: hears of each plan before it begins.
-        tell: how things stand, for the terminal.
+        stopped: returns whether to end.
+        announce: receives each plan before it begins.
+        tell: writes progress to the terminal.
     """
 
     first: Plan
@@ -45,13 +38,11 @@ class RisingLoad:
     def __post_init__(self) -> None:
         self._next_segment = self.first.first_segment + len(self.first.segments)
         self._operation = step_operation(self.first.operations)
-        self._criterion = steps.Criterion.of(self.settings.thresholds, self.first.operations[self._operation])
+        self._criterion = Criterion.of(self.settings.thresholds, self.first.operations[self._operation])
         self._interfaces = [n for n in self.first.interfaces if self._operation in self.first.offered(n, "wire")]
 
-    def _run(
-        self, interfaces: Sequence[str], *, rate: float | None = None, users: int | None = None
-    ) -> list[dict[str, Any]]:
-        """One plan, interface after interface, at a rate or with so many users; empty when there is to be an end."""
+    def _run(self, interfaces: Sequence[str], *, rate: float | None = None, users: int | None = None) -> list[Step]:
+        """Run one plan, interface after interface, at a rate or with some users; empty when the run has to end."""
         if self.stopped():
             return []
         load = replace(self.first.load, rate=rate, users=users, duration_s=self.settings.steps.step_s, warmup_s=0.0)
@@ -71,16 +62,18 @@ class RisingLoad:
         if self.stopped():
             return []
         cpu_share = busiest(self.executor.members)
-        asked = {name: arrivals_due(plan, plan.length_s, phase="step", interface=name) for name in interfaces}
-        return [
-            steps.step_result(plan, self.executor.recorder, name, asked[name], self._criterion)
-            | {"cpu_share": cpu_share}
+        results = [
+            step_result(plan, self.executor.recorder, name, plan.operations[self._operation], self._criterion)
             for name in interfaces
         ]
+        for result in results:
+            result.cpu_share = cpu_share
+        return results
 
-    def steps(self) -> list[dict[str, Any]]:
-        """The `steps` of latency.json: up until no interface is left that keeps to the criterion."""
-        standing, found = self._interfaces, []
+    def steps(self) -> list[Step]:
+        """Return the `steps` of latency.json: up to the rate at which no interface meets the criterion any more."""
+        standing = self._interfaces
+        found: list[Step] = []
         for rate in self.settings.steps.rates:
             results = self._run(standing, rate=rate) if standing else []
             if not results:
@@ -88,18 +81,18 @@ class RisingLoad:
             for result in results:
                 self._tell_rate("step", result)
             found += results
-            standing = [result["interface"] for result in results if result["meets"]]
+            standing = [result.interface for result in results if result.meets]
         return found
 
-    def _tell_rate(self, what: str, result: dict[str, Any]) -> None:
-        kept = "kept" if result["meets"] else result["reason"]
+    def _tell_rate(self, what: str, result: Step) -> None:
+        kept = "kept" if result.meets else result.reason
         self.tell(
-            f"{what} over {result['interface']}: {result['offered_rate']:.0f}/s, p50 {result['p50_ms'] or 0:.3f} ms, "
-            f"p99 {result['p99_ms'] or 0:.3f} ms: {kept}"
+            f"{what} over {result.interface}: {result.offered_rate:.0f}/s, p50 {result.p50_ms or 0:.3f} ms, "
+            f"p99 {result.p99_ms or 0:.3f} ms: {kept}"
         )
 
     def knees(self) -> list[dict[str, Any]]:
-        """Search each interface's knee, and that of both at once; empty where that was not asked for."""
+        """Search the knee of each interface, and of both together; empty where that was not asked for."""
         wanted = self.settings.steps
         if not wanted.knee_searches:
             return []
@@ -108,9 +101,9 @@ class RisingLoad:
         found: list[dict[str, Any]] = []
         for interface in [*self._interfaces, *([BOTH] if {"rest", "soap"} <= set(self._interfaces) else [])]:
 
-            def attempt(rate: float, interface: str = interface) -> dict[str, Any] | None:
+            def attempt(rate: float, interface: str = interface) -> Step | None:
                 if time.monotonic() > until:
-                    self.tell(f"knee: {_MOST_S:.0f} s are over: what has been found stands")
+                    self.tell(f"knee: ended after {_MOST_S:.0f} s, with the searches done so far")
                     return None
                 results = self._run([interface], rate=rate)
                 if not results:
@@ -123,7 +116,7 @@ class RisingLoad:
         return found
 
     def over_connections(self) -> list[dict[str, Any]]:
-        """How latency and throughput grow with the number of connections that are always busy."""
+        """Return how latency and throughput grow with the number of busy connections."""
         found: list[dict[str, Any]] = []
         kept = ("interface", "client", "count", "errors", "p50_ms", "p99_ms", "max_ms", "cpu_share")
         for users in self.settings.steps.connections:
@@ -133,10 +126,11 @@ class RisingLoad:
                     return found
                 (result,) = results
                 found.append(
-                    {"connections": users, "rate": result["achieved_rate"]} | {name: result[name] for name in kept}
+                    {"connections": users, "rate": result.achieved_rate}
+                    | {name: getattr(result, name) for name in kept}
                 )
                 self.tell(
-                    f"{users} connections over {interface}: {result['achieved_rate']:.0f}/s, "
-                    f"p50 {result['p50_ms'] or 0:.3f} ms, p99 {result['p99_ms'] or 0:.3f} ms"
+                    f"{users} connections over {interface}: {result.achieved_rate:.0f}/s, "
+                    f"p50 {result.p50_ms or 0:.3f} ms, p99 {result.p99_ms or 0:.3f} ms"
                 )
         return found

@@ -1,9 +1,7 @@
-"""The process that listens at the robot's address, where that is on this machine: its command line and processor time.
+"""The process that listens at the robot's address, if it is on this machine: its command line and processor time.
 
-A robot's other processes, such as a simulation behind its web services, are not in it.
+The robot's other processes, such as a simulation behind its web services, are not included.
 """
-
-from __future__ import annotations
 
 import ipaddress
 import re
@@ -11,22 +9,20 @@ import shlex
 import socket
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import psutil
 
 from loadtests.clients.endpoint import Endpoint
+from loadtests.clients.robot import Robot
 from loadtests.measuring.command_line import without_folders
-
-if TYPE_CHECKING:
-    from loadtests.clients.robot import Robot
 
 _SECRET = re.compile(r"^-.*(token|password|secret|key)\b(?!-file)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class RobotProcess:
-    """Who listens, as the system lets us see it.
+    """The process that listens at the robot's address.
 
     Attributes:
         command: its command line, without this machine's folders and without secrets.
@@ -40,7 +36,7 @@ class RobotProcess:
 
     @classmethod
     def find(cls, robot: Robot) -> Self | None:
-        """Look for it; None where the robot is elsewhere, or we may not look."""
+        """Find the process; None where the robot is on another machine, or we lack permission."""
         if not same_machine(robot):
             return None
         port = Endpoint.parse(_addresses(robot)[0]).port
@@ -55,7 +51,7 @@ class RobotProcess:
         return None
 
     def cpu_share(self) -> float | None:
-        """The share of one processor that it has used since it was found; None where it has ended."""
+        """Return the share of one processor that it has used since it was found; None where it has ended."""
         try:
             if not self.process.is_running():
                 return None
@@ -74,7 +70,7 @@ def _addresses(robot: Robot) -> list[str]:
 
 
 def same_machine(robot: Robot) -> bool:
-    """Whether all of a robot's addresses are this machine's, as far as can be told without asking anybody."""
+    """Return whether all of a robot's addresses are this machine's, as far as can be known without DNS."""
     addresses = _addresses(robot)
     return bool(addresses) and all(_is_here(Endpoint.parse(address).host) for address in addresses)
 
@@ -91,7 +87,7 @@ def _is_here(host: str) -> bool:
 
 
 def _shown(words: list[str]) -> str:
-    """A command line without what is nobody's business: the folders of this machine, and secrets."""
+    """Return a command line without secrets and without this machine's folders."""
     found = []
     for before, word in zip(["", *words], words, strict=False):
         if _SECRET.search(before) and "=" not in before:

@@ -1,31 +1,25 @@
-"""One process's part in a run: its users, its pacer, its recorder. The same locally and in a worker."""
-
-from __future__ import annotations
+"""One process's part in a run: its users, its pacer and its recorder, in the master's process or in a worker."""
 
 import gc
 import os
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import gevent
 
 from loadtests.clients.callers import Caller, Workload
+from loadtests.clients.failures import CallError
 from loadtests.clients.library import LIBRARY, Sent, read_document
 from loadtests.clients.payloads import VARIANTS
+from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.locust_feed import LocustFeed
 from loadtests.measuring.priority import first_in_line, leaves_the_robot_room
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Arrival, Pacer
-from loadtests.schedule.plan import BOTH
+from loadtests.schedule.plan import BOTH, Plan, Segment
 from loadtests.statistics.recorder import Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.clients.failures import CallError
-    from loadtests.clients.robot import Robot
-    from loadtests.schedule.plan import Plan, Segment
 
 _NS = 1_000_000_000
 _SIDES = ("rest", "soap")
@@ -33,9 +27,9 @@ _AFTER_ERROR_S = 0.02  # closed model: users of a dead robot would spin on refus
 
 
 class _Sink:
-    """What callers record into: the recorder, with the run's clock for failures and Locust told of them."""
+    """Where callers record: the recorder, with the run's clock for failures, and Locust's statistics."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: "Session") -> None:
         self._session = session
         self.record = session.recorder.record
         self.count = session.recorder.count
@@ -55,9 +49,9 @@ class _Sink:
 
 
 class Session:
-    """A process's part in a run: operations by their plans' numbers, and whether plans may use the library client.
+    """One process's users, pacer and recorder.
 
-    `robots` are those that segments name by their place: the one under load, and the one that it is compared with.
+    `robots` are numbered as in segments: the one under load, and the one that it is compared with.
     """
 
     def __init__(
@@ -75,14 +69,16 @@ class Session:
         self._cpu: list[tuple[float, float]] = []
         self._block: tuple[int, float, float] | None = None
         self._callers: list[Caller] = []
+        self._sent = Sent()
         self._workloads = [
-            Workload(robot, operations, seed, _documents(robot, operations) if library else {}) for robot in robots
+            Workload(robot, operations, seed, _documents(robot, operations) if library else {}, self._sent)
+            for robot in robots
         ]
         self.pacer = Pacer(int(self._timeout_s * _NS), self._between, self._dropped)
         self.after_segment: Callable[[], None] | None = None
 
     def work(self) -> None:
-        """What a user does until it is killed: take a request, make it, take the next."""
+        """Take a request, send it, and take the next, until killed: the loop of one user."""
         callers = [Caller(workload, _Sink(self)) for workload in self._workloads]
         self._callers += callers
         performs, take, segments = [caller.perform for caller in callers], self.pacer.take, self.segments
@@ -114,8 +110,8 @@ class Session:
     def run(self, plan: Plan, worker: int, origin_ns: int, ceiling: float | None = None) -> None:
         """Carry out a worker's share of a plan, whose times count from `origin_ns` (monotonic).
 
-        Returns when its last request has come back, or `stop` was called. In the closed model `ceiling` is the most
-        starts per second of this process.
+        Returns when the last response has come, or `stop` was called. In the closed model `ceiling` limits the requests
+        per second of this process.
         """
         self._first = plan.first_segment
         self.series_of.update(plan.series_of())
@@ -125,7 +121,7 @@ class Session:
             for caller in self._callers:
                 caller.close()
         self._cpu, self._block = [], None
-        Sent.requests = Sent.calls = 0  # what was sent to look around is no call of the run
+        self._sent.requests = self._sent.calls = 0
         gc.collect()
         gc.freeze()  # what exists now lives on: a collection in mid-run would look like a stall of the robot
         schedule = Schedule(plan, worker, plan.workers)
@@ -137,14 +133,13 @@ class Session:
             self.pacer.done.wait()
         self._look_at_processor(None)
         self._wait_for_answers()
-        self.pacer.give_up()  # what is late by a whole deadline will not be started any more
+        self.pacer.give_up()  # arrivals that are late by a whole deadline are not started any more
         self._wait_for_answers()
         self.recorder.flush()
-        if Sent.requests > Sent.calls:
-            self.recorder.count("resends", Sent.requests - Sent.calls)
+        self.recorder.count("resends", self._sent.resends)
 
     def _wait_for_answers(self) -> None:
-        """Until no request is under way; each has its own deadline."""
+        """Wait until no request is under way; each has its own deadline."""
         with gevent.Timeout(self._timeout_s + 1, exception=False):
             while self._busy:
                 gevent.sleep(0.01)
@@ -157,7 +152,7 @@ class Session:
         self.recorder.drop(arrival.segment + self._first, arrival.operation, now_ns() - arrival.due_ns)
 
     def _between(self, index: int) -> None:
-        """In the gap before a segment: bin what was recorded, and look at the processor's time."""
+        """Bin what was recorded and read the processor's time, in the gap before a segment."""
         number = index + self._first
         now = self._look_at_processor(number)
         self.recorder.flush()
@@ -173,7 +168,7 @@ class Session:
             self.after_segment()
 
     def _look_at_processor(self, following: int | None) -> tuple[float, float]:
-        """Note the share of a core that the segment which is over took, before one that follows, if any does."""
+        """Note the share of a core that the last segment took, before the `following` one, if any."""
         now = (time.monotonic(), time.process_time())
         if self._block is not None and now[0] > self._block[1]:
             segment, began, spent = self._block
@@ -183,7 +178,7 @@ class Session:
 
 
 def _documents(robot: Robot, operations: tuple[str, ...]) -> dict[str, Any]:
-    """The parsed WSDL of each operation that zeep can call; a WSDL of several operations is read once."""
+    """Return the parsed WSDL of each operation that zeep can call; each WSDL is read once."""
     parsed: dict[str, Any] = {}
     documents: dict[str, Any] = {}
     for name in operations:

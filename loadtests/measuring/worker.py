@@ -1,10 +1,8 @@
 """A worker process: `python -m loadtests.measuring.worker HOST PORT`, with a JSON object on its standard input.
 
-The object holds the robots' bearer tokens, which do not travel over the network with the rest, and the folder for what
-the worker leaves when its master dies: `{"tokens": […], "folder": "…"}`.
+The object contains the robots' bearer tokens, which do not travel over the network with the rest, and the folder for
+what the worker leaves when its master dies: `{"tokens": […], "folder": "…"}`.
 """
-
-from __future__ import annotations
 
 import json
 import logging
@@ -24,13 +22,14 @@ from gevent.event import Event
 
 from conformance.commandline.exit_codes import ExitCode
 from loadtests.clients.robot import Robot
+from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import answer_clock, clock_id
-from loadtests.measuring.executor import REPORT_S, new_environment, now_ns
+from loadtests.measuring.executor import REPORT_S, new_environment
 from loadtests.measuring.left_behind import LeftBehind
 from loadtests.measuring.user_session import Session
 from loadtests.schedule.plan import Plan
 
-#: The master answers a heartbeat each second. Silent for so long, it is dead, or the network to it is.
+#: The master answers a heartbeat each second. If it is silent for this long, it is dead, or the network to it is.
 MASTER_SILENT_S = 20.0
 _LOOK_S = 0.5
 
@@ -71,7 +70,7 @@ class Worker:
         self._heard = time.monotonic()
         environment.events.heartbeat_received.add_listener(self._on_heartbeat)
         self._about = {"pid": os.getpid(), "host": platform.node(), "clock": clock_id()}
-        # Locust has long said that we are here, and drops what we await.
+        # Locust has announced us long before this worker could listen to messages.
         self.runner.send_message("roaas_listening", self._about)
 
     def _on_prepare(self, environment: Any, msg: Any) -> None:
@@ -112,22 +111,22 @@ class Worker:
 
     def _on_late(self, environment: Any, msg: Any) -> None:
         del environment, msg
-        _say(f"the master at {self.master} had dealt the run out already: this worker takes no part in it")
+        _say(f"the master at {self.master} had already distributed the run: this worker takes no part in it")
 
     def _on_heartbeat(self, **_: Any) -> None:
         self._heard = time.monotonic()
 
     def follow(self, parent: int | None) -> None:
-        """End this process when the master is gone: silent for too long, or, on its machine, no parent any more."""
+        """End this process when the master is gone: silent for too long, or no longer the parent process."""
         while True:
             gevent.sleep(_LOOK_S)
             if parent is not None and os.getppid() != parent:
                 self._end(f"the master (process {parent}) has ended")
             if time.monotonic() - self._heard > MASTER_SILENT_S:
-                self._end(f"nothing was heard of the master at {self.master} for {MASTER_SILENT_S:g} s")
+                self._end(f"the master at {self.master} has been silent for {MASTER_SILENT_S:g} s")
 
     def _end(self, why: str) -> None:
-        """Stop sending, write down what there is, and end."""
+        """Stop sending, write what was recorded, and end."""
         if self.session is not None:
             self.session.stop()
         self._idle.wait()  # requests under way have deadlines
@@ -139,7 +138,7 @@ class Worker:
         _leave(ExitCode.INCONCLUSIVE, f"{why}: this worker ends; {kept}")
 
     def _packed(self) -> dict[str, Any]:
-        """Everything recorded since the last report, in parts."""
+        """Return everything recorded since the last report, in parts."""
         session = self.session
         waiting, self._report = self._report, None
         parts = [session.recorder.take()] if session else []
@@ -151,7 +150,7 @@ class Worker:
         }
 
     def _pack(self) -> None:
-        """In a gap between blocks, where it delays no request: get the next report ready."""
+        """Prepare the next report in a gap between blocks, where that delays no request."""
         if self._report is None and time.monotonic() - self._reported >= REPORT_S * 0.5:
             self._report = self._packed()
 
@@ -163,14 +162,14 @@ class Worker:
 
 
 def serve(host: str, port: int, tokens: Sequence[str | None], folder: Path, parent: int | None = None) -> None:
-    """Work until the master says quit, or is gone.
+    """Run a worker until the master quits or is gone.
 
     Args:
         host: where the master listens.
-        port: likewise.
+        port: its port.
         tokens: one for each robot.
-        folder: for what is recorded, should the master die.
-        parent: the master's process, where it started this one.
+        folder: for what was recorded if the master dies.
+        parent: the master's process id, if it started this process.
     """
     logging.getLogger("locust").setLevel(logging.ERROR)
     try:
@@ -178,14 +177,14 @@ def serve(host: str, port: int, tokens: Sequence[str | None], folder: Path, pare
     except ConnectionError:
         _leave(
             ExitCode.UNREACHABLE,
-            f"no master answers at {host}:{port}: give its address by --master-host and --master-port",
+            f"no master responds at {host}:{port}: give its address with --master-host and --master-port",
         )
     gevent.spawn(worker.follow, parent)
     worker.runner.greenlet.join()
 
 
 def main() -> None:
-    """A worker of a master on this machine."""
+    """Run a worker of a master on this machine."""
     parent = os.getppid()
     told = json.loads(sys.stdin.readline() or "{}")
     gevent.signal_handler(signal.SIGINT, lambda: None)  # the master says when to stop

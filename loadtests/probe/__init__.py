@@ -1,1 +1,1 @@
-"""The application's place on the robot's ROS graph: processes of their own, so that load tests run where no ROS is."""
+"""The application's place on the robot's ROS graph, in processes of their own: load tests run without ROS too."""

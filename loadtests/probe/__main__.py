@@ -1,12 +1,10 @@
 """A probe's process: `python -m loadtests.probe listen|publish --domain-id N --topic NAME`.
 
-Says in one line of JSON that it is ready, or what its problem is. A listener then writes a line for each delivery that
-it gets, `{"at_ns": …, "values": […]}`; a publisher reads lines of values, publishes each and writes `{"sent_ns": …}`.
+It writes a line of JSON that says that it is ready, or what its problem is. A listener then writes a line for each
+delivery, `{"at_ns": …, "values": […]}`. A publisher reads lines of values, publishes each and writes `{"sent_ns": …}`.
 Times are of CLOCK_MONOTONIC, which all processes of a machine share; values are in the order of the ROS message, in
-hexadecimal, which loses no bit. It ends when its input ends.
+hexadecimal, which loses no bit. The process ends when its input ends.
 """
-
-from __future__ import annotations
 
 import argparse
 import json
@@ -15,20 +13,20 @@ from typing import Any
 
 
 def say(answer: dict[str, Any]) -> None:
-    """A line to who started us."""
+    """Write a line of JSON to the parent process."""
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
 
 
 def main() -> int:
-    """Run the probe; 0 when its input ended, 3 when there is no ROS, or nobody on the topic."""
+    """Run the probe; returns 0 when its input ends, 3 without ROS or without a peer on the topic."""
     parser = argparse.ArgumentParser(prog="python -m loadtests.probe", description=__doc__)
     parser.add_argument("role", choices=["listen", "publish"])
     parser.add_argument("--domain-id", type=int, required=True)
     parser.add_argument("--topic", required=True)
     options = parser.parse_args()
     try:
-        # Here and nowhere else: a machine without ROS gets an answer, not a traceback.
+        # Imported here: a machine without ROS gets a message, not a traceback.
         from loadtests.probe.node import DeliveryNode  # noqa: PLC0415
 
         node = DeliveryNode(options.domain_id, options.topic, say)

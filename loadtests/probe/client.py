@@ -1,9 +1,7 @@
-"""The load test's end of the probes: starts their processes, and never waits for ever.
+"""The load test's end of the probes: starts their processes; every wait has a deadline.
 
-For a process that gevent has patched: waiting for a probe holds nobody else up.
+For a process that gevent has patched: waiting for a probe blocks no other greenlet.
 """
-
-from __future__ import annotations
 
 import json
 import os
@@ -25,12 +23,12 @@ class ProbeError(Exception):
 
 
 class Probe:
-    """A process with a role on the graph, `listen` or `publish`; `await_ready` before anything else."""
+    """A process on the ROS graph, in the role `listen` or `publish`; call `await_ready` first."""
 
     def __init__(self, role: str, domain_id: int, topic: str) -> None:
         command = [sys.executable, "-m", "loadtests.probe", role, "--domain-id", str(domain_id), "--topic", topic]
-        # A robot that only looks on its own machine hears no multicast: it is told of us directly. Shared memory that
-        # killed processes left behind, or that a container does not share, swallows messages.
+        # A robot with discovery limited to its own machine receives no multicast: as static peer it finds us. Shared
+        # memory left behind by killed processes, or not shared by a container, loses messages.
         peers = ";".join(filter(None, [os.environ.get("ROS_STATIC_PEERS"), "127.0.0.1"]))
         environment = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"} | os.environ
         environment |= {"ROS_DOMAIN_ID": str(domain_id), "ROS_STATIC_PEERS": peers}
@@ -41,21 +39,21 @@ class Probe:
             stderr=subprocess.DEVNULL,
             env=environment,
             text=True,
-            start_new_session=True,  # Ctrl-C is for the load test, which then ends the probe
+            start_new_session=True,  # Ctrl-C goes to the load test, which then ends the probe
         )
         self._lines: Queue[dict[str, Any]] = Queue()
         self._reader = gevent.spawn(self._listen)
 
     def await_ready(self) -> None:
-        """Wait until it is on the graph.
+        """Wait until the probe is on the graph.
 
         Raises:
-            ProbeError: it does not start, for want of ROS or of the message package, or finds nobody.
+            ProbeError: it does not start (no ROS, no message package), or finds no peer on the topic.
         """
         self.next(_START_S)
 
     def publish(self, values: tuple[float, ...]) -> int:
-        """Have a publisher publish a delivery; returns when it began to (CLOCK_MONOTONIC, ns).
+        """Publish a delivery; returns when that began (CLOCK_MONOTONIC, ns).
 
         Raises:
             ProbeError: it has ended.
@@ -69,7 +67,7 @@ class Probe:
         return int(self.next(_ANSWER_S)["sent_ns"])
 
     def arrival_ns(self, values: tuple[float, ...], within_s: float) -> int | None:
-        """When a listener got a delivery of these values; None where it does not come in time.
+        """Return when a listener received a delivery with these values; None where it does not come in time.
 
         Raises:
             ProbeError: it has ended.
@@ -83,10 +81,10 @@ class Probe:
         return None
 
     def next(self, within_s: float) -> dict[str, Any]:
-        """The next line.
+        """Return the next line.
 
         Raises:
-            ProbeError: none comes in time, or it tells of a problem.
+            ProbeError: none comes in time, or it reports a problem.
         """
         try:
             told: dict[str, Any] = self._lines.get(timeout=within_s)

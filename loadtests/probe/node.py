@@ -1,10 +1,9 @@
-"""The probe's ROS node: hears deliveries as the application does, or publishes them without any web service."""
-
-from __future__ import annotations
+"""The probe's ROS node: receives deliveries as the application does, or publishes them without any web service."""
 
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import rclpy
 from mybot_delivery_app.msg import DeliveryRequestMsg
@@ -16,21 +15,18 @@ from rclpy.signals import SignalHandlerOptions
 
 from conformance.packs.table1.delivery import MESSAGE_FIELDS
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 _DISCOVERY_S = 6.0
 _STEP_S = 0.02
 _DEPTH = 1000
 
 
 class DeliveryNode:
-    """A node on the topic of deliveries.
+    """A ROS node on the topic of deliveries.
 
     Args:
         domain_id: the robot's ROS domain.
         topic: full name.
-        say: told of each delivery that comes, on the executor's thread.
+        say: receives each delivery, on the executor's thread.
     """
 
     def __init__(self, domain_id: int, topic: str, say: Callable[[dict[str, Any]], None]) -> None:
@@ -46,9 +42,9 @@ class DeliveryNode:
         self._thread.start()
 
     def listen(self) -> str | None:
-        """Take the application's place, once somebody publishes deliveries; returns the problem, if there is one."""
+        """Subscribe in the application's place, once there is a publisher; returns the problem, if there is one."""
         if not self._found(lambda: self._node.count_publishers(self._topic)):
-            return f"nobody publishes {self._topic} in ROS domain {self._context.get_domain_id()}"
+            return f"nothing publishes {self._topic} in ROS domain {self._context.get_domain_id()}"
         publishers = self._node.get_publishers_info_by_topic(self._topic)
         best_effort = any(one.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for one in publishers)
         reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
@@ -58,10 +54,10 @@ class DeliveryNode:
         return None
 
     def publish_to(self) -> str | None:
-        """Become a publisher, once somebody listens; returns the problem, if there is one."""
+        """Become a publisher, once there is a subscriber; returns the problem, if there is one."""
         self._publisher = self._node.create_publisher(DeliveryRequestMsg, self._topic, QoSProfile(depth=_DEPTH))
         if not self._found(self._publisher.get_subscription_count):
-            return f"nobody listens to {self._topic} in ROS domain {self._context.get_domain_id()}"
+            return f"nothing subscribes to {self._topic} in ROS domain {self._context.get_domain_id()}"
         return None
 
     def publish(self, values: list[str]) -> int:

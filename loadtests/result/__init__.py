@@ -1,1 +1,1 @@
-"""latency.json and what stands beside it, and the summary for the terminal."""
+"""latency.json and the files beside it, and the summary for the terminal."""

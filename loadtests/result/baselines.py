@@ -1,9 +1,7 @@
-"""Stored results, by name: what later runs are compared with, and what a history is made of.
+"""Results stored by name, which later runs are compared with and a history is made of.
 
-A baseline is a folder of latency.json files that are named by when they were measured; the last one is compared with.
+A baseline is a folder of latency.json files, named by when they were measured; the latest one is compared with.
 """
-
-from __future__ import annotations
 
 import json
 import re
@@ -21,21 +19,21 @@ class BaselineError(ValueError):
 
 
 def folder_of(baselines: Path, name: str) -> Path:
-    """Where a baseline is kept.
+    """Return the folder of a baseline.
 
     Raises:
-        BaselineError: no name for a folder.
+        BaselineError: the name is not allowed.
     """
     if not _NAME.fullmatch(name):
-        raise BaselineError(f"baseline {name!r}: a name is made of letters, digits, '.', '_' and '-'")
+        raise BaselineError(f"baseline {name!r}: a name consists of letters, digits, '.', '_' and '-'")
     return baselines / name
 
 
 def newest(folder: Path) -> Path:
-    """The result that was stored last.
+    """Return the result that was stored last.
 
     Raises:
-        BaselineError: there is none.
+        BaselineError: there is no result.
     """
     stored = sorted(folder.glob(_PATTERN))
     if not stored:
@@ -44,7 +42,7 @@ def newest(folder: Path) -> Path:
 
 
 def store(result: Path, folder: Path) -> Path | None:
-    """Store a result; None where it is not valid, for nothing may be measured by it.
+    """Store a result; returns None for an invalid one, which nothing may be compared with.
 
     Raises:
         BaselineError: the folder cannot be written to.

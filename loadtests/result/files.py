@@ -1,6 +1,4 @@
-"""Writing a result: latency.json and one .hgrm file for each series, each in one piece or not at all."""
-
-from __future__ import annotations
+"""The files of a result: latency.json and one .hgrm file for each series, each written completely or not at all."""
 
 import io
 import json
@@ -27,7 +25,7 @@ def write(folder: Path, result: dict[str, Any]) -> Path:
 
 
 def percentile_distribution(encoded: str) -> str:
-    """HdrHistogram's percentile distribution as text, in milliseconds: what its plotter reads."""
+    """Return HdrHistogram's percentile distribution as text, in milliseconds, for its plotter."""
     histogram = HdrHistogram.decode(encoded)
     text = io.BytesIO()
     histogram.output_percentile_distribution(text, _US_PER_MS, _TICKS)

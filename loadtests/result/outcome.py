@@ -1,23 +1,19 @@
-"""What became of a run, as it goes along: the document is made of it in the end."""
-
-from __future__ import annotations
+"""What became of a run, collected while it runs; latency.json is made of it."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from datetime import datetime
+from typing import Any
 
+from loadtests.clients.robot import Robot
+from loadtests.measuring.distributed_executor import Executor
+from loadtests.measuring.end_to_end import Journeys
 from loadtests.measuring.machine import Moment
+from loadtests.measuring.pauses import Paused
 from loadtests.measuring.preflight import Findings
-
-if TYPE_CHECKING:
-    from datetime import datetime
-
-    from loadtests.clients.robot import Robot
-    from loadtests.measuring.distributed_executor import Executor
-    from loadtests.measuring.end_to_end import Journeys
-    from loadtests.measuring.pauses import Paused
-    from loadtests.measuring.robot_process import RobotProcess
-    from loadtests.schedule.plan import Plan, SeriesName
-    from loadtests.settings.settings import Settings
+from loadtests.measuring.robot_process import RobotProcess
+from loadtests.schedule.plan import Plan, SeriesName
+from loadtests.settings.settings import Settings
+from loadtests.statistics.steps import Step
 
 
 class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
@@ -42,13 +38,13 @@ class Outcome:
 
     Attributes:
         robots: the one under load, and the one that it is compared with, if any.
-        findings: of the calls to the first before the run.
-        notes: worth knowing; invalid: makes the run worthless.
+        findings: of the calls to the robot under load before the run.
+        notes: worth knowing; invalid: reasons why the figures are worthless.
         interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
         carried: each repeat's plan, and how many seconds of it were carried out.
-        paused: what requests cost after a pause and behind one another, by series.
+        paused: what requests cost after a pause and right behind one another, by series.
         before: the machine when the run began.
-        robot_process: who listened at the robot's address before the first request of the duel, where that is known.
+        robot_process: the process at the robot's address before the duel, where that is known.
         cpu_share: the busiest worker's share of a core in the duel.
         steps: results of the stepped load.
         knee_searches: results of the searches for the knee; over_connections: of more and more connections.
@@ -69,7 +65,7 @@ class Outcome:
     before: Moment = field(default_factory=Moment.now)
     robot_process: RobotProcess | None = None
     cpu_share: float | None = None
-    steps: list[dict[str, Any]] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
     knee_searches: list[dict[str, Any]] = field(default_factory=list)
     over_connections: list[dict[str, Any]] = field(default_factory=list)
     journeys: dict[str, Journeys] = field(default_factory=dict)

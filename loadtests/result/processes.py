@@ -1,18 +1,14 @@
-"""The `workers` of latency.json, and what is to be said of those that did not do all of their part."""
+"""The `workers` of latency.json, and remarks on those that did not do all of their share."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from loadtests.measuring.executor import Member
 from loadtests.schedule.plan import GAP_S
 from loadtests.statistics import figures
 
-if TYPE_CHECKING:
-    from loadtests.measuring.executor import Member
-
 
 def process_figures(members: list[Member]) -> tuple[list[dict[str, Any]], list[str]]:
-    """An entry for each process, and remarks."""
+    """Return an entry for each process, and remarks on those that did not do their share."""
     found, remarks = [], []
     for member in members:
         lost = member.state == "lost"
@@ -37,23 +33,24 @@ def process_figures(members: list[Member]) -> tuple[list[dict[str, Any]], list[s
 
 
 def _remarks(member: Member, missing: int | None) -> list[str]:
-    """Sentences on one process."""
+    """Return remarks on one process."""
     name, said = f"worker {member.id} ({member.host})", []
     if member.state == "lost":
-        arrivals = "" if missing is None else f", {missing} of its arrivals were never made or never reported"
+        arrivals = "" if missing is None else f", {missing} of its arrivals were not sent or not reported"
         said.append(
             f"{name} was lost {member.lost_at_s or 0.0:.1f} s into the run: "
             f"{member.requests} of its requests are in the result{arrivals}"
         )
     if member.state == "late":
         said.append(
-            f"{name} came {member.joined_at_s or 0.0:.1f} s into the run, when the schedule had been dealt out: "
+            f"{name} joined {member.joined_at_s or 0.0:.1f} s into the run, after the schedule had been distributed: "
             "it took no part"
         )
     clock = member.clock
     if clock is not None and not clock.shared and clock.uncertainty_ns > GAP_S * 1e9:
         said.append(
-            f"{name}: its clock is known to {clock.uncertainty_ns / 1e6:.1f} ms only, more than the {GAP_S * 1e3:g} ms "
-            "of silence between blocks, so that it may still send over one interface while others send over the next"
+            f"{name}: its clock is known to {clock.uncertainty_ns / 1e6:.1f} ms only, more than the gap of "
+            f"{GAP_S * 1e3:g} ms between blocks, so that it may still send over one interface while others "
+            "send over the next"
         )
     return said

@@ -1,14 +1,12 @@
-"""What a run has to say in the end, for the terminal."""
-
-from __future__ import annotations
+"""The summary of a run, for the terminal."""
 
 from typing import Any
 
 _JUDGED = {
     "differs": "a difference",
-    "bounded": "a difference of which only a bound is known",
-    "noise": "cannot be told from noise",
-    "none": "says nothing",
+    "bounded": "a difference, known only by a bound",
+    "noise": "not significant",
+    "none": "inconclusive",
 }
 
 
@@ -17,14 +15,14 @@ def _ms(value: float | None) -> str:
 
 
 def _times(entry: dict[str, Any]) -> str:
-    """A ratio with its interval."""
+    """Return a ratio with its interval."""
     bounds = entry["ci95"]
     sure = f" (95 %: {bounds[0]:.3f} to {bounds[1]:.3f})" if bounds else ""
     return f"{entry['ratio']:.3f}{sure} times"
 
 
 def summary(document: dict[str, Any]) -> str:
-    """A table of the series, the comparisons of medians, thresholds; at the end, where one looks, the headline."""
+    """Return a table of the series, the comparisons of medians, the thresholds, and the headline as the last line."""
     lines = ["operation  interface  client     count  errors  service p50      p90      p99  response p99   (ms)"]
     for entry in document["series"]:
         service, response = entry["service_ms"], entry["response_ms"]
@@ -48,7 +46,7 @@ def summary(document: dict[str, Any]) -> str:
 
 
 def _medians(document: dict[str, Any]) -> list[str]:
-    """Each interface's median beside REST's."""
+    """Return each interface's median beside REST's."""
     soap = [
         f"{entry['operation']} ({entry['client']}): SOAP takes {_times(entry)} as long as REST at the median, "
         f"{entry['soap_minus_rest_ms']:+.3f} ms: {_JUDGED[entry['judgement']]}"
@@ -65,28 +63,28 @@ def _medians(document: dict[str, Any]) -> list[str]:
 
 
 def _knees(document: dict[str, Any]) -> list[str]:
-    """Where the robot gives way, by steps and by bisection."""
+    """Return the rates at which the robot breaks down, by steps and by bisection."""
     lines = []
     for entry in document["knee"]:
         highest = entry["highest_rate"]
         reached = (
-            "no rate offered meets" if highest is None else f"{highest:g}/s is the highest rate offered that meets"
+            "no offered rate meets" if highest is None else f"{highest:g}/s is the highest offered rate that meets"
         )
         lines.append(f"{entry['interface']}: {reached}: {entry['criterion']}")
     for entry in document["knee_search"]:
         if entry["rate"] is not None:
             low, high = entry["interval"]
-            found = f"gives way at {entry['rate']:.0f}/s ({low:.0f} to {high:.0f}, {entry['searches']} searches)"
+            found = f"breaks down at {entry['rate']:.0f}/s ({low:.0f} to {high:.0f}, {entry['searches']} searches)"
         elif entry["held_up_to"] is not None:
-            found = f"did not give way up to {entry['held_up_to']:.0f}/s"
+            found = f"did not break down up to {entry['held_up_to']:.0f}/s"
         else:
-            found = "no rate tried meets the criterion"
+            found = "no rate meets the criterion"
         lines.append(f"{entry['interface']}: {found}")
     return lines
 
 
 def _against(compared: dict[str, Any] | None) -> list[str]:
-    """What the comparison with another robot found, a line for each figure that is judged."""
+    """Return what the comparison with another robot found, a line for each judged figure."""
     if compared is None:
         return []
     lines = []
@@ -101,12 +99,12 @@ def _against(compared: dict[str, Any] | None) -> list[str]:
 
 
 def _end_to_end(found: dict[str, Any] | None) -> list[str]:
-    """How long a delivery takes over each way until the application has it."""
+    """Return how long a delivery takes over each way until the application has it."""
     lines = []
     for entry in (found or {"ways": []})["ways"]:
         times, lost = entry["to_application_ms"], entry["lost"] + entry["errors"]
         answer = entry["answer_ms"]["p50"] if entry["answer_ms"] else None
-        answered = "" if answer is None else f", the answer after {answer:.3f} ms"
+        answered = "" if answer is None else f", the response after {answer:.3f} ms"
         missing = f", {lost} never arrived" if lost else ""
         lines.append(
             f"{entry['interface']} to the application: {_ms(times['p50']).strip()} ms at the median, "

@@ -1,25 +1,22 @@
 """A clock that rings at an absolute time, inside gevent's loop.
 
-On Linux a timerfd on CLOCK_MONOTONIC, watched by the loop like a socket. A process that has slept for milliseconds
-wakes up some 0.1 ms late, for its processor has slept too; so the timer goes off a little early and the loop turns
-without sleeping until the time has come, which takes at most an eighth of a processor and is right to a few
-microseconds. Sockets are served all the while: an answer never waits for the next request.
-gevent.sleep wakes on libev's millisecond grid, which would drown a service time of 0.1 ms. Where there is no
-timerfd the loop's own timer serves, and the result says so.
-"""
+On Linux it is a timerfd on CLOCK_MONOTONIC, watched by the loop like a socket. A process that has slept for
+milliseconds wakes up some 0.1 ms late, because its processor has slept too. So the timer goes off a little early, and
+the loop spins until the time has come: that takes at most an eighth of a processor and is exact to a few microseconds.
+Sockets are served all the while: a response never waits for the next request.
 
-from __future__ import annotations
+gevent.sleep wakes on libev's millisecond grid, which would hide a service time of 0.1 ms. Where there is no timerfd the
+loop's own timer is used, and the result says so.
+"""
 
 import ctypes
 import os
 import sys
 import time
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable
+from typing import Any, Protocol
 
 from gevent.hub import get_hub
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _SECOND_NS = 1_000_000_000
 _READ = 1  # libev's EV_READ
@@ -32,7 +29,7 @@ _TFD_FLAGS = os.O_NONBLOCK | os.O_CLOEXEC if hasattr(os, "O_CLOEXEC") else 0  # 
 
 
 class Alarm(Protocol):
-    """Calls back in the hub at the time that it was set to; setting it again replaces the earlier time."""
+    """Calls back in the hub at a given time; setting it again replaces the earlier time."""
 
     name: str
 
@@ -40,7 +37,7 @@ class Alarm(Protocol):
         """Ring at `at_ns` (time.monotonic_ns); a time gone by rings at once."""
 
     def close(self) -> None:
-        """Ring no more."""
+        """Cancel the alarm."""
 
 
 class _Timespec(ctypes.Structure):
@@ -52,7 +49,7 @@ class _Itimerspec(ctypes.Structure):
 
 
 class TimerfdAlarm:
-    """timerfd_create(2). Python has it as os.timerfd_create from 3.13 on; by ctypes it is the same everywhere."""
+    """timerfd_create(2), by ctypes: Python has os.timerfd_create only from 3.13 on."""
 
     name = "timerfd"
 
@@ -100,7 +97,7 @@ class TimerfdAlarm:
             raise OSError(ctypes.get_errno(), "timerfd_settime failed")
 
     def close(self) -> None:
-        """Ring no more."""
+        """Cancel the alarm."""
         if self._fd >= 0:
             self._awake.stop()
             self._awake.close()
@@ -127,7 +124,7 @@ class LoopAlarm:
         self._timer.start(self._ring, update=True)
 
     def close(self) -> None:
-        """Ring no more."""
+        """Cancel the alarm."""
         if self._timer is not None:
             self._timer.stop()
             self._timer.close()
@@ -135,5 +132,5 @@ class LoopAlarm:
 
 
 def make_alarm(ring: Callable[[], None]) -> Alarm:
-    """The best alarm of this system."""
+    """Return the best alarm of this system."""
     return TimerfdAlarm(ring) if sys.platform == "linux" else LoopAlarm(ring)

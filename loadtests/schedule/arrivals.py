@@ -1,10 +1,8 @@
-"""When requests start: constant spacing or a Poisson process, fixed by the seed, dealt out to the workers.
+"""When requests start: constant spacing or a Poisson process, fixed by the seed, divided among the workers.
 
-Every worker computes the whole schedule and takes its own share of each segment, so that the shares add up to
-the schedule without any message between them.
+Every worker computes the whole schedule and takes its own share of each segment, so that the shares add up to the
+schedule without any message between workers.
 """
-
-from __future__ import annotations
 
 from collections import Counter
 
@@ -17,7 +15,7 @@ _NS = 1_000_000_000
 
 
 class Schedule:
-    """The share of a plan that falls to one of so many workers; they are numbered from 0."""
+    """One worker's share of a plan; workers are numbered from 0."""
 
     def __init__(self, plan: Plan, worker: int, workers: int) -> None:
         if not 0 <= worker < workers:
@@ -29,9 +27,9 @@ class Schedule:
         self._before = self._counted_before()
 
     def _counted(self) -> list[int]:
-        """Arrivals of each segment over all workers: at the rate asked for, for as long as the segment is open.
+        """Return the arrivals of each segment over all workers: the rate times the time that the segment is open.
 
-        Constant: rounding errors do not add up over segments.
+        With constant spacing, rounding errors do not add up over segments.
         """
         plan = self.plan
         if not plan.open_model:
@@ -51,9 +49,9 @@ class Schedule:
         return counts
 
     def _counted_before(self) -> list[int]:
-        """Arrivals of a segment's client and interface in the segments before it.
+        """Return how many arrivals a segment's client and interface had in the segments before it.
 
-        Workers and operations take turns from there on: in short blocks whoever comes first would get more.
+        Workers and operations continue in turn from there: in short blocks the first one would otherwise get more.
         """
         so_far: Counter[tuple[str, str, str]] = Counter()
         before = []
@@ -67,52 +65,44 @@ class Schedule:
         return np.random.default_rng([self.plan.load.seed, purpose, self.plan.first_segment + segment])
 
     def count(self) -> int:
-        """How many segments there are."""
+        """Return how many segments there are."""
         return len(self.plan.segments)
 
-    def starts_ns(self, segment: int) -> int:
-        """Offset at which a segment's requests may start: after the quiet gap."""
-        return self.plan.segments[segment].opens_ns
-
-    def ends_ns(self, segment: int) -> int:
-        """Offset of a segment's end."""
-        return self.plan.segments[segment].end_ns
-
     def operations(self, segment: int) -> tuple[int, ...]:
-        """The operations that a segment's interface and client offer, by number."""
+        """Return the numbers of the operations that a segment's interface and client offer."""
         found = self.plan.segments[segment]
         return self.plan.offered(found.interface, found.client)
 
     def users(self) -> int:
-        """How many users of the closed model are this worker's."""
+        """Return how many users of the closed model are this worker's."""
         return len(range(self.worker, self.plan.load.users or 0, self.workers))
 
     def total(self, segment: int) -> int:
-        """A segment's arrivals over all workers."""
+        """Return a segment's arrivals over all workers."""
         return self._counts[segment]
 
     def share(self, segment: int) -> int:
-        """How many of a segment's arrivals are this worker's."""
+        """Return how many of a segment's arrivals are this worker's."""
         return len(self._mine(segment))
 
     def _mine(self, segment: int) -> range:
-        """The places of this worker's arrivals among a segment's."""
+        """Return the places of this worker's arrivals among a segment's."""
         return range((self.worker - self._before[segment]) % self.workers, self._counts[segment], self.workers)
 
     def due_ns(self, segment: int) -> list[int]:
-        """The offsets of all arrivals in a segment, over all workers, in order."""
+        """Return the offsets of all arrivals in a segment, over all workers, in order."""
         count = self._counts[segment]
-        start, end = self.starts_ns(segment), self.ends_ns(segment)
+        start, end = self.plan.segments[segment].opens_ns, self.plan.segments[segment].end_ns
         rng = self._rng(segment, 3)
         if self.plan.load.arrivals == "poisson":
             places = np.sort(rng.random(count))
-        else:  # a phase by lot, lest the schedule beat with the robot's own clock
+        else:  # a random phase, so that the schedule does not beat with the robot's clock
             places = (np.arange(count) + rng.random()) / max(count, 1)
         due: list[int] = (start + places * (end - start)).astype(np.int64).tolist()
         return due
 
     def arrivals(self, segment: int) -> list[tuple[int, int, int]]:
-        """This worker's arrivals in a segment: (offset in ns, operation, payload), in order."""
+        """Return this worker's arrivals in a segment: (offset in ns, operation, payload), in order."""
         due = self.due_ns(segment)
         kinds = np.resize(np.roll(self.operations(segment), -self._before[segment]), len(due))
         rng = self._rng(segment, 4)
@@ -123,7 +113,7 @@ class Schedule:
 
 
 def arrivals_due(plan: Plan, elapsed_s: float, *, phase: str, interface: str | None = None) -> int:
-    """Arrivals of a phase that were due in the segments that were over by then."""
+    """Return how many arrivals of a phase were due in the segments that had ended by then."""
     schedule = Schedule(plan, 0, 1)
     return sum(
         schedule.total(index)

@@ -1,15 +1,14 @@
 """Starts requests at their times.
 
-The pacer runs in gevent's hub, rung by an alarm. In the open model it hands each due arrival to a user that
-waits; when none does, the arrival waits for the next user that becomes free, its response time running on,
-and is dropped (and counted) once its deadline has passed. In the closed model it only opens and closes the
-gate of each segment: every user takes its next request as soon as it has finished the last.
+The pacer runs in gevent's hub, woken by an alarm. In the open model it hands each due arrival to a waiting user. When
+no user is free the arrival waits for the next one, while its response time runs on; once its deadline has passed it is
+dropped and counted. In the closed model the pacer only opens and closes the gate of each segment: every user takes its
+next request as soon as it has finished the last.
 """
 
-from __future__ import annotations
-
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import gevent
 from gevent.event import Event
@@ -17,17 +16,13 @@ from gevent.hub import Waiter
 
 from loadtests.clients.wire import now_ns
 from loadtests.schedule.alarm import make_alarm
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.arrivals import Schedule
 
 
 class Arrival(NamedTuple):
-    """One request to make: where it stands in the plan, which operation, which payload, and when (monotonic ns).
+    """One request to send: its segment, operation and payload, and when it is due (monotonic ns).
 
-    `queued`: no user was free when it was due, so that its delay is the robot's affair and not the pacer's.
+    `queued`: no user was free when it was due, so that its delay is due to the robot and not to the pacer.
     """
 
     segment: int
@@ -43,7 +38,7 @@ class Pacer:
     Args:
         timeout_ns: an arrival older than this is dropped.
         on_segment: called in the quiet gap before each segment, with its index.
-        on_drop: called with an arrival that nobody could start.
+        on_drop: called with an arrival that no user could start.
     """
 
     def __init__(self, timeout_ns: int, on_segment: Callable[[int], None], on_drop: Callable[[Arrival], None]) -> None:
@@ -68,7 +63,7 @@ class Pacer:
 
     @property
     def waiting(self) -> int:
-        """Users that are ready to take a request."""
+        """Return how many users are ready to take a request."""
         return len(self._idle)
 
     def start(self, schedule: Schedule, origin_ns: int, *, open_model: bool, interval_ns: int = 0) -> None:
@@ -89,7 +84,7 @@ class Pacer:
         self.done.set()
 
     def give_up(self) -> None:
-        """Drop what nobody has started yet."""
+        """Drop the arrivals that no user has started yet."""
         while self._backlog:
             self.on_drop(self._backlog.popleft())
 
@@ -100,7 +95,7 @@ class Pacer:
         self._alarm.close()
 
     def take(self) -> Arrival:
-        """Wait for the next request to make. Called by a user."""
+        """Wait for the next request to send. Called by a user."""
         if self.open_model:
             while self._backlog:
                 late = self._backlog.popleft()
@@ -124,7 +119,7 @@ class Pacer:
         return arrival
 
     def _wait_turn(self, now: int) -> int:
-        """Keep the closed model below its ceiling; returns the time at which the caller may go on."""
+        """Keep the closed model below its ceiling; returns the time at which the caller may continue."""
         mine = max(self._free_at, now)
         self._free_at = mine + self.interval_ns
         if mine > now:
@@ -132,7 +127,7 @@ class Pacer:
         return now_ns()
 
     def _in_turn(self, schedule: Schedule, now: int) -> Arrival:
-        """The closed model's next request: operations one after the other, payloads likewise."""
+        """Return the closed model's next request: operations and payloads in rotation."""
         operations = schedule.operations(self._segment)
         self._turn += 1
         return Arrival(self._segment, operations[self._turn % len(operations)], self._turn // len(operations), now)
@@ -153,9 +148,9 @@ class Pacer:
         if self._position < len(self._due):
             at = self._due[self._position][0]
         elif not self.open_model and self._closes == 0:
-            at = schedule.starts_ns(self._segment)
+            at = schedule.plan.segments[self._segment].opens_ns
         else:
-            at = schedule.ends_ns(self._segment)
+            at = schedule.plan.segments[self._segment].end_ns
         self._alarm.set(self._origin + at)
 
     def _ring(self) -> None:
@@ -186,18 +181,18 @@ class Pacer:
         self._arm(schedule)
 
     def _open_gate(self, schedule: Schedule) -> None:
-        """The closed model: the segment begins, or is over."""
+        """Begin a segment of the closed model, or end it."""
         if self._closes:
             self._closes = 0
             self._next_segment()
             return
-        self._closes = self._origin + schedule.ends_ns(self._segment)
+        self._closes = self._origin + schedule.plan.segments[self._segment].end_ns
         wanted = schedule.users()
         waiting, self._idle = self._idle[:wanted], self._idle[wanted:]
         for waiter in waiting:
             now = now_ns()
             if now < self._closes:
                 waiter.switch(self._in_turn(schedule, now))
-            else:  # this process was held up until the segment was over: a request of now is none of its
+            else:  # this process was delayed until the segment was over: a request now would not belong to it
                 self._idle.append(waiter)
         self._arm(schedule)

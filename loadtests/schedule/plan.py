@@ -1,22 +1,20 @@
 """What a run does when: segments of one client on one interface, a schedule that the seed fixes.
 
-A fair duel: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse by lot (ABBA).
-A machine's level wanders within a second: the sooner one follows the other, the more of it they share. A block has to
-be long beside an answer, though, for what is under way when it ends meets the other interface. In two quartets of
-five one interface meets itself under two names (A/A): what difference that shows is noise, and it is given as
-much time as the duel, so that it is known as well as the effect is. The library clients get quartets of their
-own, for their CPU time would delay the wire client's starts.
+A fair duel: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse at random (ABBA).
+The machine's speed drifts within a second: the sooner one follows the other, the more they share of it. But a block has
+to be long beside a response, because requests under way at its end overlap with the other interface. In two quartets of
+five, one interface meets itself under two names (the A/A control): the difference that this shows is noise. It gets as
+much time as the duel, so that it is known as exactly as the effect. The library clients have quartets of their own,
+because their CPU time would delay the wire client's starts.
 
-Three interfaces take turns likewise, in sextets; two robots over one interface in each quartet.
+Three interfaces take turns in the same way, in sextets; two robots over one interface in each quartet.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count, product
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 import numpy as np
@@ -54,9 +52,9 @@ class Segment:
         start_ns, end_ns: offsets from the run's start.
         phase: `warmup`, `duel`, `aa`, `against` (the duel's blocks of the other robot) or `step`.
         label: in phase `aa` the name that the interface goes by, `a` or `b`.
-        pair: neighbours that are compared share a number.
+        pair: neighbours that are compared with one another share a number.
         rate: arrivals per second over all workers; 0 in the closed model.
-        robot: which robot is called: 0, or 1 for the one that it is compared with.
+        robot: 0, or 1 for the robot that it is compared with.
     """
 
     start_ns: int
@@ -71,22 +69,22 @@ class Segment:
 
     @property
     def opens_ns(self) -> int:
-        """Offset at which its requests may start: after the quiet gap."""
+        """Return the offset at which its requests may start: after the quiet gap."""
         return self.start_ns + min(int(GAP_S * _NS), (self.end_ns - self.start_ns) // 8)
 
     @property
     def active_s(self) -> float:
-        """For how long its requests may start."""
+        """Return for how long its requests may start."""
         return (self.end_ns - self.opens_ns) / _NS
 
 
 @dataclass(frozen=True)
 class Load:
-    """How much is asked of the robot, and for how long.
+    """How many requests the robot gets, and for how long.
 
     Attributes:
         rate: arrivals per second over all workers (open model); None in the closed model.
-        users: users that each wait for their answer (closed model).
+        users: users that each wait for their response (closed model).
         arrivals: `constant` or `poisson`.
         seed: fixes schedule, payloads and intervals.
     """
@@ -105,11 +103,11 @@ class Plan:
 
     Attributes:
         offers: operation numbers by `interface/client`, where not all are offered.
-        robots: 2 where two robots meet in place of two interfaces.
-        first_segment: numbers the segments on from those of the plan before it.
+        robots: 2 where two robots are compared instead of two interfaces.
+        first_segment: number of its first segment; numbers go on from plan to plan.
         step_rate: a step of the stepped load instead of a duel: arrivals per second; 0 in the closed model.
-        connections: users that are up in all; in the closed model as many take part as the load says.
-        repeat: which of several runs of the same plan this is; those after the first begin with new connections.
+        connections: users started in total; in the closed model as many take part as the load says.
+        repeat: which repeat of the duel this is; repeats after the first begin with new connections.
         offset_s: when it starts, in seconds of load since the first one's start.
         least_block_s: BLOCK_S, or SHORT_BLOCK_S where the robot is known to be quick.
     """
@@ -131,22 +129,22 @@ class Plan:
     least_block_s: float = BLOCK_S
 
     def as_message(self) -> dict[str, Any]:
-        """A form that msgpack carries."""
+        """Return the plan in a form that msgpack carries."""
         message: dict[str, Any] = msgspec.to_builtins(self)
         return message
 
     @classmethod
-    def from_message(cls, message: dict[str, Any]) -> Plan:
-        """Read what `as_message` wrote."""
+    def from_message(cls, message: dict[str, Any]) -> Self:
+        """Return the plan that `as_message` wrote."""
         return msgspec.convert(message, cls)
 
     def offered(self, interface: str, client: str) -> tuple[int, ...]:
-        """The operations that a client can call over an interface, by number."""
+        """Return the numbers of the operations that a client can call over an interface."""
         found = self.offers.get(f"{interface}/{client}")
         return tuple(range(len(self.operations))) if found is None else tuple(found)
 
     def series_names(self) -> list[SeriesName]:
-        """Everything that is measured."""
+        """Return the names of everything that is measured."""
         return [
             (self.operations[number], interface, client)
             for client in self.clients
@@ -156,17 +154,17 @@ class Plan:
 
     @property
     def open_model(self) -> bool:
-        """Requests start at their times, whether or not earlier ones have come back."""
+        """Return whether requests start on schedule, whether or not earlier ones have been answered."""
         return self.load.users is None
 
     @cached_property
     def blocks(self) -> int:
-        """How many blocks the duel has: whole rounds, or half of one where there is no time for more."""
+        """Return how many blocks the duel has: whole rounds, or half of one where there is no time for more."""
         return len(self._rounds)
 
     @cached_property
     def _rounds(self) -> list[Segment]:
-        """The duel's blocks in their order, without their times."""
+        """Return the duel's blocks in order, without their times."""
         arrivals = _ARRIVALS_PER_BLOCK * len(self.operations)
         least = max(self.least_block_s, self.load.duration_s / _MAX_BLOCKS, arrivals / (self.load.rate or math.inf))
         most = int(self.load.duration_s / least + 1e-9)
@@ -181,24 +179,24 @@ class Plan:
 
     @property
     def block_s(self) -> float:
-        """Length of a block."""
+        """Return the length of a block."""
         return self.load.duration_s / self.blocks
 
     @cached_property
     def segments(self) -> list[Segment]:
-        """All segments in order; their numbers begin at `first_segment`."""
+        """Return all segments in order; their numbers begin at `first_segment`."""
         return self._steps() if self.step_rate is not None else [*self._warmup(), *self._duel()]
 
     def active_s(self, elapsed_s: float, phases: tuple[str, ...]) -> float:
-        """For how long requests of some phases may have started in the segments that were over by then."""
+        """Return for how long requests of some phases could start in the segments that had ended by then."""
         return sum(
             segment.active_s
             for segment in self.segments
             if segment.phase in phases and segment.end_ns <= elapsed_s * _NS + 1
         )
 
-    def again(self) -> Plan:
-        """The same once more, after this one, with the lots drawn anew."""
+    def again(self) -> Self:
+        """Return the next repeat, after this one, with its random order drawn anew."""
         return replace(
             self,
             repeat=self.repeat + 1,
@@ -208,7 +206,7 @@ class Plan:
 
     @cached_property
     def length_s(self) -> float:
-        """From start to end."""
+        """Return the time from start to end."""
         return self.segments[-1].end_ns / _NS if self.segments else 0.0
 
     def _warmup(self) -> list[Segment]:
@@ -237,9 +235,9 @@ class Plan:
         return placed
 
     def _round(self, number: int, *, swapped: bool) -> list[Segment]:
-        """All sides in turn, and then in reverse: four blocks of two sides, six of three.
+        """Return the blocks of all sides in order and then in reverse: four blocks of two sides, six of three.
 
-        Of five rounds the second goes to the library clients, the third and the fifth to A/A.
+        Of five rounds the second goes to the library clients, the third and the fifth to the A/A control.
         """
         turn = number % _TURNS
         client = self.clients[-1] if turn == _LIBRARY_TURN else self.clients[0]
@@ -256,7 +254,7 @@ class Plan:
         if swapped:
             sides.reverse()
         if len(sides) == 1:
-            sides *= 2  # one interface alone has as many blocks
+            sides *= 2  # one interface alone gets as many blocks
         rate = self.load.rate or 0.0
         return [
             Segment(0, 0, phase, interface, client, label, 2 * number + half, rate, robot)
@@ -265,7 +263,7 @@ class Plan:
         ]
 
     def _steps(self) -> list[Segment]:
-        """One step of the stepped load: each interface for `duration_s`, with quiet between to drain what piled up."""
+        """Return one step: each interface for `duration_s`, with a pause between for queues to drain."""
         made = []
         at = 0.0
         for interface in self.interfaces:
@@ -277,7 +275,7 @@ class Plan:
         return made
 
     def series_of(self) -> dict[int, int]:
-        """The series number of each segment."""
+        """Return the series number of each segment."""
         return {
             self.first_segment + index: SERIES.index((segment.phase, segment.interface, segment.client))
             for index, segment in enumerate(self.segments)
@@ -294,6 +292,6 @@ SERIES = [
 
 
 def step_operation(operations: tuple[str, ...]) -> int:
-    """The operation of the stepped load: a read where there is one, for it goes far beyond what is usual."""
+    """Return the operation of the steps: a read where there is one, because their rates are unusually high."""
     reads = [number for number, name in enumerate(operations) if name not in MOVES]
     return reads[0] if reads else 0

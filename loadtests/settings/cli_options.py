@@ -1,31 +1,27 @@
-"""The command line's options, as they were given."""
-
-from __future__ import annotations
+"""The options of the command line."""
 
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 from conformance.packs.table1.statement import Statement
+from conformance.packs.table1.thresholds import Threshold
 from conformance.statement.statement import Endpoints
 from loadtests.settings.settings import STEP_S, Generator, Repeats, Selection
 
 TOLERANCE = 0.05
 KNEE_SEARCHES = 5
 
-if TYPE_CHECKING:
-    from conformance.packs.table1.thresholds import Threshold
-
 
 @dataclass(frozen=True)
 class CliOptions:
-    """None or empty where an option was not given.
+    """The options as given; None or empty where an option was not given.
 
     Attributes:
-        endpoints: those that were given of the statement's [endpoints], which they override.
-        rosbridge: its address.
-        against: what is said of the other robot.
-        ros_domain_id: the robot's, which the statement may say as well.
-        tolerance: by which share the robot may be slower than that.
+        endpoints: override the statement's [endpoints].
+        rosbridge: address of the rosbridge.
+        against: the other robot.
+        ros_domain_id: the robot's ROS domain, if the statement does not say.
+        tolerance: by which share the robot may be slower than the other one.
     """
 
     endpoints: dict[str, Any] = field(default_factory=dict)
@@ -55,8 +51,8 @@ class CliOptions:
     command: str = ""
 
     @classmethod
-    def of(cls, **given: Any) -> CliOptions:
-        """Sort options by their names into the groups that they belong to."""
+    def of(cls, **given: Any) -> Self:
+        """Return options grouped as the settings are, from options by name."""
         endpoints = _take(given, Endpoints.__struct_fields__)
         endpoints = {name: value for name, value in endpoints.items() if value not in {None, ""}}
         selection = Selection(**_take(given, [item.name for item in fields(Selection)]))

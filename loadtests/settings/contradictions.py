@@ -1,12 +1,9 @@
-"""What options contradict one another, or lie out of range, before anything else is looked at."""
-
-from __future__ import annotations
+"""Options that contradict one another or are out of range."""
 
 import shlex
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from loadtests.settings.cli_options import CliOptions
+from loadtests.settings.cli_options import CliOptions
 
 _MOST_RATE = 1_000_000.0
 _MOST_USERS = 10_000
@@ -15,13 +12,13 @@ _MOST_DURATION_S = 24 * 3600.0
 
 
 def contradiction(options: CliOptions) -> str | None:
-    """What is wrong with options by themselves, and what to do; None where nothing is."""
+    """Return what is wrong with the options and what to change; None where nothing is."""
     if options.rate is not None and options.users is not None:
         return "--rate (open model) and --users (closed model) exclude each other"
     if options.users is not None and (options.steps or options.step_rates or options.knee):
-        return "--steps and --knee offer rates, which is an open model: give --rate instead of --users"
+        return "--steps and --knee set rates, which is an open model: use --rate instead of --users"
     if options.generator.processes + options.generator.expect < 1:
-        return "--processes 0 leaves the work to others: say how many with --expect-workers"
+        return "--processes 0 leaves the work to other machines: say how many workers with --expect-workers"
     ranges: list[tuple[str, Any, float, float]] = [
         ("--rate", options.rate, 0.0, _MOST_RATE),
         ("--users", options.users, 0, _MOST_USERS),
@@ -40,12 +37,12 @@ def contradiction(options: CliOptions) -> str | None:
 
 
 def _restarting(options: CliOptions) -> str | None:
-    """The same of the command that starts the robot anew."""
+    """Return what is wrong with the command that restarts the robot."""
     command = options.repeats.restart_command
     if command is None:
         return None
     if options.repeats.number < 2:  # noqa: PLR2004 -- there is nothing between the repeats of one
-        return "--restart-command starts the robot anew between repeats: say how many with --repeat"
+        return "--restart-command restarts the robot between repeats: say how many with --repeat"
     try:
         words = shlex.split(command)
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""A run, ready to be carried out: frozen groups of values, each passed whole to whom it concerns."""
+"""The settings of a run, in frozen groups: each group goes to the code that needs it."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -14,7 +14,7 @@ STEP_S = 3.0
 
 @dataclass(frozen=True)
 class Selection:
-    """What is measured; each empty in the options where all that there is is meant."""
+    """What to measure; in the options, an empty field means everything."""
 
     operations: tuple[str, ...] = ()
     interfaces: tuple[str, ...] = ()
@@ -26,11 +26,11 @@ class Steps:
     """The loads after the duel.
 
     Attributes:
-        rates: of the stepped load, arrivals per second; none where it is not asked for.
-        step_s: seconds for each step.
-        most_rate: the highest rate that is allowed for the operation that is stepped.
-        knee_searches: how often the knee is searched by bisection; 0: not at all.
-        connections: numbers of connections that are always busy.
+        rates: of the steps, in arrivals per second; empty for no steps.
+        step_s: seconds of each step.
+        most_rate: the highest rate allowed for the operation that is stepped.
+        knee_searches: how often to search the knee by bisection; 0 for not at all.
+        connections: numbers of connections to keep busy.
     """
 
     rates: tuple[float, ...] = ()
@@ -41,13 +41,13 @@ class Steps:
 
     @property
     def asked(self) -> bool:
-        """Whether there is anything to do after the duel."""
+        """Return whether there is anything to do after the duel."""
         return bool(self.rates or self.knee_searches or self.connections)
 
 
 @dataclass(frozen=True)
 class Repeats:
-    """How often the duel is run, and the command that starts the robot anew before each time but the first."""
+    """How often to run the duel, and the command that restarts the robot before each repeat but the first."""
 
     number: int = 1
     restart_command: str | None = None
@@ -55,7 +55,7 @@ class Repeats:
 
 @dataclass(frozen=True)
 class Limits:
-    """What the statement allows, or the default for what moves a robot: requests per second, and seconds."""
+    """What the statement allows, or the default for operations that move the robot: requests per second, seconds."""
 
     max_rate: float | None
     max_duration_s: float | None
@@ -63,13 +63,13 @@ class Limits:
 
 @dataclass(frozen=True)
 class Generator:
-    """The processes that make the load, and where they are watched.
+    """The processes that generate the load, and where to watch them.
 
     Attributes:
         processes: workers on this machine.
-        expect: workers in all, those of other machines included; 0 when only this process works.
+        expect: workers on all machines; 0 when this process alone generates the load.
         master_host, master_port: where the master listens for workers; port 0 picks a free one.
-        web_host: where Locust's web UI (`web_port`) and Prometheus' metrics (`metrics_port`) are, if anywhere.
+        web_host: where Locust's web UI (`web_port`) and the metrics for Prometheus (`metrics_port`) listen.
     """
 
     processes: int = 1
@@ -83,7 +83,7 @@ class Generator:
 
 @dataclass(frozen=True)
 class Output:
-    """The result's folder; and what the result repeats: the command line, and the robot's name, vendor and version."""
+    """The result's folder, and what the result repeats: command line, and the robot's name, vendor and version."""
 
     folder: str
     command: str
@@ -96,8 +96,9 @@ class EndToEnd:
 
     Attributes:
         domain_id: the robot's ROS domain.
-        rounds: how many deliveries over each way, where they take no longer than `longest_s`.
         most_rate: the highest rate allowed.
+        longest_s: the measurement ends after this time.
+        rounds: how many deliveries over each way, if time allows.
     """
 
     domain_id: int
@@ -108,12 +109,7 @@ class EndToEnd:
 
 @dataclass(frozen=True)
 class Against:
-    """The robot that the one under load is compared with.
-
-    Attributes:
-        robot: its addresses.
-        tolerance: by which share the robot under load may be slower.
-    """
+    """The other robot, which the one under load is compared with, and by which share that one may be slower."""
 
     robot: Robot
     tolerance: float
@@ -121,13 +117,13 @@ class Against:
 
 @dataclass(frozen=True)
 class Settings:
-    """A run. Whatever was not asked for is filled in.
+    """The settings of a run, complete.
 
     Attributes:
         robot: addresses of the selected interfaces only; a SOAP address that only the WSDL knows is None.
-        load: rate is None in the closed model.
+        load: its rate is None in the closed model.
         against: None where no other robot takes part.
-        end_to_end: None where it was not asked for.
+        end_to_end: None where it is not wanted.
     """
 
     robot: Robot
@@ -143,10 +139,10 @@ class Settings:
     end_to_end: EndToEnd | None = None
 
     def to_json(self) -> str:
-        """For the process that measures."""
+        """Return the settings for the process that measures."""
         return msgspec.json.encode(self).decode()
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Read what `to_json` wrote."""
+        """Return the settings that `to_json` wrote."""
         return msgspec.json.decode(text, type=cls)

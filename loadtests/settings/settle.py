@@ -1,44 +1,42 @@
-"""From options and statement to settings: options over statement over defaults."""
+"""Settings from options and statement: options win over the statement, which wins over the defaults."""
 
-from __future__ import annotations
-
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Self
 
 import msgspec
 
+from conformance.packs.table1.statement import Statement
+from conformance.statement.statement import Endpoints
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS, Load
+from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.contradictions import contradiction
 from loadtests.settings.settings import Against, EndToEnd, Limits, Output, Selection, Settings, Steps
-
-if TYPE_CHECKING:
-    from conformance.packs.table1.statement import Statement
-    from conformance.statement.statement import Endpoints
-    from loadtests.settings.cli_options import CliOptions
 
 DEFAULT_RATE = 200.0
 DEFAULT_DURATION_S = 20.0
 DEFAULT_WARMUP_S = 2.0
 DEFAULT_STEP_RATES = (100.0, 200.0, 400.0, 800.0, 1600.0, 3200.0, 6400.0, 12800.0)
-#: For anything that moves a robot, unless its statement's [load] says otherwise.
+#: Limits on operations that move the robot, unless its statement's [load] says otherwise.
 MOTION_RATE = 500.0
 MOTION_DURATION_S = 120.0
 _MOST_TOLERANCE = 10.0
+_DEFAULT_LIMIT = "the default limit for operations that move the robot; the statement's [load] {} lifts it"
 
 
 class SettingsError(ValueError):
-    """A run that cannot be, or must not be; the message says what to change."""
+    """Settings that are impossible or not allowed; the message says what to change."""
 
 
 def settle(options: CliOptions, statement: Statement) -> Settings:
-    """Fill in and check.
+    """Return the settings of a run: options over statement over defaults.
 
     Raises:
-        SettingsError: contradictions, values out of range, limits of the statement exceeded, motion not allowed.
+        SettingsError: options contradict one another, are out of range, exceed the statement's limits, or ask for
+            motion without --allow-motion.
     """
     endpoints = msgspec.structs.replace(statement.endpoints, **options.endpoints)
     _check_endpoints(endpoints)
@@ -50,7 +48,11 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
     wrong = contradiction(options)
     if wrong is not None:
         raise SettingsError(wrong)
-    rate, duration_s = _bounded(options, statement, operations)
+    allowed = _Allowed.of(statement, operations)
+    # Defaults are lowered to what is allowed; options that exceed it are refused.
+    rate = None if options.users is not None else (options.rate or min(DEFAULT_RATE, allowed.rate or DEFAULT_RATE))
+    duration_s = options.duration_s or min(DEFAULT_DURATION_S, allowed.duration_s or DEFAULT_DURATION_S)
+    allowed.check(rate, duration_s, options.repeats.number)
     generator = options.generator
     clients = tuple(name for name in CLIENTS if name in (options.selection.clients or CLIENTS))
     if options.against is not None:
@@ -68,45 +70,80 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
         ),
         steps=_steps(options, statement, operations),
         repeats=options.repeats,
-        limits=Limits(_ceiling(statement, operations)[0], _longest(statement, operations)[0]),
+        limits=Limits(allowed.rate, allowed.duration_s),
         generator=replace(
             generator, expect=max(generator.expect, generator.processes if generator.processes > 1 else 0)
         ),
         output=Output(options.out, options.command, statement.robot),
         thresholds=options.thresholds or statement.load.thresholds,
-        end_to_end=_end_to_end(options, statement, operations, duration_s),
+        end_to_end=_end_to_end(options, statement, operations, allowed.rate, duration_s),
     )
     return settings if options.against is None else _compared(settings, options.against, options.tolerance)
 
 
+@dataclass(frozen=True)
+class _Allowed:
+    """The highest rate and the longest duration that a statement allows, and what says so; None without a limit."""
+
+    rate: float | None
+    rate_by: str
+    duration_s: float | None
+    duration_by: str
+
+    @classmethod
+    def of(cls, statement: Statement, operations: tuple[str, ...]) -> Self:
+        """Return the limits of a statement, or those by default for operations that move the robot."""
+        moves = MOVES.intersection(operations)
+        rates, duration = [], (statement.load.max_duration_s, "the statement's [load] max_duration_s")
+        if statement.endpoints.request_rate is not None:
+            rates.append((statement.endpoints.request_rate, "the statement's [endpoints] request_rate"))
+        if statement.load.max_rate is not None:
+            rates.append((statement.load.max_rate, "the statement's [load] max_rate"))
+        elif moves:
+            rates.append((MOTION_RATE, _DEFAULT_LIMIT.format("max_rate")))
+        if duration[0] is None and moves:
+            duration = MOTION_DURATION_S, _DEFAULT_LIMIT.format("max_duration_s")
+        rate, rate_by = min(rates) if rates else (None, "")
+        return cls(rate, rate_by, *duration)
+
+    def check(self, rate: float | None, duration_s: float, repeats: int, whose: str = "") -> None:
+        """Refuse a load that exceeds the limits."""
+        if rate is not None and self.rate is not None and rate > self.rate:
+            raise SettingsError(f"--rate {rate:g} exceeds {self.rate:g} requests/s ({self.rate_by}{whose})")
+        if self.duration_s is not None and duration_s * repeats > self.duration_s:
+            times = f" {repeats} times" if repeats > 1 else ""
+            raise SettingsError(
+                f"--duration {duration_s:g}{times} exceeds {self.duration_s:g} s ({self.duration_by}{whose})"
+            )
+
+
 def _end_to_end(
-    options: CliOptions, statement: Statement, operations: tuple[str, ...], duration_s: float
+    options: CliOptions, statement: Statement, operations: tuple[str, ...], most_rate: float | None, duration_s: float
 ) -> EndToEnd | None:
-    """What --end-to-end needs: deliveries, and the domain in which they arrive."""
     if not options.end_to_end:
         return None
     domain_id = statement.ros.domain_id if options.ros_domain_id is None else options.ros_domain_id
     if domain_id is None:
         raise SettingsError("--end-to-end needs the robot's ROS domain: --ros-domain-id or [ros] domain_id")
     if "delivery" not in operations:
-        raise SettingsError("--end-to-end follows deliveries, which make the robot drive: say --allow-motion")
-    return EndToEnd(domain_id, _ceiling(statement, operations)[0], duration_s)
+        raise SettingsError("--end-to-end follows deliveries, which make the robot drive: add --allow-motion")
+    return EndToEnd(domain_id, most_rate, duration_s)
 
 
 def _shared(other: Endpoints, interfaces: tuple[str, ...]) -> tuple[str, ...]:
-    """The interfaces that the robot of --against has too."""
+    """Return the interfaces that the robot of --against has too."""
     there = {"rest": bool(other.rest), "soap": other.publishers or other.subscribers}
     shared = tuple(name for name in interfaces if there[name])
     if not shared:
         raise SettingsError(
-            f"--against names a robot without {' or '.join(interfaces)}: nothing can be compared (its SOAP services "
-            "are named by --against-publishers-wsdl and --against-subscribers-wsdl)"
+            f"--against names a robot without {' or '.join(interfaces)}: there is nothing to compare (name its SOAP "
+            "services with --against-publishers-wsdl and --against-subscribers-wsdl)"
         )
     return shared
 
 
 def _compared(settings: Settings, other: Statement, tolerance: float) -> Settings:
-    """The settings of a run against another robot, whose own limits hold as well."""
+    """Return the settings of a run against another robot, whose own limits apply as well."""
     _check_endpoints(other.endpoints)
     if settings.steps.asked:
         raise SettingsError(
@@ -114,10 +151,10 @@ def _compared(settings: Settings, other: Statement, tolerance: float) -> Setting
         )
     if not 0 < tolerance <= _MOST_TOLERANCE:
         raise SettingsError(f"--tolerance {tolerance:.3%} is out of range: above 0, at most {_MOST_TOLERANCE:.0%}")
-    operations, load = settings.selection.operations, settings.load
-    _check_limits(other, operations, load.rate, load.duration_s, settings.repeats.number, "; of the robot of --against")
-    most = _ceiling(other, operations)[0]
-    ceilings = [rate for rate in (settings.limits.max_rate, most) if rate is not None]
+    load = settings.load
+    allowed = _Allowed.of(other, settings.selection.operations)
+    allowed.check(load.rate, load.duration_s, settings.repeats.number, "; of the robot of --against")
+    ceilings = [rate for rate in (settings.limits.max_rate, allowed.rate) if rate is not None]
     return replace(
         settings,
         limits=replace(settings.limits, max_rate=min(ceilings, default=None)),
@@ -167,7 +204,7 @@ def _check_bridge(options: CliOptions) -> None:
 
 
 def _robot(endpoints: Endpoints, interfaces: tuple[str, ...]) -> Robot:
-    """The robot, with no more addresses than the interfaces need."""
+    """Return the robot with the addresses of the selected interfaces only."""
     soap = endpoints if "soap" in interfaces else type(endpoints)()
     return Robot(
         rest=endpoints.rest if "rest" in interfaces else None,
@@ -187,79 +224,26 @@ def _operations(options: CliOptions) -> tuple[str, ...]:
     moving = [name for name in options.selection.operations if name in MOVES]
     if moving and not options.allow_motion:
         raise SettingsError(
-            f"operation {moving[0]!r} makes the robot drive: say --allow-motion when its surroundings are clear, "
+            f"operation {moving[0]!r} makes the robot drive: add --allow-motion when its surroundings are clear, "
             "or measure --operation pose"
         )
     return tuple(name for name in OPERATIONS if name in options.selection.operations)
 
 
-def _ceiling(statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, str]:
-    """The highest rate allowed, and who says so."""
-    found: list[tuple[float, str]] = []
-    if statement.endpoints.request_rate is not None:
-        found.append((statement.endpoints.request_rate, "the statement's [endpoints] request_rate"))
-    if statement.load.max_rate is not None:
-        found.append((statement.load.max_rate, "the statement's [load] max_rate"))
-    elif MOVES.intersection(operations):
-        found.append(
-            (MOTION_RATE, "the default limit for what moves a robot; the statement's [load] max_rate lifts it")
-        )
-    return min(found) if found else (None, "")
-
-
-def _longest(statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, str]:
-    """The longest duration allowed, and who says so."""
-    if statement.load.max_duration_s is not None:
-        return statement.load.max_duration_s, "the statement's [load] max_duration_s"
-    if MOVES.intersection(operations):
-        why = "the default limit for what moves a robot; the statement's [load] max_duration_s lifts it"
-        return MOTION_DURATION_S, why
-    return None, ""
-
-
-def _bounded(options: CliOptions, statement: Statement, operations: tuple[str, ...]) -> tuple[float | None, float]:
-    """Rate and duration within what is allowed; defaults bend, options are refused."""
-    most, longest = _ceiling(statement, operations)[0], _longest(statement, operations)[0]
-    rate = None if options.users is not None else (options.rate or min(DEFAULT_RATE, most or DEFAULT_RATE))
-    duration_s = options.duration_s or min(DEFAULT_DURATION_S, longest or DEFAULT_DURATION_S)
-    _check_limits(statement, operations, rate, duration_s, options.repeats.number)
-    return rate, duration_s
-
-
-def _check_limits(
-    statement: Statement,
-    operations: tuple[str, ...],
-    rate: float | None,
-    duration_s: float,
-    repeats: int,
-    whose: str = "",
-) -> None:
-    """Refuse what a robot's statement does not allow."""
-    most, why = _ceiling(statement, operations)
-    longest, reason = _longest(statement, operations)
-    if rate is not None and most is not None and rate > most:
-        raise SettingsError(f"--rate {rate:g} exceeds {most:g} requests/s ({why}{whose})")
-    if longest is not None and duration_s * repeats > longest:
-        times = f" {repeats} times" if repeats > 1 else ""
-        raise SettingsError(f"--duration {duration_s:g}{times} exceeds {longest:g} s ({reason}{whose})")
-
-
 def _steps(options: CliOptions, statement: Statement, operations: tuple[str, ...]) -> Steps:
-    """The loads after the duel, which are of reads where there are some."""
+    """Return the loads after the duel, which are of reads where there are some."""
     reads = tuple(name for name in operations if name not in MOVES)
-    ceiling = _ceiling(statement, reads or operations)[0]
+    ceiling = _Allowed.of(statement, reads or operations).rate
     searches = options.knee_searches if options.knee else 0
     return Steps(_step_rates(options, ceiling), options.step_s, ceiling, searches, options.connections)
 
 
 def _step_rates(options: CliOptions, ceiling: float | None) -> tuple[float, ...]:
-    """The rates of the stepped load below a ceiling; empty when it was not asked for."""
+    """Return the rates of the stepped load up to a limit; empty when no steps are wanted."""
     if options.step_rates:
         above = [rate for rate in options.step_rates if ceiling is not None and rate > ceiling]
         if above:
-            raise SettingsError(
-                f"--step-rates {above[0]:g} exceeds {ceiling:g} requests/s, which is the highest allowed"
-            )
+            raise SettingsError(f"--step-rates {above[0]:g} exceeds {ceiling:g} requests/s, the highest rate allowed")
         return tuple(sorted(set(options.step_rates)))
     if not options.steps:
         return ()
@@ -269,10 +253,10 @@ def _step_rates(options: CliOptions, ceiling: float | None) -> tuple[float, ...]
 
 
 def _token(path: str | None) -> str | None:
-    """The bearer token in a file.
+    """Return the bearer token in a file.
 
     Raises:
-        SettingsError: unreadable, empty, or nothing that a header may hold (RFC 6750 section 2.1).
+        SettingsError: the file is unreadable or empty, or no header may contain its text (RFC 6750 section 2.1).
     """
     if path is None:
         return None
@@ -281,5 +265,5 @@ def _token(path: str | None) -> str | None:
     except (OSError, UnicodeDecodeError) as error:
         raise SettingsError(f"token file {path!r}: {getattr(error, 'strerror', None) or error}") from None
     if not token or not token.isascii() or not token.isprintable() or " " in token:
-        raise SettingsError(f"token file {path!r} holds no token: one line of printable ASCII without spaces")
+        raise SettingsError(f"token file {path!r} is not a token: expected one line of printable ASCII without spaces")
     return token

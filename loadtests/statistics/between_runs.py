@@ -1,13 +1,11 @@
-"""What runs differ by and one run cannot see: a component of the interval that comes from other measurements.
+"""The part of an interval that one run cannot show: by how much runs differ.
 
-Within a run the ratio of the interfaces hardly wanders, and resampling says how well that run knows it. Another run of
-the same robot finds another ratio all the same, for what else the machine does adds to both interfaces' times, and
-that changes over minutes. This is an uncertainty of type B (JCGM 100:2008, GUM, 4.3): its size was found by measuring
-one robot again and again (`benchmarks/repeatability.py`; the figures stand in docs/load.md). Where a run is repeated
-often enough, its own repeats say it, and nothing is added.
+Within a run the ratio of the interfaces hardly drifts, and resampling shows how exactly that run knows it. Another run
+of the same robot finds another ratio all the same: what else the machine does adds to both interfaces' times, and that
+changes over minutes. This is an uncertainty of type B (JCGM 100:2008, GUM, 4.3). Its size was found by measuring one
+robot repeatedly (`benchmarks/repeatability.py`; the figures are in docs/load.md). Where a run has enough repeats, they
+show it themselves, and nothing is added.
 """
-
-from __future__ import annotations
 
 import math
 from typing import Any
@@ -23,7 +21,7 @@ _REACH = 1.959964  # standard deviations to either side hold 95 %
 
 
 def between_runs(machine: dict[str, Any], cpus: int, repeats: int) -> float:
-    """The standard deviation to reckon with, by the `machine` of the environment; 0 where repeats show it."""
+    """Return the standard deviation between runs, by the `machine` of the environment; 0 where repeats show it."""
     if repeats >= LEAST_REPEATS:
         return 0.0
     load = machine["load_average_before"]
@@ -31,14 +29,14 @@ def between_runs(machine: dict[str, Any], cpus: int, repeats: int) -> float:
 
 
 def widened_ratio(ratio: float, interval: Interval, deviation: float) -> Interval:
-    """A ratio's interval with the deviation between runs in it: variances add, on the logarithmic scale."""
+    """Widen a ratio's interval by the deviation between runs: variances add, on the logarithmic scale."""
     low, high = (math.log(bound / ratio) for bound in interval)
     reach = _REACH * deviation
     return ratio * math.exp(-math.hypot(min(low, 0.0), reach)), ratio * math.exp(math.hypot(max(high, 0.0), reach))
 
 
 def widened_difference(difference: float, interval: Interval, deviation_ms: float) -> Interval:
-    """Likewise a difference's, by a deviation in milliseconds."""
+    """Widen a difference's interval likewise, by a deviation in milliseconds."""
     low, high = (bound - difference for bound in interval)
     reach = _REACH * deviation_ms
     return difference - math.hypot(min(low, 0.0), reach), difference + math.hypot(max(high, 0.0), reach)

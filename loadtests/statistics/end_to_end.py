@@ -1,10 +1,8 @@
 """The `end_to_end` of latency.json: journeys from the request to the application, as figures.
 
-A delivery that failed or never arrived counts in every figure, as at least the time for which it was waited: a robot
-that loses what it is slow at is not quick.
+A delivery that failed or never arrived counts in every figure, with at least the time for which it was waited: a robot
+that loses its slow deliveries is not fast.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,9 +12,8 @@ import numpy as np
 from scipy import stats
 
 from loadtests.statistics.figures import plain_quantiles, rounded, rounded_interval
-from loadtests.statistics.histogram import Histogram
+from loadtests.statistics.histogram import SHARES, Histogram
 from loadtests.statistics.intervals import order_interval_ms
-from loadtests.statistics.rounds import SHARES
 
 _BASE = "rest"
 
@@ -27,13 +24,13 @@ Journey = Sequence[int | None]
 def ways(
     arrivals: Mapping[str, Journey], answers: Mapping[str, Journey], errors: Mapping[str, int], waited_ns: int
 ) -> list[dict[str, Any]]:
-    """An entry for each way.
+    """Return an entry for each way.
 
     Args:
         arrivals: nanoseconds from the request's start to the application, by round; None where it never came.
-        answers: likewise to the request's answer; None where the way has none.
-        errors: requests that brought no good answer.
-        waited_ns: how long was waited for each.
+        answers: nanoseconds to the response; None where the way has none.
+        errors: requests without a good response.
+        waited_ns: how long each delivery was waited for.
     """
     return [
         _way(way, times, answers[way], errors[way], waited_ns)
@@ -45,7 +42,7 @@ def ways(
 def _way(way: str, times: Journey, answers: Journey, errors: int, waited_ns: int) -> dict[str, Any]:
     arrived = [time for time in times if time is not None]
     missing = len(times) - len(arrived)
-    whole = _histogram([*arrived, *[max([waited_ns, *arrived])] * missing])
+    whole = Histogram.of([*arrived, *[max([waited_ns, *arrived])] * missing])
     figures = plain_quantiles(whole)
     return {
         "interface": way,
@@ -59,20 +56,14 @@ def _way(way: str, times: Journey, answers: Journey, errors: int, waited_ns: int
             if missing and figure is not None and (name not in SHARES or SHARES[name] > len(arrived) / len(times))
         ],
         "ci95_ms": {name: rounded_interval(order_interval_ms(whole, SHARES[name])) for name in ("p50", "p99")},
-        "answer_ms": plain_quantiles(_histogram(answers)) if any(answers) else None,
+        "answer_ms": plain_quantiles(Histogram.of(filter(None, answers))) if any(answers) else None,
     }
 
 
-def _histogram(times: Journey) -> Histogram:
-    made = Histogram()
-    made.record(np.array([time for time in times if time is not None], dtype=np.int64))
-    return made
-
-
 def _over(times: Journey, base: Journey) -> dict[str, Any]:
-    """The median of the ratios of neighbours, and its interval from their order (the sign test's).
+    """Return the median of the ratios of neighbours, and its interval by their order (the sign test's).
 
-    One that never arrived took longer than any; of two that did not nothing is known.
+    A delivery that never arrived counts as longer than any other; pairs of two such deliveries are left out.
     """
     taken = ([math.inf if time is None else time for time in side] for side in (times, base))
     ratios = [one / other for one, other in zip(*taken, strict=False) if other and min(one, other) < math.inf]

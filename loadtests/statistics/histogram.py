@@ -1,14 +1,13 @@
 """HdrHistogram's bins on NumPy arrays: one microsecond and three significant digits, up to an hour.
 
-The bins are those of HdrHistogram (http://hdrhistogram.org), so that any of its readers takes our files; the
-pure-Python recorder of the `hdrhistogram` package costs 2 us a value, and here whole buffers are binned at
-once. Counts are kept sparsely: adding two histograms is adding counts, hence a merge of parts equals the
-histogram of the whole, whatever the order.
+The bins are those of HdrHistogram (http://hdrhistogram.org), so that any of its readers can read our files. The
+pure-Python recorder of the `hdrhistogram` package costs 2 us a value; here whole buffers are binned at once. Counts are
+sparse: adding two histograms is adding counts, so that a merge of parts equals the histogram of the whole, in any
+order.
 """
 
-from __future__ import annotations
-
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -23,10 +22,12 @@ Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 _NOTHING: Ints = np.zeros(0, dtype=np.int64)
 _LEAST_SUMMED = 256
+#: The quantiles that results give, by name.
+SHARES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
 
 
 def bins_of(values_us: Ints) -> Ints:
-    """The bin of each value, in whole microseconds; values out of range go to the first or the last bin."""
+    """Return the bin of each value in microseconds; values out of range go to the first or the last bin."""
     values = np.clip(values_us, 0, HIGHEST_US)
     exponent = np.frexp((values | _MASK).astype(np.float64))[1].astype(np.int64)  # position of the highest bit
     bucket = exponent - (_HALF_BITS + 1)
@@ -37,17 +38,17 @@ BINS = int(bins_of(np.array([HIGHEST_US]))[0]) + 1
 
 
 def edges_us(bins: Ints) -> tuple[Ints, Ints]:
-    """Lower edge and width of each bin, in microseconds."""
+    """Return lower edge and width of each bin, in microseconds."""
     bucket = np.maximum((bins >> _HALF_BITS) - 1, 0)
     sub = np.where(bins < 2 * _HALF, bins, (bins & (_HALF - 1)) + _HALF)
     return sub << bucket, np.int64(1) << bucket
 
 
 class Histogram:
-    """Counts by bin, with the exact number, sum and extremes (nanoseconds) beside them.
+    """Counts by bin, with the exact number, sum and extremes (nanoseconds).
 
-    What is added waits in arrays and is summed at once when there is enough of it, or when somebody looks: a merge
-    costs some 10 ns a bin, whereas adding bin by bin to a dict costs ten times that.
+    Added counts wait in arrays until there are enough of them, or until they are read: a merge costs some 10 ns a bin,
+    and adding bin by bin to a dict ten times that.
     """
 
     __slots__ = ("_bins", "_counts", "_pending", "_waiting", "highest_ns", "lowest_ns", "sum_ns", "total")
@@ -62,6 +63,21 @@ class Histogram:
         self.highest_ns = 0
         self.lowest_ns = 0
 
+    @classmethod
+    def sum_of(cls, parts: "Iterable[Histogram]") -> Self:
+        """Return a histogram of all values of others."""
+        whole = cls()
+        for part in parts:
+            whole.merge(part)
+        return whole
+
+    @classmethod
+    def of(cls, values_ns: Iterable[int]) -> Self:
+        """Return a histogram of values in nanoseconds."""
+        made = cls()
+        made.record(np.array(list(values_ns), dtype=np.int64))
+        return made
+
     def record(self, values_ns: Ints) -> None:
         """Add values, in nanoseconds."""
         if not len(values_ns):
@@ -70,7 +86,7 @@ class Histogram:
         self._add(found, counts)
         self._note(len(values_ns), int(values_ns.sum()), int(values_ns.min()), int(values_ns.max()))
 
-    def merge(self, other: Histogram) -> None:
+    def merge(self, other: "Histogram") -> None:
         """Add another histogram's counts."""
         if other.total:
             self._add(*other.arrays())
@@ -83,7 +99,7 @@ class Histogram:
             self._settle()
 
     def _settle(self) -> None:
-        """Sum up what waits."""
+        """Sum up what waits in arrays."""
         parts = [(self._bins, self._counts), *self._pending]
         bins, counts = (np.concatenate([part[side] for part in parts]) for side in (0, 1))
         summed = np.bincount(bins, weights=counts)  # as floats: exact up to 2**53
@@ -98,13 +114,13 @@ class Histogram:
         self.sum_ns += sum_ns
 
     def arrays(self) -> tuple[Ints, Ints]:
-        """Occupied bins in ascending order, and their counts. Not to be changed."""
+        """Return the occupied bins in ascending order, and their counts; do not change them."""
         if self._pending:
             self._settle()
         return self._bins, self._counts
 
-    def at_least(self, floor_ns: int) -> Histogram:
-        """The same values, each below `floor_ns` raised to it; sum to within a bin's width."""
+    def at_least(self, floor_ns: int) -> "Histogram":
+        """Return the values, each below `floor_ns` raised to it; the sum is exact to a bin's width."""
         made = Histogram()
         if not self.total:
             return made
@@ -120,12 +136,18 @@ class Histogram:
         )
         return made
 
+    def figure_ms(self, name: str) -> float | None:
+        """Return the mean, the maximum or a quantile by its name; None without values."""
+        if name in SHARES:
+            return self.quantile_ms(SHARES[name])
+        return self.mean_ms() if name == "mean" or not self.total else self.highest_ns / 1e6
+
     def mean_ms(self) -> float | None:
-        """The mean, exact; None without values."""
+        """Return the exact mean; None without values."""
         return self.sum_ns / self.total / 1e6 if self.total else None
 
     def quantile_ms(self, quantile: float) -> float | None:
-        """The value below which a share of the values lies, interpolated in its bin; None without values."""
+        """Return a quantile, interpolated in its bin; None without values."""
         if not self.total:
             return None
         bins, counts = self.arrays()
@@ -133,12 +155,12 @@ class Histogram:
         return min(max(found, self.lowest_ns / 1e6), self.highest_ns / 1e6)
 
     def encode(self) -> str:
-        """HdrHistogram V2, compressed, base64: for its readers in any language."""
+        """Return HdrHistogram V2, compressed, in base64, which readers in any language understand."""
         encoded: bytes = self.as_hdr().encode()
         return encoded.decode("ascii")
 
     def as_hdr(self) -> HdrHistogram:
-        """The same counts in the `hdrhistogram` package's class."""
+        """Return the counts in the `hdrhistogram` package's class."""
         hdr = HdrHistogram(1, HIGHEST_US, 3)
         bins, counts = self.arrays()
         for index, count in zip(bins.tolist(), counts.tolist(), strict=True):
@@ -148,7 +170,7 @@ class Histogram:
         return hdr
 
     def pack(self) -> list[Any]:
-        """A form that msgpack carries; see `unpack`."""
+        """Return the histogram in a form that msgpack carries."""
         bins, counts = self.arrays()
         return [
             self.total,
@@ -160,8 +182,8 @@ class Histogram:
         ]
 
     @classmethod
-    def unpack(cls, packed: list[Any]) -> Histogram:
-        """Read what `pack` wrote."""
+    def unpack(cls, packed: list[Any]) -> Self:
+        """Return the histogram that `pack` wrote."""
         made = cls()
         total, sum_ns, lowest, highest, bins, counts = packed
         made._bins = np.frombuffer(bins, "<i4").astype(np.int64)
@@ -171,7 +193,7 @@ class Histogram:
 
 
 def quantiles_us(bins: Ints, counts: Floats, quantile: float) -> Floats:
-    """A quantile of many histograms over the same bins, in microseconds.
+    """Return a quantile of each of many histograms over the same bins, in microseconds.
 
     Args:
         bins: occupied bins in ascending order, shape (bins,).

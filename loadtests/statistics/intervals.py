@@ -1,46 +1,41 @@
 """Confidence intervals of medians, p99s and other quantiles, and of their ratios and differences.
 
-By scipy's bootstrap over rounds (see `rounds`), or over repeats and the rounds within them (Davison and Hinkley 1997,
-section 3.8) where the run was repeated often enough. Percentile intervals of few rounds are too narrow; they are taken
-at the level that makes them as wide as Student's t (Hesterberg 2015), and widened by what correlation is left between
-rounds and by what the repeats differ beyond what each run's own scatter explains (Birge 1932). How often they are
-right is measured by `benchmarks/calibration.py`.
+They come from scipy's bootstrap over rounds (module `rounds`), or over repeats and the rounds within them (Davison and
+Hinkley 1997, section 3.8) where the run has enough repeats. Percentile intervals of few rounds are too narrow: they are
+taken at the level that makes them as wide as Student's t (Hesterberg 2015). They are widened by the correlation that is
+left between rounds, and by what the repeats differ beyond each run's own scatter (Birge 1932). How often they are right
+is measured by `benchmarks/calibration.py`.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 
 from loadtests.statistics.between_runs import LEAST_REPEATS, Interval, widened_difference, widened_ratio
-from loadtests.statistics.histogram import Floats, Histogram, Ints
-from loadtests.statistics.rounds import SHARES, Rounds, Sample, Unit, in_rounds
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from loadtests.statistics.histogram import SHARES, Floats, Histogram, Ints
+from loadtests.statistics.rounds import Rounds, Sample, Unit, in_rounds
 
 RESAMPLES = 2000
 LEAST_ROUNDS = 6
 _AT_ONCE = 100  # resamples held in memory together
 _TAIL = 0.025
 _UPPER_TAIL = 0.99
-#: On the logarithmic scale: an interval that reaches farther than a factor of 1e13 says no more than one that does not,
-#: and further on its bounds would be zero and infinite.
+#: On the logarithmic scale: an interval wider than a factor of 1e13 says no more than one of that width, and its bounds
+#: would become zero and infinite.
 _FARTHEST = 30.0
 
 
 def samples_for_point(quantile: float) -> int:
-    """Fewest samples for a quantile to be given: two beyond it, and ten from p99 on (1,000 samples)."""
+    """Return the fewest samples for a quantile: two beyond it, and ten from p99 on (1,000 samples)."""
     beyond = 10 if quantile >= _UPPER_TAIL else 2
     return math.ceil(beyond / (1 - quantile) - 1e-9)
 
 
 def samples_for_interval(quantile: float) -> int:
-    """Fewest samples for which any 95 % interval of a quantile exists.
+    """Return the fewest samples for which any 95 % interval of a quantile exists.
 
     The largest of n values lies above the quantile with probability 1 - q**n, which has to reach 0.975 (the
     distribution-free interval of order statistics).
@@ -50,7 +45,7 @@ def samples_for_interval(quantile: float) -> int:
 
 @dataclass(frozen=True)
 class Replicates:
-    """A figure of each side, and what it came to in each resample (Davison and Hinkley's bootstrap replicates).
+    """A figure of each side, and its value in each resample (Davison and Hinkley's bootstrap replicates).
 
     Attributes:
         estimates: of the whole, shape (sides,), milliseconds.
@@ -67,7 +62,7 @@ class Replicates:
     widening: float
 
     def interval(self, combined: Floats, estimate: float) -> Interval | None:
-        """The 95 % interval of a positive figure, `combined` from the sides' replicates, about its `estimate`."""
+        """Return the 95 % interval of a positive figure, `combined` from the sides' replicates."""
         known = combined[np.isfinite(combined) & (combined > 0)]
         if len(known) < RESAMPLES / 2 or estimate <= 0:
             return None
@@ -76,7 +71,7 @@ class Replicates:
         return estimate * math.exp(low), estimate * math.exp(high)
 
     def difference_interval(self) -> Interval | None:
-        """The 95 % interval of the second side's figure less the first's."""
+        """Return the 95 % interval of the second side's figure less the first's."""
         combined = self.values[1] - self.values[0]
         known = combined[np.isfinite(combined)]
         if len(known) < RESAMPLES / 2:
@@ -87,7 +82,7 @@ class Replicates:
 
 
 def expanded_percentiles(replicates: Floats, degrees: int) -> Floats:
-    """The two quantiles of the replicates between which Student's 95 % lie, for so many degrees of freedom."""
+    """Return the quantiles of the replicates between which 95 % lie by Student's t with these degrees of freedom."""
     reach = stats.t.ppf(1 - _TAIL, degrees) * math.sqrt((degrees + 1) / degrees)
     tail = float(stats.norm.cdf(-reach))
     found: Floats = np.quantile(replicates, [tail, 1 - tail])
@@ -95,7 +90,7 @@ def expanded_percentiles(replicates: Floats, degrees: int) -> Floats:
 
 
 def resample(units: Sequence[Unit], name: str, seed: int, stream: int = 0) -> Replicates | None:
-    """Resample units again and again; None where there are fewer than LEAST_ROUNDS with samples on each side."""
+    """Resample units; returns None where fewer than LEAST_ROUNDS have samples on each side."""
     filled = [unit for unit in units if all(side.total for side in unit.sides)]
     if len(filled) < LEAST_ROUNDS:
         return None
@@ -106,7 +101,7 @@ def resample(units: Sequence[Unit], name: str, seed: int, stream: int = 0) -> Re
     outer = repeats if nested else sample.size
 
     def figures(chosen: Ints, axis: int = -1) -> Floats:
-        """The figures of resamples, each given by the numbers of what was chosen, shape (resamples, outer)."""
+        """Return the figures of resamples, given by the numbers of the chosen items, shape (resamples, outer)."""
         del axis
         times = _times(np.atleast_2d(chosen), outer)
         return sample.statistic_ms(_within(times, sample.repeats, rng) if nested else times, name)
@@ -126,14 +121,14 @@ def resample(units: Sequence[Unit], name: str, seed: int, stream: int = 0) -> Re
 
 
 def _times(chosen: Ints, number: int) -> Floats:
-    """How often each of `number` things was chosen, shape (resamples, number), from the choices' numbers."""
+    """Return how often each of `number` items was chosen, shape (resamples, number)."""
     rows = np.arange(len(chosen))[:, None] * number
     counted = np.bincount((chosen + rows).ravel(), minlength=len(chosen) * number)
     return counted.reshape(len(chosen), number).astype(np.float64)
 
 
 def _within(times: Floats, repeats: Ints, rng: np.random.Generator) -> Floats:
-    """Resample rounds within repeats that were chosen so often: how often each counts, shape (resamples, rounds)."""
+    """Resample rounds within the chosen repeats: how often each round counts, shape (resamples, rounds)."""
     found = np.zeros((len(times), len(repeats)))
     for number, repeat in enumerate(np.unique(repeats).tolist()):
         members = np.flatnonzero(repeats == repeat)
@@ -143,7 +138,7 @@ def _within(times: Floats, repeats: Ints, rng: np.random.Generator) -> Floats:
 
 
 def birge_ratio(rounds: Rounds) -> float:
-    """By how much the repeats scatter more than the rounds within them explain, 1 or more."""
+    """Return by how much repeats scatter more than their rounds explain, 1 or more."""
     numbers = np.unique(rounds.sample.repeats)
     within = [rounds.influence[rounds.sample.repeats == number] for number in numbers]
     within = [values for values in within if len(values) > 1]
@@ -158,7 +153,7 @@ def birge_ratio(rounds: Rounds) -> float:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure of one series: its 95 % interval, or why there is none; and its replicates."""
+    """A figure's 95 % interval, or why there is none, and its replicates."""
 
     interval: Interval | None
     reason: str | None
@@ -166,7 +161,7 @@ class Estimate:
 
 
 def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
-    """The 95 % interval of a mean or a quantile (p50, p99, ...) of one series, as latency.json gives it.
+    """Return the 95 % interval of a mean or a quantile (p50, p99, ...) of one series.
 
     By resampling rounds, or from the order of the samples where there are too few of these.
 
@@ -185,16 +180,14 @@ def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
         return Estimate(interval, None if interval else "too few resamples hold samples", replicates)
     if name not in SHARES:
         return Estimate(None, f"fewer than {LEAST_ROUNDS} rounds of blocks", None)
-    whole = Histogram()
-    for unit in units:
-        whole.merge(unit.sides[0])
+    whole = Histogram.sum_of(unit.sides[0] for unit in units)
     return Estimate(order_interval_ms(whole, SHARES[name]), None, None)
 
 
 def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
-    """The distribution-free 95 % interval of a quantile, from the order of the samples alone.
+    """Return the distribution-free 95 % interval of a quantile, from the order of the samples alone.
 
-    It takes them as independent, which requests are not quite: it serves where there are too few blocks to resample.
+    It assumes independent samples, which requests are not quite: it is used where there are too few blocks to resample.
     """
     samples = histogram.total
     if samples < samples_for_interval(quantile):
@@ -206,7 +199,7 @@ def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
 
 @dataclass(frozen=True)
 class Compared:
-    """Two sides' figure: the second less the first, and over it."""
+    """Two sides' figures: the second less the first, and over it."""
 
     difference_ms: float
     ratio: float
@@ -216,7 +209,7 @@ class Compared:
 
 
 def compare(units: Sequence[Unit], name: str, seed: int, *, stream: int = 0, deviation: float = 0.0) -> Compared | None:
-    """Compare two sides by units that hold both; None where a side is empty.
+    """Compare two sides by units that hold both; returns None where a side is empty.
 
     Args:
         units: with the first and the second side's histogram each.
@@ -247,7 +240,7 @@ def compare(units: Sequence[Unit], name: str, seed: int, *, stream: int = 0, dev
 
 
 def pooled_interval(parts: Sequence[Compared]) -> Interval | None:
-    """The 95 % interval of the geometric mean of the ratios of comparisons, which have streams of their own.
+    """Return the 95 % interval of the geometric mean of the ratios of comparisons with independent resamples.
 
     None where one of them has no interval.
     """

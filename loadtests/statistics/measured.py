@@ -1,49 +1,71 @@
-"""What was recorded, by series: cells added up, and the units that are resampled.
+"""What was recorded, by series: sums over blocks, and the units that intervals are resampled from.
 
-A request that was not answered as it should be, or that never started, counts in every figure: as at least the time
-until it was given up, and as no less than the slowest answer of its series. Else a robot that hangs on what it is
-slow at would look quick.
+A request that failed, or that never started, counts in every figure: with the time until it was given up, and with no
+less than the slowest response of its series. Otherwise a robot that hangs on its slow requests would look fast.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from loadtests.schedule.plan import SERIES, Plan, Segment, SeriesName
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.recorder import Cell, Recorder, Spans
 from loadtests.statistics.rounds import Unit
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
+def counted(cell: Cell, time: str, floor_ns: int | None = None) -> Histogram:
+    """Return a cell's `service` or `response` times, failed requests included.
 
-def counted(cell: Cell, time: str, floor_ns: int) -> Histogram:
-    """A cell's `service` or `response` times with those that failed, each of them no less than `floor_ns`."""
+    A failed request counts with no less than `floor_ns`, by default the slowest response of the cell.
+    """
     answered: Histogram = getattr(cell, time)
     failed: Histogram = getattr(cell, f"failed_{time}")
     if not failed.total:
         return answered
-    whole = Histogram()
-    whole.merge(answered)
-    whole.merge(failed.at_least(floor_ns))
-    return whole
+    return Histogram.sum_of([answered, failed.at_least(answered.highest_ns if floor_ns is None else floor_ns)])
 
 
 class Side(NamedTuple):
-    """One of two that are compared: a phase, a series, and the label by which it goes there, if any."""
+    """One of two things compared: a phase, a series, and its label in that phase (`a` or `b` in the A/A control)."""
 
     phase: str
     name: SeriesName
     label: str | None = None
 
 
+class Block(NamedTuple):
+    """What was recorded of one operation in one segment.
+
+    Attributes:
+        plan: the repeat's plan.
+        number: of the segment, over all plans.
+        segment: when, and over which interface.
+        cell: what was recorded.
+    """
+
+    plan: Plan
+    number: int
+    segment: Segment
+    cell: Cell
+
+    @property
+    def pair(self) -> tuple[int, int]:
+        """Return repeat and pair: blocks that are compared with one another share them."""
+        return self.plan.repeat, self.segment.pair
+
+    @property
+    def start_s(self) -> float:
+        """Return when the block began, in seconds of load since the run's start."""
+        return self.plan.offset_s + self.segment.start_ns / 1e9
+
+
 class Measured:
     """The cells of one run, or of several repeats of it, by series.
 
     Args:
-        plans: of each repeat, in order.
+        plans: the plan of each repeat, in order.
+        recorder: what was recorded.
     """
 
     def __init__(self, plans: Sequence[Plan], recorder: Recorder) -> None:
@@ -51,57 +73,61 @@ class Measured:
         self.plan = self.plans[0]
         self.recorder = recorder
 
-    def blocks(
-        self, phase: str, name: SeriesName, label: str | None = None
-    ) -> Iterator[tuple[tuple[int, int], Segment, Cell]]:
-        """A series' cells in order of time: (repeat, pair), segment, cell."""
+    def blocks(self, name: SeriesName, *phases: str, label: str | None = None) -> Iterator[Block]:
+        """Yield the blocks of a series in some phases, in order of time; those in which nothing happened are left out.
+
+        Args:
+            name: the series.
+            phases: which phases.
+            label: only blocks of this label.
+        """
         operation, interface, client = name
-        number = self.plan.operations.index(operation)
+        operation_number = self.plan.operations.index(operation)
         for plan in self.plans:
-            for index, segment in enumerate(plan.segments):
-                if (segment.phase, segment.interface, segment.client) != (phase, interface, client):
+            for number, segment in enumerate(plan.segments, plan.first_segment):
+                if segment.phase not in phases or (segment.interface, segment.client) != (interface, client):
                     continue
-                if label is not None and segment.label != label:
-                    continue
-                cell = self.recorder.cells.get((plan.first_segment + index, number))
-                if cell is not None:
-                    yield (plan.repeat, segment.pair), segment, cell
+                cell = self.recorder.cells.get((number, operation_number))
+                if cell is not None and label in {None, segment.label}:
+                    yield Block(plan, number, segment, cell)
 
     def total(self, phase: str, name: SeriesName) -> Cell:
-        """A series' cells added up."""
+        """Return the sum of a series' cells."""
         whole = Cell()
-        for _, _, cell in self.blocks(phase, name):
-            whole.merge(cell)
+        for block in self.blocks(name, phase):
+            whole.merge(block.cell)
         return whole
 
     def pairs(
         self, phase: str, name: SeriesName, time: str = "service", label: str | None = None
     ) -> dict[tuple[int, int], Histogram]:
-        """All requests of each pair of blocks, failed ones included, by repeat and pair."""
+        """Return the times of all requests of each pair of blocks, failed ones included, by repeat and pair."""
         cells: defaultdict[tuple[int, int], Cell] = defaultdict(Cell)
-        for place, _, cell in self.blocks(phase, name, label):
-            cells[place].merge(cell)
+        for block in self.blocks(name, phase, label=label):
+            cells[block.pair].merge(block.cell)
         floor = max((getattr(cell, time).highest_ns for cell in cells.values()), default=0)
-        return {place: counted(cell, time, floor) for place, cell in cells.items()}
+        return {pair: counted(cell, time, floor) for pair, cell in cells.items()}
 
     def units(self, name: SeriesName, time: str, phase: str = "duel") -> list[Unit]:
-        """What is resampled for a series' intervals."""
-        return [Unit(place[0], (side,)) for place, side in sorted(self.pairs(phase, name, time).items())]
+        """Return the units that a series' intervals are resampled from."""
+        return [Unit(pair[0], (side,)) for pair, side in sorted(self.pairs(phase, name, time).items())]
 
     def whole(self, name: SeriesName, time: str, phase: str = "duel") -> Histogram:
-        """All requests of a series, failed ones included."""
-        found = Histogram()
-        for histogram in self.pairs(phase, name, time).values():
-            found.merge(histogram)
-        return found
+        """Return the times of all requests of a series, failed ones included."""
+        return Histogram.sum_of(self.pairs(phase, name, time).values())
 
     def paired(self, first: Side, second: Side) -> list[Unit]:
-        """The pairs that hold two sides, with the service times of both."""
-        sides = [self.pairs(side.phase, side.name, label=side.label) for side in (first, second)]
-        return [Unit(place[0], (sides[0][place], sides[1][place])) for place in sorted(set(sides[0]) & set(sides[1]))]
+        """Return the pairs of blocks that hold two sides, with the service times of both."""
+        one, other = (self.pairs(side.phase, side.name, label=side.label) for side in (first, second))
+        return [Unit(pair[0], (one[pair], other[pair])) for pair in sorted(set(one) & set(other))]
+
+    def pair_s(self, phase: str, name: SeriesName) -> float:
+        """Return how many seconds of the run lie between one pair of a series' blocks and the next."""
+        pairs = len({block.pair for block in self.blocks(name, phase)})
+        return sum(plan.load.duration_s for plan in self.plans) / max(1, pairs)
 
     def spans(self, phase: str, name: SeriesName) -> Spans:
-        """Where a series' time went."""
+        """Return where a series' time went."""
         operation, interface, client = name
         key = (SERIES.index((phase, interface, client)), self.plan.operations.index(operation))
         return self.recorder.spans.get(key, Spans())

@@ -1,24 +1,18 @@
-"""Does a series have two modes? Quantiles and an interval do not show it: half the requests may take ten times as long.
+"""Whether a series has two modes, which quantiles and intervals hide: half the requests may take ten times as long.
 
-Hartigan's dip (The dip test of unimodality, Annals of Statistics 13, 1985; by the `diptest` package) on the logarithm
-of the service times, which are read off the histogram at evenly spaced quantiles. The test finds bumps of no account in
-thousands of samples: two modes are told where there is a valley between them as well, with enough on both sides of it.
+The test is Hartigan's dip (The dip test of unimodality, Annals of Statistics 13, 1985; by the `diptest` package) on the
+logarithm of the service times, read from the histogram at evenly spaced quantiles. In thousands of samples it finds
+insignificant bumps too: two modes are reported only where there is a valley between them, with enough on both sides.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import diptest
 import numpy as np
 
 from loadtests.statistics.figures import named, rounded
-from loadtests.statistics.histogram import Histogram, edges_us, quantiles_us
-
-if TYPE_CHECKING:
-    from loadtests.schedule.plan import SeriesName
-    from loadtests.statistics.histogram import Floats
-    from loadtests.statistics.measured import Measured
+from loadtests.statistics.histogram import Floats, Histogram, edges_us, quantiles_us
+from loadtests.statistics.measured import Measured
 
 _FEWEST, _POINTS = 100, 2000
 _SIGNIFICANCE = 0.01
@@ -31,7 +25,7 @@ _COLUMNS, _ROWS = 40, 24  # of the heat map: as many as a page can draw without 
 
 
 def modes(histogram: Histogram) -> dict[str, Any] | None:
-    """The `modes` of a series of latency.json; None where there are too few samples to speak of."""
+    """Return the `modes` of a series of latency.json; None where there are too few samples."""
     if histogram.total < _FEWEST:
         return None
     times = _quantiles_ms(histogram, min(_POINTS, histogram.total))
@@ -51,11 +45,6 @@ def modes(histogram: Histogram) -> dict[str, Any] | None:
     }
 
 
-def of_series(measured: Measured, entry: dict[str, Any]) -> dict[str, Any] | None:
-    """The `modes` of an entry of `series`."""
-    return modes(measured.total("duel", (entry["operation"], entry["interface"], entry["client"])).service)
-
-
 def _quantiles_ms(histogram: Histogram, points: int) -> Floats:
     bins, counts = histogram.arrays()
     rows = counts[None, :].astype(np.float64)
@@ -70,7 +59,7 @@ def _share_above(histogram: Histogram, limit_ms: float) -> float:
 
 
 def _valley_ms(times: Floats) -> float | None:
-    """Where two modes part, if they do."""
+    """Return where two modes part, if they do."""
     logs = np.log(times)
     counts, edges = np.histogram(logs, _BINS)
     smooth = counts.astype(np.float64)
@@ -98,7 +87,7 @@ def _two_sides(times: Floats, split: float) -> bool:
 
 
 def heat_map(measured: Measured) -> dict[str, Any]:
-    """The `heat_map` of latency.json: how many requests took how long, when; rows of time, columns of latency."""
+    """Return the `heat_map` of latency.json: how many requests took how long, when."""
     plan = measured.plan
     last = measured.plans[-1]
     width_s = max(1.0, (last.offset_s + last.length_s) / _COLUMNS)
@@ -106,8 +95,9 @@ def heat_map(measured: Measured) -> dict[str, Any]:
     lowest, highest = float("inf"), 0.0
     for name in plan.series_names():
         columns: dict[int, Histogram] = {}
-        for start_s, histogram in _block_times(measured, name):
-            columns.setdefault(int(start_s / width_s + 1e-9), Histogram()).merge(histogram)
+        for block in measured.blocks(name, "duel"):
+            if block.cell.service.total:
+                columns.setdefault(int(block.start_s / width_s + 1e-9), Histogram()).merge(block.cell.service)
         held = [histogram for histogram in columns.values() if histogram.total]
         lowest = min([lowest, *(histogram.lowest_ns / 1e6 for histogram in held)])
         highest = max([highest, *(histogram.highest_ns / 1e6 for histogram in held)])
@@ -136,13 +126,3 @@ def _binned(histogram: Histogram, edges: Floats) -> list[int]:
     lower, width = edges_us(bins)
     found, _ = np.histogram((lower + width / 2) / 1e3, edges, weights=counts)
     return [int(count) for count in found]
-
-
-def _block_times(measured: Measured, name: SeriesName) -> list[tuple[float, Histogram]]:
-    """Each block of a series in the duel: its start in seconds, and its service times."""
-    offsets = {plan.repeat: plan.offset_s for plan in measured.plans}
-    return [
-        (offsets[place[0]] + segment.start_ns / 1e9, cell.service)
-        for place, segment, cell in measured.blocks("duel", name)
-        if cell.service.total
-    ]

@@ -1,24 +1,20 @@
-"""Keeps what happened, in memory that does not grow with the number of requests.
+"""Records what happened, in memory that does not grow with the number of requests.
 
-A request is seven integers appended to a buffer; the buffer is binned by NumPy in the quiet gap between blocks.
-A cell holds the histograms of one operation in one segment of the plan (a block): the blocks are what the
-statistics resample, and their sums are the series. The number of segments is bounded by the plan, that of bins
-by the histogram. Cells add, so that those of processes and machines merge into exactly their union.
+A request is eight integers appended to a buffer; NumPy bins the buffer in the quiet gap between blocks. A cell holds
+the histograms of one operation in one segment of the plan (a block): the statistics resample blocks, and a series is
+their sum. The plan bounds the number of segments, and the histogram the number of bins. Cells add, so that those of
+several processes merge into exactly their union.
 """
-
-from __future__ import annotations
 
 from array import array
 from collections import Counter, defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 import numpy as np
 
 from loadtests.statistics.histogram import Histogram, Ints
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 #: A start later than this after its time counts as late.
 LATE_NS = 1_000_000
@@ -32,9 +28,9 @@ class Cell:
     """One operation in one segment: histograms of the successful requests, and the ages of the others.
 
     Attributes:
-        service, response: of the requests that were answered as they should be.
-        failed_service, failed_response: of the others, until they were given up: from the actual and from the
-            intended start. One that never started has its wait in both.
+        service, response: times of the successful requests.
+        failed_service, failed_response: of the others, until they were given up, from the actual and from the
+            intended start. A request that never started has its wait in both.
         queued: how long arrivals waited because no user was free when they were due.
         errors: requests that failed; late: started over 1 ms after their time; dropped: never started.
     """
@@ -48,7 +44,7 @@ class Cell:
     late: int = 0
     dropped: int = 0
 
-    def merge(self, other: Cell) -> None:
+    def merge(self, other: Self) -> None:
         """Add another cell."""
         for name, part in self.histograms().items():
             part.merge(getattr(other, name))
@@ -57,7 +53,7 @@ class Cell:
         self.dropped += other.dropped
 
     def histograms(self) -> dict[str, Histogram]:
-        """Its histograms by name."""
+        """Return its histograms by name."""
         return {name: getattr(self, name) for name in _HISTOGRAMS}
 
 
@@ -66,7 +62,7 @@ _HISTOGRAMS = ("service", "response", "failed_service", "failed_response", "queu
 
 @dataclass(slots=True)
 class Spans:
-    """Where the time of a series went, and how late the generator started it."""
+    """Where the time of a series went, and how late the generator started its requests."""
 
     build: Histogram = field(default_factory=Histogram)
     wire: Histogram = field(default_factory=Histogram)
@@ -75,10 +71,10 @@ class Spans:
     lag: Histogram = field(default_factory=Histogram)
 
     def parts(self) -> dict[str, Histogram]:
-        """The histograms by name."""
+        """Return the histograms by name."""
         return {name: getattr(self, name) for name in ("build", "wire", "server", "parse", "lag")}
 
-    def merge(self, other: Spans) -> None:
+    def merge(self, other: Self) -> None:
         """Add another series' spans."""
         for name, part in self.parts().items():
             part.merge(getattr(other, name))
@@ -93,8 +89,8 @@ class Failure:
     first_ns: int
     last_ns: int
 
-    def merge(self, other: Failure) -> None:
-        """Add another one of the kind."""
+    def merge(self, other: Self) -> None:
+        """Add further failures of this kind."""
         if other.first_ns < self.first_ns:
             self.message = other.message
         self.count += other.count
@@ -112,8 +108,8 @@ class Recorder:
     """What happened so far.
 
     Args:
-        series_of: the series number of each segment (see `Plan.series_of`); spans and errors are kept by series.
-        listener: told of each buffer's response times, by series and operation.
+        series_of: the series number of each segment (`Plan.series_of`); spans and errors are kept by series.
+        listener: receives each buffer's response times, by series and operation.
     """
 
     def __init__(
@@ -176,7 +172,7 @@ class Recorder:
             known.merge(failure)
 
     def drop(self, segment: int, operation: int, age_ns: int = 0) -> None:
-        """Record an arrival that nobody started before its deadline, `age_ns` after it was due."""
+        """Record an arrival that was not started before its deadline, `age_ns` after it was due."""
         cell = self.cells[segment, operation]
         cell.dropped += 1
         age = np.array([age_ns])
@@ -184,7 +180,7 @@ class Recorder:
         cell.failed_response.record(age)
 
     def was_busy(self, segment: int, share: float) -> None:
-        """Record the share of a core that the generator's process used during a segment; the busiest one's counts."""
+        """Record a generator process's share of a core during a segment; the highest one is kept."""
         self.busy[segment] = max(share, self.busy.get(segment, 0.0))
 
     def count(self, name: str, number: int = 1) -> None:
@@ -223,7 +219,7 @@ class Recorder:
         spans.parse.record(done - received)
         spans.lag.record(np.maximum((start - due)[~queued.astype(bool)], 0))
 
-    def merge(self, other: Recorder) -> None:
+    def merge(self, other: Self) -> None:
         """Add what another recorder holds."""
         for key, cell in other.cells.items():
             self.cells[key].merge(cell)
@@ -236,7 +232,7 @@ class Recorder:
             self.was_busy(segment, share)
 
     def take(self) -> dict[str, Any]:
-        """Hand over everything in a form that msgpack carries, and begin anew."""
+        """Return everything in a form that msgpack carries, and begin again."""
         self.flush()
         packed = {
             "cells": [
@@ -263,8 +259,8 @@ class Recorder:
         return packed
 
     @classmethod
-    def unpack(cls, packed: dict[str, Any]) -> Recorder:
-        """Read what `take` handed over."""
+    def unpack(cls, packed: dict[str, Any]) -> Self:
+        """Return the recorder that `take` packed."""
         made = cls()
         for segment, operation, parts, errors, late, dropped in packed["cells"]:
             histograms = {name: Histogram.unpack(part) for name, part in parts.items()}

@@ -1,30 +1,25 @@
-"""What is resampled: rounds of neighbouring pairs of blocks, long enough that one says nothing about the next.
+"""What is resampled: rounds of neighbouring pairs of blocks, long enough to be independent of one another.
 
-Requests that follow one another are not independent, and blocks are not either: a stall or a drift meets several.
-Resampling what depends on its neighbour makes intervals too narrow (Carlstein 1986). The smallest unit is the pair of
-neighbouring blocks; units are put together, two at least where there are enough for that (a quartet, in which both
-sides have been first), until the correlation between one round and the next is gone. What is left of it then widens
-the interval by as much as it makes the mean of a first-order autoregressive series less certain.
+Consecutive requests are not independent, and blocks are not either: a stall or a drift affects several. Resampling
+dependent parts makes intervals too narrow (Carlstein 1986). The smallest unit is the pair of neighbouring blocks. Units
+are put together, at least two where there are enough (a quartet, in which both sides have been first), until one round
+does not correlate with the next. The correlation that is left widens the interval by as much as it makes the mean of a
+first-order autoregressive series less certain.
 
-The correlation is that of each unit's influence on the figure in question: for a quantile the share of its samples
-that lie beyond, for a mean their sum. This is what the figure's error is made of (Hampel 1974), and unlike a median of
-few samples it exists for every unit.
+The correlation is that of each unit's influence on the figure: for a quantile the share of its samples beyond it, for a
+mean their sum. The figure's error is made of this influence (Hampel 1974), and unlike a median of few samples it exists
+for every unit.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from loadtests.statistics.histogram import Floats, Histogram, Ints, edges_us, quantiles_us
+from loadtests.statistics.histogram import SHARES, Floats, Histogram, Ints, edges_us, quantiles_us
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-SHARES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
 #: Putting units together ends before there are fewer rounds than this: of seven independent rounds the correlation is
 #: as often as not estimated beyond 0.3 or below -0.3, and intervals came out three times as wide as they had to be.
 _FEWEST_ROUNDS = 12
@@ -37,7 +32,7 @@ _LEAST_FOR_LAG = 6
 
 
 class Unit(NamedTuple):
-    """A pair of the plan's blocks: in which repeat it ran, and one histogram for each side that is compared."""
+    """A pair of the plan's blocks: its repeat, and one histogram for each side that is compared."""
 
     repeat: int
     sides: tuple[Histogram, ...]
@@ -58,8 +53,8 @@ class Sample:
     repeats: Ints
 
     @classmethod
-    def of(cls, units: Sequence[Unit]) -> Sample:
-        """From units, of which there has to be one, in order of time."""
+    def of(cls, units: Sequence[Unit]) -> Self:
+        """Return a sample from units, at least one, in order of time."""
         arrays = [[side.arrays() for side in unit.sides] for unit in units]
         occupied = np.unique(np.concatenate([bins for sides in arrays for bins, _ in sides]))
         counts = np.zeros((len(arrays[0]), len(units), len(occupied)))
@@ -70,11 +65,11 @@ class Sample:
 
     @property
     def size(self) -> int:
-        """How many units."""
+        """Return how many units there are."""
         return int(self.counts.shape[1])
 
     def statistic_ms(self, weights: Floats, name: str) -> Floats:
-        """The mean or a quantile of weighted sums of units.
+        """Return the mean or a quantile of weighted sums of units.
 
         Args:
             weights: how often each unit counts, shape (resamples, units).
@@ -86,7 +81,7 @@ class Sample:
         return np.array([_statistic_ms(self.bins, weights @ side, name) for side in self.counts])
 
     def influence(self, name: str) -> Floats:
-        """What each unit contributes to the figure's error, shape (units,): of two sides the second less the first."""
+        """Return each unit's contribution to the figure's error, shape (units,); of two sides the difference."""
         whole = self.statistic_ms(np.ones((1, self.size)), name)[:, 0]
         lower, width = edges_us(self.bins)
         found = []
@@ -136,15 +131,15 @@ class Rounds:
 
     @property
     def widening(self) -> float:
-        """By how much what is left of the correlation makes an interval wider, 1 or more."""
+        """Return by how much the remaining correlation widens an interval, 1 or more."""
         left = min(max(self.correlation or 0.0, 0.0), _MOST)
         return math.sqrt((1 + left) / (1 - left))
 
 
 def lag_correlation(values: Floats, repeats: Ints) -> float | None:
-    """The correlation of each value with the one after it, within repeats; None where there are too few values.
+    """Return the correlation of each value with the next, within repeats; None where there are too few values.
 
-    A short series makes it look smaller than it is; that is put right to first order (Marriott and Pope 1954).
+    A short series makes it look too small; that is corrected to first order (Marriott and Pope 1954).
     """
     number = len(values)
     if number < _LEAST_FOR_LAG:
@@ -178,7 +173,7 @@ def in_rounds(sample: Sample, name: str) -> Rounds:
 
 
 def _first_of_each(repeats: Ints, length: int) -> Ints:
-    """The first unit of each round of so many; what is over at a repeat's end goes to its last round."""
+    """Return the first unit of each round; what is left at a repeat's end goes to its last round."""
     first: list[int] = []
     for repeat in np.unique(repeats).tolist():
         members = np.flatnonzero(repeats == repeat)

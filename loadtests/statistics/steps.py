@@ -1,31 +1,29 @@
-"""Where it breaks: a load stepped up until the robot no longer keeps to the criterion."""
+"""Where a robot breaks down: a load that is stepped up until the robot no longer meets the criterion."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
+import msgspec
+
+from conformance.packs.table1.thresholds import Threshold
+from loadtests.schedule.arrivals import arrivals_due
+from loadtests.schedule.plan import Plan
 from loadtests.statistics.figures import rounded
 from loadtests.statistics.histogram import Histogram
-from loadtests.statistics.measured import counted
-from loadtests.statistics.recorder import Cell, Recorder
-from loadtests.statistics.rounds import SHARES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from conformance.packs.table1.thresholds import Threshold
-    from loadtests.schedule.plan import Plan
+from loadtests.statistics.measured import Measured, counted
+from loadtests.statistics.recorder import Recorder
 
 _MOST_P99_MS = 50.0
 _MOST_ERRORS = 0.01
 _LEAST_ACHIEVED = 0.95
-_BUSY = 0.9
+#: From this share of a core on, the generator may be what limits the rate.
+BUSY = 0.9
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """What a step has to keep to.
+    """What a step has to meet.
 
     Attributes:
         limits: (time, quantile, below ms) for each interface.
@@ -34,8 +32,8 @@ class Criterion:
     limits: dict[str, list[tuple[str, str, float]]]
 
     @classmethod
-    def of(cls, thresholds: Iterable[Threshold], operation: str) -> Criterion:
-        """The thresholds on an operation's wire series, or a default where there are none."""
+    def of(cls, thresholds: Iterable[Threshold], operation: str) -> Self:
+        """Return the criterion by the thresholds on an operation's wire series."""
         limits: dict[str, list[tuple[str, str, float]]] = {}
         for threshold in thresholds:
             if threshold.operation == operation and threshold.client == "wire":
@@ -44,11 +42,11 @@ class Criterion:
         return cls(limits)
 
     def of_interface(self, interface: str) -> list[tuple[str, str, float]]:
-        """The limits of an interface."""
+        """Return the limits of an interface, or a default where no threshold concerns it."""
         return self.limits.get(interface) or [("response", "p99", _MOST_P99_MS)]
 
     def words(self, interface: str) -> str:
-        """The criterion in a sentence."""
+        """Return the criterion as a sentence."""
         limits = ", ".join(
             f"{quantile} {time} time below {below:g} ms" for time, quantile, below in self.of_interface(interface)
         )
@@ -57,27 +55,42 @@ class Criterion:
         )
 
 
-def figure(histogram: Histogram, name: str) -> float | None:
-    """Mean, quantile or maximum in ms, whatever the number of samples."""
-    if name == "mean":
-        return histogram.mean_ms()
-    if name == "max":
-        return histogram.highest_ns / 1e6 if histogram.total else None
-    return histogram.quantile_ms(SHARES[name])
+class Step(msgspec.Struct, kw_only=True):
+    """One rate over one interface: an entry of `steps` in latency.json.
+
+    Attributes:
+        reason: why the step does not meet the criterion.
+        cpu_share: the busiest generator process's share of a core.
+    """
+
+    interface: str
+    client: str = "wire"
+    offered_rate: float
+    achieved_rate: float
+    count: int
+    errors: int
+    dropped: int
+    p50_ms: float | None
+    p99_ms: float | None
+    max_ms: float | None
+    meets: bool
+    reason: str | None
+    cpu_share: float | None = None
+
+    @property
+    def limited_by_generator(self) -> bool:
+        """Return whether the generator was too busy for the step to say anything about the robot."""
+        return (self.cpu_share or 0.0) > BUSY
 
 
-def step_result(plan: Plan, recorder: Recorder, interface: str, asked: int, criterion: Criterion) -> dict[str, Any]:
-    """One interface's step of a plan, in which it should have had `asked` arrivals."""
-    whole, last, seconds = Cell(), Histogram(), 0.0
-    for index, segment in enumerate(plan.segments):
-        if segment.interface != interface:
-            continue
-        seconds += segment.active_s
-        for number in range(len(plan.operations)):
-            cell = recorder.cells.get((plan.first_segment + index, number))
-            if cell is not None:
-                whole.merge(cell)
-                last = cell.response
+def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, criterion: Criterion) -> Step:
+    """Return one interface's step of a plan that was carried out."""
+    measured, name = Measured([plan], recorder), (operation, interface, "wire")
+    asked = arrivals_due(plan, plan.length_s, phase="step", interface=interface)
+    seconds = sum(segment.active_s for segment in plan.segments if segment.interface == interface)
+    whole, last = measured.total("step", name), Histogram()
+    for block in measured.blocks(name, "step"):
+        last = block.cell.response
     achieved = _answered_in_time(whole.service.total, last, seconds)
     reasons = []
     if achieved < _LEAST_ACHIEVED * asked / seconds:
@@ -86,60 +99,52 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, asked: int, crit
     if started and whole.errors / started > _MOST_ERRORS:
         reasons.append(f"{whole.errors} of {started} requests failed")
     for time, quantile, below in criterion.of_interface(interface):
-        value = figure(counted(whole, time, getattr(whole, time).highest_ns), quantile)
+        value = counted(whole, time).figure_ms(quantile)
         if value is not None and value >= below:
             reasons.append(f"{quantile} {time} time {value:.3f} ms is not below {below:g} ms")
-    response = counted(whole, "response", whole.response.highest_ns)
-    return {
-        "interface": interface,
-        "client": "wire",
-        "offered_rate": rounded(plan.step_rate),
-        "achieved_rate": rounded(achieved),
-        "count": whole.service.total,
-        "errors": whole.errors,
-        "dropped": whole.dropped,
-        "p50_ms": rounded(figure(response, "p50")),
-        "p99_ms": rounded(figure(response, "p99")),
-        "max_ms": rounded(figure(response, "max")),
-        "meets": not reasons,
-        "reason": "; ".join(reasons) or None,
-    }
+    response = counted(whole, "response")
+    return Step(
+        interface=interface,
+        offered_rate=round(plan.step_rate or 0.0, 6),
+        achieved_rate=round(achieved, 6),
+        count=whole.service.total,
+        errors=whole.errors,
+        dropped=whole.dropped,
+        p50_ms=rounded(response.figure_ms("p50")),
+        p99_ms=rounded(response.figure_ms("p99")),
+        max_ms=rounded(response.figure_ms("max")),
+        meets=not reasons,
+        reason="; ".join(reasons) or None,
+    )
 
 
 def _answered_in_time(answered: int, last: Histogram, seconds: float) -> float:
-    """Requests answered per second, from the step's beginning to its last answers.
+    """Return the requests answered per second, from the step's beginning to its last responses.
 
-    A robot that cannot follow answers the last arrivals late, by as much as its queue is long: the time that all
-    answers took together is the step's length and that delay. The median of the last half second stands for it,
-    so that a single hiccup does not.
+    An overloaded robot answers the last arrivals late, by the length of its queue: all responses together took the
+    step's length plus that delay. The median of the last half second is taken as the delay, so that one outlier does
+    not count.
     """
     delay = (last.quantile_ms(0.5) or 0.0) / 1e3
     length = seconds if delay < seconds * (1 - _LEAST_ACHIEVED) else seconds + delay
     return answered / length if length > 0 else 0.0
 
 
-def knee(results: list[dict[str, Any]], interfaces: tuple[str, ...], criterion: Criterion) -> list[dict[str, Any]]:
-    """The highest rate up to which every step met the criterion, for each interface."""
+def knee(results: Iterable[Step], interfaces: tuple[str, ...], criterion: Criterion) -> list[dict[str, Any]]:
+    """Return the highest rate up to which every step met the criterion, for each interface."""
     found = []
     for interface in interfaces:
-        steps = sorted(
-            (step for step in results if step["interface"] == interface), key=lambda step: step["offered_rate"]
-        )
-        highest, missed = None, None
-        for step in steps:
-            if not step["meets"]:
-                missed = step
-                break
-            highest = step["offered_rate"]
-        busy = missed is not None and (missed["cpu_share"] or 0.0) > _BUSY
+        steps = sorted((step for step in results if step.interface == interface), key=lambda step: step.offered_rate)
+        missed = next((step for step in steps if not step.meets), None)
+        met = steps if missed is None else steps[: steps.index(missed)]
         found.append(
             {
                 "interface": interface,
-                "highest_rate": highest,
-                "first_rate_missed": missed["offered_rate"] if missed else None,
+                "highest_rate": met[-1].offered_rate if met else None,
+                "first_rate_missed": missed.offered_rate if missed else None,
                 "criterion": criterion.words(interface),
-                "reason": missed["reason"] if missed else None,
-                "limited_by": None if missed is None else ("generator" if busy else "robot"),
+                "reason": missed.reason if missed else None,
+                "limited_by": None if missed is None else ("generator" if missed.limited_by_generator else "robot"),
             }
         )
     return found

@@ -1,66 +1,52 @@
-"""Whether the robot kept its thresholds."""
+"""Whether the robot met its thresholds."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 from scipy import stats
 
-from loadtests.statistics.figures import quantiles
-from loadtests.statistics.histogram import Histogram, edges_us
+from conformance.packs.table1.thresholds import Threshold
+from loadtests.statistics.figures import plain_quantiles
+from loadtests.statistics.histogram import SHARES, Histogram, edges_us
 from loadtests.statistics.intervals import figure_interval_ms
-from loadtests.statistics.rounds import SHARES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from conformance.packs.table1.thresholds import Threshold
-    from loadtests.statistics.measured import Measured
+from loadtests.statistics.measured import Measured
 
 _SMALL_CHANCE = 0.025
 
 
-def _surely_above(histogram: Histogram, threshold: Threshold) -> bool:
-    """Whether even few samples prove a quantile to lie above its threshold.
+def judge(measured: Measured, thresholds: Iterable[Threshold]) -> list[dict[str, Any]]:
+    """Return the `thresholds` of latency.json: each against its interval's upper bound, failed requests included."""
+    return [threshold.as_message() | _judged(measured, threshold) for threshold in thresholds]
 
-    They do when, were it below, so few samples under the threshold would turn up in less than 2.5 % of all runs.
+
+def _judged(measured: Measured, threshold: Threshold) -> dict[str, Any]:
+    name, limit = (threshold.operation, threshold.interface, threshold.client), threshold.below_ms
+    found: dict[str, Any] = {"measured_ms": None, "bound_ms": None, "outcome": "inconclusive"}
+    if name not in measured.plan.series_names():
+        return found | {"reason": "not measured in this run"}
+    whole = measured.whole(name, threshold.time)
+    found["measured_ms"] = plain_quantiles(whole)[threshold.quantile]
+    bound, reason = found["measured_ms"], None if whole.total else "no samples"
+    if threshold.quantile != "max":
+        estimate = figure_interval_ms(measured.units(name, threshold.time), threshold.quantile, measured.plan.load.seed)
+        bound, reason = estimate.interval[1] if estimate.interval else None, estimate.reason
+    found |= {"bound_ms": bound, "reason": reason}
+    if bound is not None and bound < limit:
+        return found | {"outcome": "met", "reason": None}
+    if bound is not None:
+        return found | {"outcome": "missed", "reason": f"{bound:.3f} ms is not below {limit:g} ms"}
+    if threshold.quantile in SHARES and _surely_above(whole, threshold):
+        said = f"too many of the {whole.total} samples are not below {limit:g} ms"
+        return found | {"outcome": "missed", "reason": said}
+    return found
+
+
+def _surely_above(histogram: Histogram, threshold: Threshold) -> bool:
+    """Return whether even few samples prove that a quantile lies above its threshold.
+
+    They do where so few samples below the threshold would occur in less than 2.5 % of all runs if it were met.
     """
     bins, counts = histogram.arrays()
     below = int(counts[edges_us(bins)[0] < threshold.below_ms * 1e3].sum())
     chance = float(stats.binom.cdf(below, histogram.total, SHARES[threshold.quantile]))
     return histogram.total > 0 and chance < _SMALL_CHANCE
-
-
-def judge(measured: Measured, thresholds: Iterable[Threshold]) -> list[dict[str, Any]]:
-    """The `thresholds` of latency.json: each against the upper bound of its interval, failed requests included."""
-    found = []
-    for threshold in thresholds:
-        entry = threshold.as_message() | {
-            "measured_ms": None,
-            "bound_ms": None,
-            "outcome": "inconclusive",
-            "reason": None,
-        }
-        name = (threshold.operation, threshold.interface, threshold.client)
-        if name not in measured.plan.series_names():
-            entry["reason"] = "not measured in this run"
-            found.append(entry)
-            continue
-        units = measured.units(name, threshold.time)
-        whole = measured.whole(name, threshold.time)
-        entry["measured_ms"] = quantiles(whole)[0][threshold.quantile]
-        if threshold.quantile == "max":
-            bound, reason = entry["measured_ms"], None if whole.total else "no samples"
-        else:
-            estimate = figure_interval_ms(units, threshold.quantile, measured.plan.load.seed)
-            bound, reason = estimate.interval[1] if estimate.interval else None, estimate.reason
-        entry["bound_ms"], entry["reason"] = bound, reason
-        if bound is None and threshold.quantile in SHARES and _surely_above(whole, threshold):
-            entry["outcome"] = "missed"
-            entry["reason"] = f"too many of the {whole.total} samples are not below {threshold.below_ms:g} ms"
-        if bound is not None:
-            met = bound < threshold.below_ms
-            entry["outcome"] = "met" if met else "missed"
-            entry["reason"] = None if met else f"{bound:.3f} ms is not below {threshold.below_ms:g} ms"
-        found.append(entry)
-    return found

@@ -1,1 +1,1 @@
-"""Signed certificates: keys, the signed statement, its envelope, the policy that a relying party checks it by."""
+"""Signed certificates: keys, the signed statement, its envelope, and the policy by which a relying party judges it."""

@@ -1,8 +1,8 @@
 """The envelope around a signed statement, as a file: DSSE v1 (Dead Simple Signing Envelope) with one signature.
 
-What securesystemslib leaves open is checked here: that the payload's type is in-toto's, that there is one signature,
-that the base64 is the one way to write the octets, and that there is nothing else in the envelope, such as a key: whom
-to trust is for the relying party to say, never for the file. Nothing here verifies; see `signature`.
+This module checks what securesystemslib does not: the payload's type is in-toto's, there is exactly one signature, the
+base64 is canonical, and the envelope has no other members. A key inside it, for example, is refused, because only the
+relying party decides whom to trust. `signature` verifies the signature.
 """
 
 import base64
@@ -17,7 +17,7 @@ from reports.errors import EnvelopeRefusedError, ResultMissingError, ResultUnrea
 
 ENVELOPE_NAME = "certificate.intoto.json"
 _MOST_OCTETS = 4 << 20
-"""A certificate has some kilobytes; what is larger is none, and is not parsed."""
+"""A certificate has some kilobytes; a larger file is not parsed."""
 
 
 class _Signature(msgspec.Struct, forbid_unknown_fields=True):
@@ -32,12 +32,12 @@ class _Envelope(msgspec.Struct, forbid_unknown_fields=True, rename="camel"):
 
 
 class Opened(NamedTuple):
-    """An envelope, of which nothing is verified.
+    """An envelope whose signature is not verified.
 
     Attributes:
-        payload: what the signature is over, with its type.
+        payload: the signed content.
         keyid: the key that the signature names.
-        signature: the signature.
+        signature: the signature itself.
     """
 
     payload: bytes
@@ -46,54 +46,54 @@ class Opened(NamedTuple):
 
 
 def read_envelope(path: Path) -> bytes:
-    """Read an envelope's file, of one that is too large no more than shows it.
+    """Return an envelope's file, cut off shortly after the largest size that is accepted.
 
     Raises:
-        ResultMissingError: there is none.
+        ResultMissingError: there is no such file.
         ResultUnreadableError: it cannot be read.
     """
     try:
         with path.open("rb") as file:
             return file.read(_MOST_OCTETS + 1)
     except FileNotFoundError as error:
-        raise ResultMissingError(f"{path}: there is no such file") from error
+        raise ResultMissingError(f"{path}: no such file") from error
     except OSError as error:
         raise ResultUnreadableError(f"{path}: {error.strerror or error}") from error
 
 
 def open_envelope(octets: bytes) -> Opened:
-    """Take an envelope apart.
+    """Return the parts of an envelope.
 
     Raises:
-        EnvelopeRefusedError: it is not as `signature.seal` makes it.
+        EnvelopeRefusedError: it is not as `signature.seal` writes it.
     """
     if len(octets) > _MOST_OCTETS:
-        raise EnvelopeRefusedError(f"it is no certificate: it has more than {_MOST_OCTETS} octets")
+        raise EnvelopeRefusedError(f"not a certificate: it has more than {_MOST_OCTETS} octets")
     try:
         envelope = msgspec.json.decode(octets, type=_Envelope)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise EnvelopeRefusedError(f"it is no envelope with one signature: {error}") from error
+        raise EnvelopeRefusedError(f"not an envelope with one signature: {error}") from error
     if envelope.payload_type != PAYLOAD_TYPE:
-        raise EnvelopeRefusedError(f"its payload type is {envelope.payload_type[:80]!r}, and not {PAYLOAD_TYPE}")
+        raise EnvelopeRefusedError(f"the payload type is {envelope.payload_type[:80]!r}, not {PAYLOAD_TYPE}")
     signature = envelope.signatures[0]
     if not signature.keyid:
-        raise EnvelopeRefusedError("its signature names no key")
+        raise EnvelopeRefusedError("the signature names no key")
     return Opened(_octets(envelope.payload, "payload"), signature.keyid, _octets(signature.sig, "signature"))
 
 
 def statement_in(opened: Opened) -> Statement:
-    """What an envelope says, whoever signed it.
+    """Return the statement in an envelope, whose signature is not verified.
 
     Raises:
-        EnvelopeRefusedError: it is no certificate.
+        EnvelopeRefusedError: it is not a certificate.
     """
     try:
         statement = msgspec.json.decode(opened.payload, type=Statement)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise EnvelopeRefusedError(f"what was signed is no certificate of a run: {error}") from error
+        raise EnvelopeRefusedError(f"the signed content is not a certificate of a run: {error}") from error
     for found, wanted in ((statement.type, STATEMENT_TYPE), (statement.predicate_type, PREDICATE_TYPE)):
         if found != wanted:
-            raise EnvelopeRefusedError(f"what was signed is {found[:80]!r}, and not {wanted}")
+            raise EnvelopeRefusedError(f"the signed content is of type {found[:80]!r}, not {wanted}")
     return statement
 
 
@@ -101,7 +101,7 @@ def _octets(text: str, what: str) -> bytes:
     try:
         octets = base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError) as error:
-        raise EnvelopeRefusedError(f"its {what} is no base64: {error}") from error
+        raise EnvelopeRefusedError(f"the {what} is not base64: {error}") from error
     if base64.b64encode(octets).decode() != text:
-        raise EnvelopeRefusedError(f"its {what} is base64 as no encoder writes it")
+        raise EnvelopeRefusedError(f"the {what} is not canonical base64")
     return octets

@@ -1,7 +1,7 @@
 """Ed25519 keys as PEM files, which `openssl pkey` reads as well.
 
-A key is named by its fingerprint: SHA-256 over the public key as DER (SubjectPublicKeyInfo, RFC 8410). It is what
-`openssl pkey -pubin -in public-key.pem -outform DER | sha256sum` shows.
+A key is identified by its fingerprint: SHA-256 of the public key as DER (SubjectPublicKeyInfo, RFC 8410), as
+`openssl pkey -pubin -in public-key.pem -outform DER | sha256sum` prints it.
 """
 
 import hashlib
@@ -25,13 +25,10 @@ PUBLIC_NAME = "public-key.pem"
 
 
 def generate(directory: Path) -> str:
-    """Make a key pair and write it to signing-key.pem (for its owner's eyes alone) and public-key.pem.
-
-    Returns:
-        Its fingerprint.
+    """Make a key pair, write it to signing-key.pem (mode 0600) and public-key.pem, and return its fingerprint.
 
     Raises:
-        KeyUnusableError: one of the files is there already, or the folder cannot be written to.
+        KeyUnusableError: one of the files exists already, or the folder cannot be written to.
     """
     signer = CryptoSigner.generate_ed25519()
     public = load_pem_private_key(signer.private_bytes, None).public_key()
@@ -40,7 +37,7 @@ def generate(directory: Path) -> str:
     try:
         directory.mkdir(parents=True, exist_ok=True)
         for name, octets, mode in ((PRIVATE_NAME, signer.private_bytes, 0o600), (PUBLIC_NAME, pem, 0o644)):
-            # Created with its mode, and never over a key that somebody may still need.
+            # The mode is set at creation, and an existing key is never overwritten.
             with os.fdopen(os.open(directory / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
                 file.write(octets)
     except OSError as error:
@@ -51,37 +48,37 @@ def generate(directory: Path) -> str:
 
 
 def signer_of(path: Path) -> CryptoSigner:
-    """Read a private key.
+    """Return the signer of a private key file.
 
     Raises:
-        KeyUnusableError: it cannot be read, has a passphrase, or is no Ed25519 private key.
+        KeyUnusableError: it cannot be read, has a passphrase, or is not an Ed25519 private key.
     """
     try:
         key = load_pem_private_key(_octets(path), None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:
-        raise KeyUnusableError(f"{path}: it is no private key in PEM without a passphrase") from error
+        raise KeyUnusableError(f"{path}: not a private key in PEM without a passphrase") from error
     if not isinstance(key, Ed25519PrivateKey):
-        raise KeyUnusableError(f"{path}: it is no Ed25519 key; `roaas keygen` makes one")
+        raise KeyUnusableError(f"{path}: not an Ed25519 key; `roaas keygen` makes one")
     return CryptoSigner(key, _named(key.public_key()))
 
 
 def public_key(path: Path) -> SSlibKey:
-    """Read a public key.
+    """Return a public key.
 
     Raises:
-        KeyUnusableError: it cannot be read, or is no Ed25519 public key.
+        KeyUnusableError: it cannot be read, or is not an Ed25519 public key.
     """
     try:
         key = load_pem_public_key(_octets(path))
     except (ValueError, UnsupportedAlgorithm) as error:
-        raise KeyUnusableError(f"{path}: it is no public key in PEM") from error
+        raise KeyUnusableError(f"{path}: not a public key in PEM") from error
     if not isinstance(key, Ed25519PublicKey):
-        raise KeyUnusableError(f"{path}: it is no Ed25519 key")
+        raise KeyUnusableError(f"{path}: not an Ed25519 key")
     return _named(key)
 
 
 def fingerprint(key: Ed25519PublicKey) -> str:
-    """SHA-256 over the key as DER, in hexadecimal."""
+    """Return the SHA-256 of the key as DER, in hexadecimal."""
     return hashlib.sha256(key.public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)).hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""The policy: what a relying party asks of a certificate beyond its signature, each point a line of a TOML file."""
+"""The policy: what a relying party requires of a certificate besides its signature, one point a line in TOML."""
 
 import datetime as dt
 import tomllib
@@ -13,19 +13,19 @@ from reports.attestation.statement import Run, Statement, passed, seed_of
 from reports.errors import PolicyUnusableError
 
 _SKEW = dt.timedelta(minutes=5)
-"""As much as the clock of whoever certified may be ahead of ours."""
+"""How far the vendor's clock may be ahead of ours."""
 OWN = "installed"
-"""In a policy, the suite that verifies."""
+"""In a policy, this word means the suite that verifies."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """What the suite that verifies knows.
+    """What the verifying suite knows.
 
     Attributes:
-        suite: its own digest.
-        requirement_sets: name to digest.
-        profiles: name to the classes that it holds.
+        suite: its digest.
+        requirement_sets: digests by name.
+        profiles: classes by name of the profile.
     """
 
     suite: str = ""
@@ -34,21 +34,21 @@ class Known:
 
 
 class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is asked; the defaults are the default policy, and docs/certificates.md explains each.
+    """What a certificate must meet. The defaults are the default policy; docs/certificates.md explains each point.
 
     Attributes:
         robot: the robot's name, or None for any; vendor and firmware likewise.
-        verdicts: of the whole run that will do.
-        profile: whose classes have to have passed; classes: these instead.
-        suites: digests of suites that are trusted; "installed" is the one that verifies.
-        requirement_sets: names of sets that this suite knows, too.
-        efforts: how much has to have been tried.
-        motion: whether the robot has to have been moved.
-        ros: whether its ROS side has to have been watched where a class asks for it.
-        baseline: whether failures may have been accepted.
-        interrupted: whether a part of a run will do.
-        max_age_days: since the end of the run.
-        nonce: that the run has to have been made with, or None.
+        verdicts: accepted verdicts of the whole run.
+        profile: the profile whose classes must have passed, unless `classes` names them.
+        suites: digests of trusted suites; "installed" is the one that verifies.
+        requirement_sets: names of accepted sets, which the verifying suite must know.
+        efforts: accepted efforts.
+        motion: whether the robot must have been allowed to move.
+        ros: whether ROS topics must have been observed for the classes that ask for it.
+        baseline: whether accepted failures are tolerated.
+        interrupted: whether an incomplete run is tolerated.
+        max_age_days: greatest age of the run.
+        nonce: the nonce that the run must have been made with, or None.
     """
 
     robot: str | None = None
@@ -69,7 +69,7 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Point(NamedTuple):
-    """One point of a policy: its line, whether the certificate meets it, and what was found."""
+    """One point of a policy: its name, whether the certificate meets it, and what the certificate says."""
 
     name: str
     met: bool
@@ -77,10 +77,10 @@ class Point(NamedTuple):
 
 
 def read_policy(path: Path, known: Known) -> Policy:
-    """Read a policy file.
+    """Return the policy in a file.
 
     Raises:
-        PolicyUnusableError: it cannot be read, has an unknown line, or names a profile that there is not.
+        PolicyUnusableError: it cannot be read, has an unknown line, or names an unknown profile.
     """
     try:
         policy = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Policy)
@@ -94,73 +94,76 @@ def read_policy(path: Path, known: Known) -> Policy:
 
 
 def judge(statement: Statement, policy: Policy, known: Known, now: dt.datetime) -> list[Point]:
-    """Compare a verified statement with a policy, point by point."""
+    """Judge a verified statement by a policy, point by point."""
     run = statement.predicate.roaas
-    return [*_who(run, policy), *_what(run, policy, known), *_how(run, policy, known), *_when(run, policy, now)]
+    return [*_robot(run, policy), *_verdict(run, policy, known), *_run(run, policy, known), *_time(run, policy, now)]
 
 
-def _who(run: Run, policy: Policy) -> Iterator[Point]:
+def _robot(run: Run, policy: Policy) -> Iterator[Point]:
     for line, found in (("robot", run.robot.name), ("vendor", run.robot.vendor), ("firmware", run.robot.version)):
         wanted = policy.firmware if line == "firmware" else getattr(policy, line)
-        asked = "" if wanted in {None, found} else f"; you asked for {wanted!r}"
+        asked = "" if wanted in {None, found} else f"; the policy requires {wanted!r}"
         yield Point(line, not asked, f"{found or 'not named'}{asked}")
 
 
-def _what(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
+def _verdict(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
     yield Point("verdicts", run.verdict in policy.verdicts, run.verdict)
     wanted = known.profiles.get(policy.profile, ()) if policy.classes is None else policy.classes
     there = passed(run)
     missing = [name for name in wanted if name not in there]
-    told = f"{', '.join(there) or 'none'} passed"
+    text = f"{', '.join(there) or 'none'} passed"
     yield Point(
-        "classes", not missing and bool(there), f"{told}; not passed: {', '.join(missing)}" if missing else told
+        "classes", not missing and bool(there), f"{text}; not passed: {', '.join(missing)}" if missing else text
     )
     accepted = f": {', '.join(run.accepted)}" if run.accepted else ""
     used = run.baseline is not None or bool(run.accepted) or run.accepted_until is not None
-    yield Point("baseline", policy.baseline or not used, f"failures were accepted{accepted}" if used else "none")
     yield Point(
-        "interrupted", policy.interrupted or not run.interrupted, "a part of a run" if run.interrupted else "no"
+        "baseline",
+        policy.baseline or not used,
+        f"failures were accepted{accepted}" if used else "no failure was accepted",
     )
+    text = "the run was interrupted" if run.interrupted else "the run is complete"
+    yield Point("interrupted", policy.interrupted or not run.interrupted, text)
 
 
-def _how(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
+def _run(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
     trusted = {known.suite if digest == OWN else digest for digest in policy.suites} - {""}
-    unknown = "" if run.suite.digest in trusted else ", which is not known"
+    unknown = "" if run.suite.digest in trusted else ", which the policy does not trust"
     yield Point("suites", not unknown, f"RoAAS {run.suite.version}, {run.suite.digest}{unknown}")
     yield _requirement_set(run, policy, known)
     yield Point("efforts", run.effort in policy.efforts, run.effort)
     moved = "the robot was allowed to move" if run.motion_allowed else "the robot was not allowed to move"
     yield Point("motion", run.motion_allowed or not policy.motion, moved)
     black_box = [name for name in passed(run) if run.views.get(name) == "black box"]
-    told = f"seen as a black box: {', '.join(black_box)}" if black_box else "no class was a black box"
-    yield Point("ros", not (policy.ros and black_box), told)
+    text = f"ROS topics not observed: {', '.join(black_box)}" if black_box else "observed where a passed class uses it"
+    yield Point("ros", not (policy.ros and black_box), text)
 
 
 def _requirement_set(run: Run, policy: Policy, known: Known) -> Point:
     found = run.requirement_set
     wrong = ""
     if found is None:
-        wrong = "none that is frozen: a contract of its own"
+        wrong = "none: the run used an own contract"
     elif found.name not in policy.requirement_sets:
-        wrong = f"{found.name}, which is not accepted"
+        wrong = f"{found.name}, which the policy does not accept"
     elif known.requirement_sets.get(found.name) != found.digest:
-        wrong = f"{found.name}, with other requirements than are known by that name"
+        wrong = f"{found.name}, but with other requirements than the set {found.name} of this suite"
     return Point("requirement_sets", not wrong, wrong or (found.name if found else ""))
 
 
-def _when(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
+def _time(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
     if run.ended is None:
-        yield Point("max_age_days", met=False, found=f"{run.finished[:40]!r} is no time in UTC")
+        yield Point("max_age_days", met=False, found=f"{run.finished[:40]!r} is not a time in UTC")
     else:
         age = now - run.ended
-        told = f"the run ended on {run.ended:%Y-%m-%d %H:%M} UTC"
+        text = f"the run ended on {run.ended:%Y-%m-%d %H:%M} UTC"
         days = f", {age.days} days ago" if age.days > 0 else ""
-        yield Point("max_age_days", -_SKEW <= age <= dt.timedelta(days=policy.max_age_days), told + days)
+        yield Point("max_age_days", -_SKEW <= age <= dt.timedelta(days=policy.max_age_days), text + days)
     if policy.nonce is None:
-        told, fresh = "you asked for none", True
+        text, fresh = "you gave no nonce", True
     elif run.nonce != policy.nonce:
-        told, fresh = f"the run has {run.nonce!r}, and you gave {policy.nonce!r}", False
+        text, fresh = f"the run has {run.nonce!r}, but you gave {policy.nonce!r}", False
     else:
-        told, fresh = "yours", run.seed == seed_of(policy.nonce)
-        told += "" if fresh else f", and its seed {run.seed} does not follow from it"
-    yield Point("nonce", fresh, told)
+        text, fresh = "the one that you gave", run.seed == seed_of(policy.nonce)
+        text += "" if fresh else f", but the seed {run.seed} was not derived from it"
+    yield Point("nonce", fresh, text)

@@ -1,4 +1,4 @@
-"""Signing: a result and the pages that were written from it in, an envelope out."""
+"""Signing of a result and of the pages written from it."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,26 +18,26 @@ class Notary:
     """
 
     def __init__(self, path: Path) -> None:
-        """Read the private key; errors as in `keys.signer_of`."""
+        """Read the private key; errors as for `keys.signer_of`."""
         self._signer = signer_of(path)
         self.key = self._signer.public_key.keyid
 
     def envelope(self, path: Path, result: Mapping[str, Any], pages: Mapping[str, str]) -> str:
-        """The envelope for a result file and its pages.
+        """Return the envelope for a result file and its pages.
 
         Raises:
-            ResultInvalidError: the result contradicts itself, as one that was edited may.
+            ResultInvalidError: the result contradicts itself, for example because it was edited.
         """
         _agree(path, result)
         return seal(statement_of(result, path.read_bytes(), pages), self._signer)
 
 
 def _agree(path: Path, result: Mapping[str, Any]) -> None:
-    """Refuse a verdict that does not follow from the classes, or a class that does not from its requirements."""
+    """Refuse a verdict that contradicts the classes, and a class that contradicts its requirements."""
     passed = {name for name, verdict in result["classes"].items() if verdict == "pass"}
     claimed = {name for name, verdict in result["classes"].items() if verdict != "not-claimed"}
     for item in result["requirements"]:
         if item["verdict"] == "fail" and item["class"] in passed:
-            raise ResultInvalidError(f"{path}: class {item['class']} is told to have passed, and {item['id']} did not")
+            raise ResultInvalidError(f"{path}: it says that class {item['class']} passed, although {item['id']} failed")
     if result["verdict"] == "conformant" and (not passed or passed != claimed):
-        raise ResultInvalidError(f"{path}: it is told to be conformant, and not each of its classes passed")
+        raise ResultInvalidError(f"{path}: it says conformant, although not all claimed classes passed")

@@ -1,9 +1,8 @@
-"""What is signed: an in-toto Statement v1 whose predicate is a Simple Verification Result (SVR) v0.2.
+"""The signed statement: an in-toto Statement v1 whose predicate is a Simple Verification Result (SVR) v0.2.
 
-SVR names the properties that were verified, so a class that failed, was inconclusive or passed only because
-failures are accepted is simply not among them; in-toto's test-result knows PASSED, WARNED and FAILED only, and
-would have to call such a run one of the three. What a relying party asks beyond that stands in the predicate's
-extension field `roaas` (a consumer ignores what it does not know: in-toto attestation, parsing rules).
+SVR lists verified properties: the classes that passed without an accepted failure. in-toto's test-result predicate was
+not used, because it has only PASSED, WARNED and FAILED for a whole run. Everything else that a policy checks is in the
+predicate's extension field `roaas`; consumers ignore fields that they do not know (in-toto attestation, parsing rules).
 """
 
 import datetime as dt
@@ -18,30 +17,30 @@ PAYLOAD_TYPE = "application/vnd.in-toto+json"
 STATEMENT_TYPE = "https://in-toto.io/Statement/v1"
 PREDICATE_TYPE = "https://in-toto.io/attestation/svr/v0.2"
 PROPERTY = "ROAAS_CLASS_"
-"""What the name of a class is prefixed with among the verified properties."""
+"""Prefix of a class among the verified properties."""
 RESULT_SUBJECT = "result.json"
 PAGE_SUBJECTS = ("certificate.html", "certificate-print.html")
 STATEMENT_SUBJECT = "statement"
 CONTRACT_SUBJECT = "contract/"
-"""What the name of a file of the contract is prefixed with among the subjects."""
+"""Prefix of a contract file among the subjects."""
 
 Text = str | None
 
 
 class Subject(msgspec.Struct, frozen=True):
-    """An artifact, identified by its SHA-256 digest in hexadecimal; of its name, only a reader makes use."""
+    """An artifact, identified by its SHA-256 digest in hexadecimal; the name is for readers."""
 
     name: str
     digest: dict[str, str]
 
     @property
     def sha256(self) -> str:
-        """The digest, or nothing where there is only one of another kind."""
+        """Return the digest, or an empty string if there is none of this kind."""
         return self.digest.get("sha256", "")
 
 
 class Robot(msgspec.Struct, frozen=True):
-    """Whom the result is about, as the vendor's statement names it."""
+    """The robot, as the vendor's statement names it."""
 
     name: Text = None
     vendor: Text = None
@@ -49,7 +48,7 @@ class Robot(msgspec.Struct, frozen=True):
 
 
 class Suite(msgspec.Struct, frozen=True):
-    """Who judged, and by which contract."""
+    """The suite, and the contract by which it judged."""
 
     version: str
     digest: str
@@ -57,29 +56,28 @@ class Suite(msgspec.Struct, frozen=True):
 
 
 class RequirementSet(msgspec.Struct, frozen=True):
-    """By which requirements."""
+    """The requirements by which the suite judged."""
 
     name: str
     digest: str
 
 
 class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What a relying party asks of a run; nothing of addresses and tokens.
+    """What a policy checks of a run; it holds neither addresses nor tokens.
 
     Attributes:
-        verdict: of the whole.
-        classes: the verdict of each class.
-        requirements: how many have each verdict.
-        outcomes: which, by level and verdict, so that two certificates can be compared; empty in those that were signed
-            before this was.
+        verdict: verdict of the whole run.
+        classes: verdict of each class.
+        requirements: number of requirements with each verdict.
+        outcomes: ids by level and verdict, so that two certificates can be compared; empty in older certificates.
         accepted: ids of the requirements whose failure the baseline accepts.
-        accepted_until: until when, where a baseline is why the run ended well.
+        accepted_until: last day on which the baseline accepts all failures, if it does.
         baseline: digest of the file of accepted failures, or None.
-        nonce: what the relying party asked the run to be made with, or None.
-        views: from where each class was seen that a look at the ROS side could have judged further.
-        intermittent: ids of the requirements that failed at times.
+        nonce: the relying party's nonce that the run was made with, or None.
+        views: for classes that depend on it, whether ROS topics were observed.
+        intermittent: ids of the requirements that failed only at times.
         started: RFC 3339, UTC.
-        finished: as started.
+        finished: RFC 3339, UTC.
     """
 
     robot: Robot
@@ -104,7 +102,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @property
     def ended(self) -> dt.datetime | None:
-        """`finished` as a time; None where it is none in UTC."""
+        """Return `finished` as a time, or None if it is not a time in UTC."""
         try:
             moment = dt.datetime.fromisoformat(self.finished)
         except ValueError:
@@ -113,14 +111,14 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Verifier(msgspec.Struct, frozen=True):
-    """The suite; `policies` are the contract's files."""
+    """The suite that verified the robot; `policies` are the contract's files."""
 
     id: str
     policies: list[Subject]
 
 
 class Predicate(msgspec.Struct, frozen=True, rename="camel"):
-    """SVR v0.2, with the extension."""
+    """SVR v0.2 with the extension field `roaas`."""
 
     verifier: Verifier
     time_created: str
@@ -137,17 +135,17 @@ class Statement(msgspec.Struct, frozen=True, rename="camel"):
     predicate: Predicate
 
     def digest_of(self, name: str) -> str | None:
-        """The digest of the subject of that name, or None where there is none."""
+        """Return the digest of the subject with that name, or None."""
         return next((item.sha256 for item in self.subject if item.name == name), None)
 
 
 def statement_of(result: Mapping[str, Any], octets: bytes, pages: Mapping[str, str]) -> Statement:
-    """Put together what is to be signed.
+    """Return the statement to sign.
 
     Args:
         result: a valid `roaas-result/1` document.
-        octets: the file that it was read from.
-        pages: the certificate that was written from it, by the names of its files.
+        octets: the content of its file.
+        pages: the pages written from it, by file name.
     """
     digests = result.get("digests") or {}
     contract = [
@@ -164,23 +162,23 @@ def statement_of(result: Mapping[str, Any], octets: bytes, pages: Mapping[str, s
 
 
 def passed(run: Run) -> list[str]:
-    """The classes that passed without a failure that is accepted."""
+    """Return the classes that passed without an accepted failure."""
     accepted = {id_.partition("/")[0] for id_ in run.accepted}
     return [name for name, verdict in run.classes.items() if verdict == "pass" and name not in accepted]
 
 
 def property_name(class_: str) -> str:
-    """A class as it stands among the properties: `rest-resources` as REST_RESOURCES."""
+    """Return the property of a class: REST_RESOURCES for `rest-resources`."""
     return class_.upper().replace("-", "_")
 
 
 def sha256(octets: bytes) -> str:
-    """Digest in hexadecimal."""
+    """Return the SHA-256 in hexadecimal."""
     return hashlib.sha256(octets).hexdigest()
 
 
 def seed_of(nonce: str) -> int:
-    """The seed that a run with this nonce has; `roaas certify --nonce` derives it likewise."""
+    """Return the seed of a run with this nonce, which `roaas certify --nonce` derives in the same way."""
     return int.from_bytes(hashlib.sha256(b"roaas-nonce/1\0" + nonce.encode()).digest()[:6])
 
 

@@ -1,4 +1,4 @@
-"""Verification: the signature, the policy, the files beside it, and in plain words what that proves."""
+"""Verification: the signature, the policy, the files beside it, and what that proves."""
 
 import datetime as dt
 from collections.abc import Iterator
@@ -13,35 +13,35 @@ from reports.attestation.statement import PAGE_SUBJECTS, RESULT_SUBJECT, Stateme
 from reports.errors import ResultUnreadableError
 
 PROVED = (
-    "Proved: the holder of this key says that this run took place and gave this, and nothing was changed since it "
-    "was signed."
+    "Proved: the holder of this key vouches that this run took place and gave this result, and nothing was changed "
+    "since it was signed."
 )
 NOT_PROVED = (
-    "Not proved: that the robot is genuine, that the software that ran was the suite that it names, or that another "
-    "run would give the same. Who holds the key, and whether to believe them, is for you to know."
+    "Not proved: that the robot is genuine, that the named suite really ran, or that another run would give the same "
+    "result. You have to know who holds the key, and decide whether to trust them."
 )
 
 
 @dataclass(frozen=True)
 class Verification:
-    """What came of it: what was signed, and the points of the policy, the files compared included."""
+    """The signed statement, and the points of the policy, including the compared files."""
 
     statement: Statement
     points: tuple[Point, ...]
 
     @property
     def accepted(self) -> bool:
-        """Whether every point is met."""
+        """Return whether every point is met."""
         return all(point.met for point in self.points)
 
 
 def verify(
     octets: bytes, key: Key, policy: Policy, known: Known, *, now: dt.datetime, directory: Path | None = None
 ) -> Verification:
-    """Verify an envelope, and the result in a directory where one is given.
+    """Verify an envelope, and the result in a directory if one is given.
 
     Raises:
-        EnvelopeRefusedError: it is not signed by the key, or no certificate.
+        EnvelopeRefusedError: it is not signed by the key, or not a certificate.
         ResultUnreadableError: the directory's result cannot be read.
     """
     statement = unseal(octets, key)
@@ -50,7 +50,7 @@ def verify(
 
 
 def _files(statement: Statement, directory: Path) -> Iterator[Point]:
-    """Whether result.json, and the pages that are there, are those that were signed."""
+    """Yield for result.json, and for each page that exists, whether it is the file that was signed."""
     for name in (RESULT_SUBJECT, *PAGE_SUBJECTS):
         path = directory / name
         if name in PAGE_SUBJECTS and not path.exists():

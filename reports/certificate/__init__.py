@@ -1,1 +1,1 @@
-"""What becomes of result.json: the certificate as HTML and Markdown, and what changed between two."""
+"""The certificate of a result.json as HTML and Markdown, and the difference of two results."""

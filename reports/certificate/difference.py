@@ -1,7 +1,7 @@
-"""What changed between two conformance results: each requirement that did, under what happened to it.
+"""What changed between two conformance results, requirement by requirement.
 
-A failure is a requirement that was judged and not met, whatever its level and whether or not a baseline accepts it;
-so a change of level, or of what is accepted, is no change of the robot.
+A failure is a requirement that was judged and not met, whatever its level, and whether or not the baseline accepts it.
+So a change of the level or of the baseline does not count as a change of the robot.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,39 +13,39 @@ Requirement = Mapping[str, Any]
 
 
 class Kind(StrEnum):
-    """What happened to a requirement, the worst first."""
+    """What happened to a requirement, the worst change first."""
 
     NEW_FAILURE = "new failures"
     LOST = "lost coverage"
     NEW_WARNING = "new warnings"
-    ACCEPTED = "failures accepted since"
-    OUT_OF_SIGHT = "failures out of sight"
+    ACCEPTED = "newly accepted failures"
+    OUT_OF_SIGHT = "failures no longer judged"
     FIXED = "fixed"
     FIRST_JUDGED = "judged for the first time"
     LEVEL = "changed levels"
     TEXT = "changed texts"
     ADDED = "added to the requirements"
-    REMOVED = "taken out of the requirements"
+    REMOVED = "removed from the requirements"
 
 
 MEANINGS = {
-    Kind.NEW_FAILURE: "A MUST that fails and did not before.",
-    Kind.LOST: "It passed before and was not judged now: nobody knows whether it still holds.",
-    Kind.NEW_WARNING: "A recommendation (SHOULD) that is not followed any more.",
-    Kind.ACCEPTED: "The baseline accepts a failure that it did not accept before, or that is new.",
-    Kind.OUT_OF_SIGHT: "It failed before and was not judged now: that is not fixed.",
+    Kind.NEW_FAILURE: "A MUST that fails now and did not before.",
+    Kind.LOST: "It passed before and could not be judged now, so it is unknown whether it still passes.",
+    Kind.NEW_WARNING: "A recommendation (SHOULD) that is not followed now and was before.",
+    Kind.ACCEPTED: "The baseline accepts a failure that is new, or that it did not accept before.",
+    Kind.OUT_OF_SIGHT: "It failed before and could not be judged now. It may not be fixed.",
     Kind.FIXED: "It failed before and passes now.",
-    Kind.FIRST_JUDGED: "It was not judged before: nothing can be compared.",
-    Kind.LEVEL: "The suite's requirements changed, and not the robot.",
-    Kind.TEXT: "The suite asks for something else under the same name.",
-    Kind.ADDED: "The older suite did not have it: nothing can be compared.",
+    Kind.FIRST_JUDGED: "It was not judged before, so there is nothing to compare.",
+    Kind.LEVEL: "The suite changed the level of the requirement. The robot did not change.",
+    Kind.TEXT: "The suite changed the text of the requirement, so the two verdicts may mean different things.",
+    Kind.ADDED: "The older suite did not have it, so there is nothing to compare.",
     Kind.REMOVED: "The newer suite does not have it.",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One requirement in both results; None where one of them has none such."""
+    """One requirement in both results; None if a result does not have it."""
 
     id: str
     kind: Kind
@@ -54,12 +54,12 @@ class Change:
 
     @property
     def text(self) -> str:
-        """What is required, by the newer result."""
+        """Return the text of the requirement in the newer result."""
         return str((self.new or self.old or {})["text"])
 
     @property
     def course(self) -> str:
-        """From what to what: levels and verdicts."""
+        """Return level and verdict, before → now."""
         levels = [item["level"] for item in (self.old, self.new) if item]
         verdicts = [item["verdict"] if item else "absent" for item in (self.old, self.new)]
         level = levels[0] if levels[0] == levels[-1] else f"{levels[0]} → {levels[-1]}"
@@ -67,12 +67,12 @@ class Change:
 
     @property
     def reason(self) -> str:
-        """Why the newer result says what it says."""
+        """Return the reason in the newer result."""
         return str((self.new or {}).get("reason") or "")
 
     @property
     def regression(self) -> bool:
-        """Whether the robot kept it and does not any more, or nobody knows any more whether it does."""
+        """Return whether a MUST newly fails, or passed before and could not be judged now."""
         return self.kind is Kind.NEW_FAILURE or (
             self.kind is Kind.LOST and self.new is not None and self.new["level"] == "MUST"
         )
@@ -83,9 +83,9 @@ class Difference:
     """Two results compared.
 
     Attributes:
-        changes: what changed, the worst first.
-        circumstances: what was different about the runs: name, before, now.
-        still_failing: how many requirements failed before and fail now.
+        changes: the changes, the worst first.
+        circumstances: how the runs differ: name, before, now.
+        still_failing: number of requirements that failed before and fail now.
     """
 
     old: Mapping[str, Any]
@@ -96,14 +96,14 @@ class Difference:
 
     @property
     def groups(self) -> dict[Kind, tuple[Change, ...]]:
-        """The changes by what happened, each kind that occurs."""
+        """Return the changes of each kind that occurs."""
         return {
             kind: found for kind in Kind if (found := tuple(change for change in self.changes if change.kind is kind))
         }
 
     @property
     def regressions(self) -> tuple[Change, ...]:
-        """The changes for the worse."""
+        """Return the regressions."""
         return tuple(change for change in self.changes if change.regression)
 
 
@@ -136,7 +136,7 @@ def _kinds(old: Requirement | None, new: Requirement | None) -> Iterator[Kind]:
 
 
 def _course(old: Requirement, new: Requirement) -> Iterator[Kind]:
-    """What became of the verdict."""
+    """Yield the kinds of change that follow from the two verdicts."""
     if old["verdict"] == "not-claimed" and _judged(new):
         yield Kind.FIRST_JUDGED
     elif _failed(new):

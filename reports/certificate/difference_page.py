@@ -1,4 +1,4 @@
-"""What `roaas diff` says: in the terminal, as a page and as Markdown."""
+"""The output of `roaas diff`: text for the terminal, a page, and Markdown."""
 
 from typing import Any
 
@@ -7,22 +7,22 @@ from reports.pages.page import html_page, markdown_page, opened
 from reports.pages.untrusted import excerpt
 
 SHOWN = 50
-"""Requirements of one kind that are listed; the rest are counted."""
+"""Requirements of one kind of change that are listed; the rest are counted."""
 _TONES = {Kind.NEW_FAILURE: "bad", Kind.LOST: "warning", Kind.FIXED: "good"}
 
 
 def headline(found: Difference) -> str:
-    """The answer in a sentence."""
+    """Return a summary in a sentence."""
     counts = [f"{len(changes)} {kind}" for kind, changes in found.groups.items() if kind in _TONES]
     still = f"{found.still_failing} still failing" if found.still_failing else ""
-    told = ", ".join([*counts, *filter(None, [still])]) or "no requirement changed its verdict"
+    summary = ", ".join([*counts, *filter(None, [still])]) or "no requirement changed its verdict"
     number = len(found.regressions)
     worse = f"{number} {'regression' if number == 1 else 'regressions'}" if number else "No regression"
-    return f"{worse}: {told}."
+    return f"{worse}: {summary}."
 
 
 def difference_text(found: Difference) -> str:
-    """For a terminal."""
+    """Return the text for a terminal."""
     lines = [headline(found)]
     for kind, changes in found.groups.items():
         lines += ["", f"{opened(kind)} ({len(changes)}). {MEANINGS[kind]}"]
@@ -33,18 +33,18 @@ def difference_text(found: Difference) -> str:
         if len(changes) > SHOWN:
             lines.append(f"  and {len(changes) - SHOWN} more")
     if found.circumstances:
-        lines += ["", "The runs themselves differ:"]
+        lines += ["", "The runs differ:"]
         lines += [f"  {name}: {excerpt(old, 100)} → {excerpt(new, 100)}" for name, old, new in found.circumstances]
     return "\n".join(lines)
 
 
 def difference_html(found: Difference, names: tuple[str, str]) -> str:
-    """The page; `names` are the two files."""
+    """Return the page; `names` are the two files."""
     return html_page("diff.html.j2", **_values(found, names))
 
 
 def difference_markdown(found: Difference, names: tuple[str, str]) -> str:
-    """The short form for a pull request; `names` are the two files."""
+    """Return the short form for a pull request; `names` are the two files."""
     return markdown_page("diff.md.j2", **_values(found, names))
 
 

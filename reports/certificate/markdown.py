@@ -1,16 +1,17 @@
-"""The certificate's short form, for a pull request and for the summary of a CI job: Markdown of bounded size.
+"""The certificate's short form for a pull request or the summary of a CI job: Markdown of limited size.
 
-GitHub refuses a job summary of more than 1 MiB whole, so that the worst run would be the one of which nothing is seen.
+GitHub drops a job summary of more than 1 MiB, so a very bad run would show nothing.
 """
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from reports.certificate.page import page_values
+from reports.findings import findings
 from reports.pages.page import markdown_page
 
 MOST_OCTETS = 512 * 1024
-"""Of what is told of single requirements; verdict, classes and reasons are bounded by their number."""
+"""Limit for the details of single requirements; the number of verdicts, classes and reasons is limited as well."""
 _MOST_SHOWN = 30
 _MOST_NAMED = 500
 _MOST_GROUPS = 30
@@ -18,26 +19,31 @@ _HEADINGS = {"fail": "What failed", "warn": "Warnings"}
 
 
 class _Part(NamedTuple):
-    """Requirements of one verdict: those that are told in full, and the rest."""
+    """Requirements of one verdict: those shown in full, and the rest."""
 
     heading: str
-    told: Sequence[str]
+    in_full: Sequence[str]
     rest: Sequence[Mapping[str, Any]]
 
 
 def certificate_markdown(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as Markdown of less than 1 MiB."""
+    """Return a valid `roaas-result/1` document as Markdown of less than 1 MiB."""
     values = page_values(result)
     parts, left = [], MOST_OCTETS
     for verdict, heading in _HEADINGS.items():
-        found = values["certificate"].with_verdict(verdict)
-        told: list[str] = []
+        found = sorted(values["certificate"].with_verdict(verdict), key=_urgency)
+        in_full: list[str] = []
         for requirement in found[:_MOST_SHOWN]:
-            block = markdown_page("requirement.md.j2", r=requirement)
+            block = markdown_page("requirement.md.j2", r=requirement, found=findings([requirement], result))
             left -= len(block.encode())
             if left < 0:
                 break
-            told.append(block)
+            in_full.append(block)
         if found:
-            parts.append(_Part(heading, told, found[len(told) :]))
+            parts.append(_Part(heading, in_full, found[len(in_full) :]))
     return markdown_page("certificate.md.j2", parts=parts, most_named=_MOST_NAMED, most_groups=_MOST_GROUPS, **values)
+
+
+def _urgency(requirement: Mapping[str, Any]) -> int:
+    """Return the lowest number of the requirement's findings: 1 is what a vendor should look at first."""
+    return min((failure.get("number", 0) for failure in requirement["failures"]), default=0)

@@ -1,7 +1,7 @@
 """The certificate: a conformance result as a page that a vendor can hand to a customer.
 
-What it says is worked out here, once, for all its forms; how it looks is the templates' affair. It calls itself a
-certificate only where every claimed class passed.
+This module computes what all forms of the certificate say; the templates lay it out. The page calls itself a
+certificate only if every claimed class passed.
 """
 
 from collections.abc import Iterator, Mapping
@@ -9,16 +9,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from reports.certificate.seal import Seal
+from reports.findings import Finding, by_cause, by_requirement, findings
 from reports.pages.page import html_page
 
 SHOWN_FAILURES = 5
-"""Findings shown for each requirement; the rest are counted. Result files hold them all."""
+"""Findings shown for each requirement; the rest are counted."""
 SHOWN_BODY = 3000
-"""Characters of a request's or response's body that are shown."""
+"""Characters shown of a request's or response's body."""
 SHOWN_CURL = 8000
-"""A longer command (a size attack's) is of no use on a clipboard: it is cut, and the page says so."""
+"""Characters shown of a curl command; a longer one, as of a size attack, cannot be copied."""
 SHOWN_IDS = 12
-"""Requirements of one reason that are named at once; a longer list is folded, or counted."""
+"""Requirements of one reason that are listed; a longer list is folded, or counted."""
 
 VERDICT_WORDS = {
     "conformant": "Conformant",
@@ -31,13 +32,18 @@ VERDICT_WORDS = {
     "error": "No verdict",
     "not-claimed": "Not claimed",
 }
+VIEWS = {
+    "black box": ": judged by the responses of the web services alone.",
+    "seen on ROS": ": the suite also observed the robot's ROS topics.",
+}
+"""What it means how a class was observed."""
 _ORDER = ("fail", "error", "warn", "skip", "pass", "not-claimed")
 _CLASS_ORDER = ("fail", "inconclusive", "pass", "not-claimed")
 
 
 @dataclass(frozen=True, slots=True)
 class ClassSummary:
-    """One conformance class with its requirements, the worst first."""
+    """One conformance class with its requirements, the worst verdict first."""
 
     name: str
     title: str
@@ -45,36 +51,41 @@ class ClassSummary:
     reason: str
     requirements: tuple[Mapping[str, Any], ...]
     view: str = ""
-    """From where it was seen, where that makes a difference: black box, or seen on ROS."""
+    """How it was observed, if that makes a difference: one of `VIEWS`."""
 
     @property
     def cases(self) -> int:
-        """Cases executed for the class."""
+        """Return the number of cases executed for the class."""
         return sum(requirement["cases"] for requirement in self.requirements)
 
     def count(self, verdict: str, level: str | None = None) -> int:
-        """Requirements with that verdict, of one level or of all."""
+        """Return the number of requirements with that verdict, of one level or of all."""
         return sum(
             requirement["verdict"] == verdict and level in (None, requirement["level"])
             for requirement in self.requirements
         )
 
     def level(self, level: str) -> int:
-        """Requirements of that level."""
+        """Return the number of requirements of that level."""
         return sum(requirement["level"] == level for requirement in self.requirements)
 
 
 @dataclass(frozen=True, slots=True)
 class Untested:
-    """Requirements of claimed classes that were not judged for one reason."""
+    """Requirements of claimed classes that were not judged for the same reason.
+
+    Attributes:
+        because_of: number of the finding that kept the suite from testing them, or None.
+    """
 
     reason: str
+    because_of: int | None
     requirements: tuple[Mapping[str, Any], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What both pages show: claimed classes first, each group with the worst verdict first."""
+    """What all forms of the certificate show, the worst verdict first."""
 
     result: Mapping[str, Any]
     classes: tuple[ClassSummary, ...]
@@ -82,40 +93,40 @@ class Certificate:
 
     @property
     def claimed(self) -> tuple[ClassSummary, ...]:
-        """The classes that were judged."""
+        """Return the classes that the vendor claims."""
         return tuple(c for c in self.classes if c.verdict != "not-claimed")
 
     @property
     def unclaimed(self) -> tuple[ClassSummary, ...]:
-        """The classes that the vendor does not claim."""
+        """Return the classes that the vendor does not claim."""
         return tuple(c for c in self.classes if c.verdict == "not-claimed")
 
     @property
     def passed(self) -> tuple[ClassSummary, ...]:
-        """The classes that the document certifies."""
+        """Return the classes that passed."""
         return tuple(c for c in self.classes if c.verdict == "pass")
 
     @property
     def title(self) -> str:
-        """What the document may call itself."""
+        """Return the title that the document may have."""
         return "Certificate of conformance" if self.result["verdict"] == "conformant" else "Conformance report"
 
     @property
     def robot(self) -> str:
-        """The robot's name, or where it was reached when it has none."""
+        """Return the robot's name, or its address if it has no name."""
         name = self.result["statement"]["robot"].get("name")
         return str(name or self.result["target"].get("rest") or "Unnamed robot")
 
     @property
     def maker(self) -> str:
-        """Vendor and version, as far as they are stated."""
+        """Return vendor and version, as far as they are stated."""
         robot = self.result["statement"]["robot"]
         parts = [robot.get("vendor"), f"version {robot['version']}" if robot.get("version") else None]
         return ", ".join(part for part in parts if part)
 
     @property
     def headline(self) -> str:
-        """The verdict in a sentence, and what of it is accepted until when."""
+        """Return the verdict in a sentence, and which failures are accepted until when."""
         accepted = self.result.get("accepted_until")
         if not accepted:
             return self._headline
@@ -127,7 +138,7 @@ class Certificate:
 
     @property
     def declared(self) -> str:
-        """The figures that the statement declares, on which the verdict rests."""
+        """Return the figures that the vendor declares, on which the verdict depends."""
         figures = self.result["statement"].get("declared", {})
         return ", ".join(f"{name} = {figure:g}" for name, figure in figures.items()) or "nothing"
 
@@ -144,15 +155,32 @@ class Certificate:
             rest = f"; {open_classes} could not be judged" if open_classes else ""
             return f"{failed} of {classes} failed{rest}."
         if not sum(requirement["cases"] for requirement in self.result["requirements"]):
-            return "No case was executed: nothing can be said of this robot."
+            return "No case was executed, so there is no verdict on this robot."
         return f"{open_classes} of {classes} could not be judged."
 
+    @property
+    def contract(self) -> str:
+        """Return the contract's title, version and pack; before version 1.2 only its version."""
+        pack = self.result.get("pack")
+        if not pack:
+            return str(self.result["suite"]["contract"])
+        return f"{pack['title']} {pack['version']}".rstrip() + f" (pack {pack['name']})"
+
+    @property
+    def subject(self) -> str:
+        """Return what a conforming robot conforms to."""
+        return str(self.result.get("pack", {}).get("title", "RoAAS"))
+
+    def findings(self, verdict: str) -> list[Finding]:
+        """Return the findings of requirements with that verdict, the one to look at first first."""
+        return findings(self.with_verdict(verdict), self.result)
+
     def with_verdict(self, verdict: str) -> tuple[Mapping[str, Any], ...]:
-        """Requirements of all classes with that verdict."""
+        """Return the requirements of all classes with that verdict."""
         return tuple(r for c in self.classes for r in c.requirements if r["verdict"] == verdict)
 
     def counts(self) -> Iterator[tuple[str, int]]:
-        """Number of requirements for each verdict that occurs, the worst first."""
+        """Yield the number of requirements for each verdict that occurs, the worst first."""
         for verdict in _ORDER:
             number = len(self.with_verdict(verdict))
             if number:
@@ -160,7 +188,7 @@ class Certificate:
 
 
 def certificate(result: Mapping[str, Any]) -> Certificate:
-    """Arrange a valid `roaas-result/1` document for reading."""
+    """Arrange a valid `roaas-result/1` document for the templates."""
     classes = tuple(sorted(_classes(result), key=lambda c: _CLASS_ORDER.index(c.verdict)))
     return Certificate(result, classes, tuple(_untested(classes)))
 
@@ -182,35 +210,39 @@ def _classes(result: Mapping[str, Any]) -> Iterator[ClassSummary]:
 
 
 def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
-    groups: dict[str, list[Mapping[str, Any]]] = {}
+    groups: dict[tuple[str, int | None], list[Mapping[str, Any]]] = {}
     for summary in classes:
         if summary.verdict == "not-claimed":
             continue
         for requirement in summary.requirements:
             if requirement["verdict"] in {"skip", "error"}:
                 reason = requirement["untestable"] or requirement["reason"] or "No reason was recorded."
-                groups.setdefault(reason, []).append(requirement)
-    for reason, requirements in groups.items():
-        yield Untested(reason, tuple(requirements))
+                groups.setdefault((reason, requirement.get("because_of")), []).append(requirement)
+    for (reason, because_of), requirements in groups.items():
+        yield Untested(reason, because_of, tuple(requirements))
 
 
 def certificate_html(result: Mapping[str, Any], seal: Seal | None = None) -> str:
-    """The certificate as one HTML file."""
+    """Return the certificate as an HTML page."""
     return html_page("certificate.html.j2", seal=seal, **page_values(result))
 
 
 def certificate_print(result: Mapping[str, Any], seal: Seal) -> str:
-    """A signed certificate's first page alone, for a wall or a folder: one sheet of A4."""
+    """Return a signed certificate's summary on one sheet of A4, for print."""
     return html_page("certificate-print.html.j2", seal=seal, **page_values(result))
 
 
 def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
-    """What the templates of all forms of a certificate are filled with."""
+    """Return the values that the templates of all forms use."""
     return {
         "certificate": certificate(result),
         "result": result,
         "sections": result.get("contract_sections", {}),
         "words": VERDICT_WORDS,
+        "views": VIEWS,
+        "by_cause": by_cause,
+        "by_requirement": by_requirement,
+        "findings": findings,
         "shown_failures": SHOWN_FAILURES,
         "shown_body": SHOWN_BODY,
         "shown_curl": SHOWN_CURL,

@@ -1,4 +1,4 @@
-"""What a signed page is checked by: two fingerprints, as text and as a QR code (ISO/IEC 18004)."""
+"""The fingerprints by which a signed page is checked, as text and as a QR code (ISO/IEC 18004)."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ class Seal:
 
     Attributes:
         result: SHA-256 of result.json, in hexadecimal.
-        key: fingerprint of the key that signed it, or None where none did.
+        key: fingerprint of the signing key, or None if it is not signed.
     """
 
     result: str
@@ -20,11 +20,11 @@ class Seal:
 
     @property
     def text(self) -> str:
-        """Both in a line, as the QR code has them; `roaas verify` tells the same two."""
+        """Return both in a line, as in the QR code; `roaas verify` prints the same two."""
         return f"RoAAS result sha256:{self.result} key sha256:{self.key}"
 
     @property
     def code(self) -> Markup:
-        """The QR code as SVG: dark on white, whatever the page's colours, with the quiet zone that scanners need."""
+        """Return the QR code as SVG: dark on white, with the margin that scanners need."""
         picture = segno.make(self.text, error="m").svg_inline(scale=3, light="#fff", omitsize=True)
         return Markup(picture)  # noqa: S704 - drawn here, from two digests

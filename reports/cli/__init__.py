@@ -1,1 +1,1 @@
-"""The room's commands: report and compare, keygen, sign and verify."""
+"""The room's commands: report, compare, diff, keygen, sign, verify and registry."""

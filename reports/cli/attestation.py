@@ -3,79 +3,72 @@
 import datetime as dt
 from pathlib import Path
 from textwrap import fill
-from typing import Protocol
 
 import click
 import msgspec
 
 from reports.attestation.envelope import read_envelope
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
-from reports.attestation.policy import Known, Policy, read_policy
 from reports.attestation.statement import RESULT_SUBJECT
 from reports.attestation.verifying import NOT_PROVED, PROVED, Verification
 from reports.attestation.verifying import verify as verified
-from reports.cli.refusal import refuse
-from reports.errors import EnvelopeRefusedError, ReportError
+from reports.cli.options import CONTRACT, FILE, FOLDER, FrontDoor, policy_of
+from reports.errors import EnvelopeRefusedError
 from reports.pages.untrusted import excerpt
 
 EXIT_REFUSED = 1
-_FILE = click.Path(dir_okay=False, path_type=Path)
-_FOLDER = click.Path(file_okay=False, path_type=Path)
-
-
-class FrontDoor(Protocol):
-    """What `verify` asks of the front door."""
-
-    def known(self) -> dict[str, object]:
-        """What the installed suite knows, as `policy.Known` has it."""
 
 
 @click.command()
-@click.argument("directory", metavar="DIR", type=_FOLDER)
+@click.argument("directory", metavar="DIR", type=FOLDER)
 def keygen(directory: Path) -> None:
     """Make an Ed25519 key pair for signing results: DIR/signing-key.pem and DIR/public-key.pem.
 
-    Keep the first to yourself; give the second, or its fingerprint, to whoever relies on your certificates. Exit code
-    2 where one of them is there already or cannot be written.
+    Keep signing-key.pem secret. Give public-key.pem, or its fingerprint, to everybody who relies on your certificates.
+    Exit code 2: one of the files exists already, or cannot be written.
     """
-    try:
-        fingerprint = generate(directory)
-    except ReportError as error:
-        refuse(error)
+    fingerprint = generate(directory)
     click.echo(f"private: {directory / PRIVATE_NAME}\npublic:  {directory / PUBLIC_NAME}")
     click.echo(f"fingerprint: sha256:{fingerprint}")
 
 
 @click.command()
-@click.argument("file", type=_FILE)
-@click.option("--key", required=True, type=_FILE, metavar="PUB", help="Public key of whom you trust (PEM).")
-@click.option("--policy", type=_FILE, help="What you ask of a certificate (TOML).  [default: the strict policy]")
-@click.option("--nonce", help="The nonce that you gave: the run must have been made with it.")
-@click.option("--result", type=_FOLDER, metavar="DIR", help="Compare DIR/result.json and DIR/certificate.html, too.")
+@click.argument("file", type=FILE)
+@click.option("--key", required=True, type=FILE, metavar="PUB", help="Public key (PEM) of the signer whom you trust.")
+@click.option("--policy", type=FILE, help="What a certificate must meet (TOML).  [default: the strict policy]")
+@CONTRACT
+@click.option("--nonce", help="The nonce that you gave to the vendor: the run must have been made with it.")
+@click.option("--result", type=FOLDER, metavar="DIR", help="Compare DIR/result.json and DIR/certificate.html as well.")
 @click.pass_obj
-def verify(door: FrontDoor, file: Path, key: Path, policy: Path | None, nonce: str | None, result: Path | None) -> None:
-    """Say what a signed certificate proves, and whether it is enough for you; offline.
+def verify(
+    door: FrontDoor,
+    file: Path,
+    key: Path,
+    *,
+    policy: Path | None,
+    pack: str | None,
+    nonce: str | None,
+    result: Path | None,
+) -> None:
+    """Check the signature of a certificate, and whether it meets your policy. No network is needed.
 
-    Exit code: 0 accepted, 1 refused, 2 usage, or a file of yours cannot be read.
+    Exit code: 0 accepted; 1 refused; 2 wrong usage, or a file cannot be read.
     """
+    wanted, known = policy_of(door, policy, pack)
+    if nonce is not None:
+        wanted = msgspec.structs.replace(wanted, nonce=nonce)
+    trusted = public_key(key)
     try:
-        known = msgspec.convert(door.known(), Known)
-        asked = read_policy(policy, known) if policy else Policy()
-        if nonce is not None:
-            asked = msgspec.structs.replace(asked, nonce=nonce)
-        trusted = public_key(key)
-        found = verified(read_envelope(file), trusted, asked, known, now=dt.datetime.now(dt.UTC), directory=result)
+        found = verified(read_envelope(file), trusted, wanted, known, now=dt.datetime.now(dt.UTC), directory=result)
     except EnvelopeRefusedError as error:
         click.echo(f"REFUSED: {excerpt(str(error), 500)}\n\nNothing is proved.")
         raise SystemExit(EXIT_REFUSED) from error
-    except ReportError as error:
-        refuse(error)
-    _tell(found, trusted.keyid)
+    _print(found, trusted.keyid)
     if not found.accepted:
         raise SystemExit(EXIT_REFUSED)
 
 
-def _tell(found: Verification, key: str) -> None:
+def _print(found: Verification, key: str) -> None:
     click.echo(f"signed by key  sha256:{key}")
     click.echo(f"result         sha256:{found.statement.digest_of(RESULT_SUBJECT)}\n")
     for point in found.points:

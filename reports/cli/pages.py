@@ -4,8 +4,7 @@ from pathlib import Path
 
 import click
 
-from reports.cli.refusal import refuse
-from reports.errors import ReportError
+from reports.cli.options import FOLDER, PATH
 from reports.formats.catalogue import FORMATS
 from reports.pages.page import write_pages
 from reports.pages.untrusted import visible
@@ -18,78 +17,64 @@ EXIT_INVALID = 4
 
 
 @click.command()
-@click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("directory", metavar="DIR", type=PATH)
 @click.option(
     "--format",
     "formats",
     multiple=True,
     type=click.Choice(list(FORMATS)),
-    help="Write result.json in this format instead; repeatable.",
+    help="Write result.json in this format instead of the pages; may be given several times.",
 )
 def report(directory: Path, formats: tuple[str, ...]) -> None:
-    """Write the pages that belong to the result files in DIR again.
+    """Write the pages of the result files in DIR again.
 
-    result.json gives certificate.html, certificate.md and junit.xml; latency.json gives latency.html and
-    latency.md; fleet.json gives fleet.html and fleet.md. With --format: that file alone, for a CI system or a code
-    host. Exit code 2 where DIR holds no result file, or an unreadable one.
+    result.json becomes certificate.html, certificate.md and junit.xml. latency.json becomes latency.html and
+    latency.md. fleet.json becomes fleet.html and fleet.md. --format writes one file for a CI system or a code host.
+    Exit code 2: DIR holds no result file, or one that cannot be read.
     """
-    try:
-        written = render_formats(directory, formats) if formats else render(directory)
-    except ReportError as error:
-        refuse(error)
-    for path in written:
+    for path in render_formats(directory, formats) if formats else render(directory):
         click.echo(path)
 
 
 @click.command()
-@click.argument("old", type=click.Path(path_type=Path))
-@click.argument("new", type=click.Path(path_type=Path))
+@click.argument("old", type=PATH)
+@click.argument("new", type=PATH)
 @click.option(
     "--threshold",
     type=click.FloatRange(min=0.0),
     default=5.0,
     show_default=True,
     metavar="PERCENT",
-    help="How much a quantile has to change to count; a result's own noise floor counts where it is greater.",
+    help="How much a quantile must change to count. A result's own noise counts instead where it is greater.",
 )
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    help="Write compare.html and compare.md there.",
-)
+@click.option("--out", type=FOLDER, metavar="DIR", help="Write compare.html and compare.md into DIR.")
 def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
-    """Tell what changed from OLD to NEW, two results of `roaas load`: latency.json or the directory that holds it.
+    """Show what changed from OLD to NEW, two results of `roaas load`: latency.json or the directory that holds it.
 
-    A change counts where its whole 95 % confidence interval lies beyond the threshold. Exit code 0: not
-    slower; 1: slower; 2: a result cannot be read, or the two cannot be compared; 4: one of them is not valid,
-    or nothing in them could be judged.
+    A change counts if its whole 95 % confidence interval is beyond the threshold. Exit code: 0 not slower; 1 slower;
+    2 a result cannot be read, or the two cannot be compared; 4 one of them is not valid, or no change could be judged.
     """
-    try:
-        code = tell_change(old, new, threshold / 100, out)
-    except ReportError as error:
-        refuse(error)
-    raise SystemExit(code)
+    raise SystemExit(tell_change(old, new, threshold / 100, out))
 
 
 def tell_change(old: Path, new: Path, threshold: float, out: Path | None = None) -> int:
-    """Say what changed from one latency result to another, and return the exit code of `roaas compare`.
+    """Print what changed between two latency results, and return the exit code of `roaas compare`.
 
-    `threshold` is a share, 0.05 for 5 %; pages go to `out`, where it is given.
+    `threshold` is a share, 0.05 for 5 %. Pages are written to `out` if it is given.
 
     Raises:
         ReportError: a result cannot be read, or the two cannot be compared.
     """
-    # They load matplotlib and numpy, which `roaas report` of a certificate does without.
+    # They load matplotlib and numpy, half a second that `roaas report` of a certificate does not need.
     from reports.latency import comparison, comparison_page  # noqa: PLC0415 - see above
 
-    names = _latency_file(old), _latency_file(new)
-    texts = str(names[0]), str(names[1])
-    found = comparison.compare(read_latency(names[0]), read_latency(names[1]), texts, threshold)
+    paths = [path / LATENCY_NAME if path.is_dir() else path for path in (old, new)]
+    names = str(paths[0]), str(paths[1])
+    found = comparison.compare(read_latency(paths[0]), read_latency(paths[1]), names, threshold)
     if out is not None:
         pages = {
-            "compare.html": comparison_page.comparison_html(found, texts),
-            "compare.md": comparison_page.comparison_markdown(found, texts),
+            "compare.html": comparison_page.comparison_html(found, names),
+            "compare.md": comparison_page.comparison_markdown(found, names),
         }
         for path in write_pages(out, pages):
             click.echo(path, err=True)
@@ -101,7 +86,3 @@ def tell_change(old: Path, new: Path, threshold: float, out: Path | None = None)
     if not found.valid:
         return EXIT_INVALID
     return EXIT_SLOWER if found.slower else EXIT_OK
-
-
-def _latency_file(path: Path) -> Path:
-    return path / LATENCY_NAME if path.is_dir() else path

@@ -1,1 +1,1 @@
-"""The page of a fleet: which robot may be trusted with what."""
+"""The page of a fleet: which robot passed which classes."""

@@ -1,4 +1,4 @@
-"""fleet.json as a page and as Markdown: who may do what, who failed, and who could not be judged."""
+"""fleet.json as a page and as Markdown: which robots passed, failed or could not be judged."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,16 +16,16 @@ OUTCOMES = {
     "interrupted": ("quiet", "interrupted"),
     "not-started": ("quiet", "not started"),
 }
-"""Tone and words of what came of a robot."""
+"""Tone and words for each outcome."""
 
 
 def fleet_html(document: Mapping[str, Any]) -> str:
-    """The page of a valid `roaas-fleet/1` document; it links to the robots' certificates beside it."""
+    """Return the page of a valid `roaas-fleet/1` document, which links to the robots' certificates."""
     return html_page("fleet.html.j2", **_values(document))
 
 
 def fleet_markdown(document: Mapping[str, Any]) -> str:
-    """The short form."""
+    """Return the short form for a pull request."""
     return markdown_page("fleet.md.j2", **_values(document))
 
 

@@ -1,1 +1,1 @@
-"""A conformance result in the forms that CI systems and code hosts read: one module for each."""
+"""A conformance result in the formats that CI systems and code hosts read: one module for each."""

@@ -1,21 +1,20 @@
-"""GitHub's workflow commands: the worst cases as annotations, at most ten, and how many more there are.
+"""GitHub's workflow commands: the ten worst cases as annotations, and the number of the others.
 
-GitHub shows ten errors and ten warnings of a step and drops the rest without a word.
+GitHub shows ten errors and ten warnings of a step and silently drops the rest.
 """
 
 from collections.abc import Mapping
 from typing import Any
 
-from reports.formats.cases import Case, Outcome, cases, worst_first
+from reports.formats.cases import MESSAGE, Case, Outcome, cases, worst_first
 from reports.formats.places import places_of
 from reports.pages.untrusted import excerpt
 
 MOST = 10
-_MESSAGE = 600
 
 
 def annotations(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as workflow commands, a line each."""
+    """Return a valid `roaas-result/1` document as workflow commands, one a line."""
     found = worst_first(cases(result))
     lines = [_command(result, case) for case in found[:MOST]]
     if len(found) > MOST:
@@ -27,14 +26,14 @@ def _command(result: Mapping[str, Any], case: Case) -> str:
     place = places_of(result, case)[0]
     command = "error" if case.outcome in {Outcome.FAILED, Outcome.ERROR} else "warning"
     title = f"{case.name} ({case.outcome})"
-    told = f"file={_property(place.file)},line={place.line},title={_property(title)}"
-    return f"::{command} {told}::{_data(excerpt(case.message, _MESSAGE))}"
+    properties = f"file={_property(place.file)},line={place.line},title={_property(title)}"
+    return f"::{command} {properties}::{_data(excerpt(case.message, MESSAGE))}"
 
 
 def _data(text: str) -> str:
-    """What could end a command is escaped: a robot's words start none of their own."""
+    """Escape what could end a command, so that a robot's text cannot start another one."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _property(text: str) -> str:
-    return _data(excerpt(text, _MESSAGE)).replace(":", "%3A").replace(",", "%2C")
+    return _data(excerpt(text, MESSAGE)).replace(":", "%3A").replace(",", "%2C")

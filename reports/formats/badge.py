@@ -1,4 +1,4 @@
-"""A badge, as shields' endpoint reads it: green for a conforming robot and for nothing else."""
+"""A badge in the format of shields' endpoint: green for a conforming robot only."""
 
 import json
 from collections.abc import Mapping
@@ -10,12 +10,12 @@ _COLOURS = {"conformant": "brightgreen", "not-conformant": "red", "inconclusive"
 
 
 def badge(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as a badge."""
+    """Return a valid `roaas-result/1` document as a badge."""
     verdict, colour = VERDICT_WORDS[result["verdict"]].lower(), _COLOURS[result["verdict"]]
     values = list(result["classes"].values())
-    told = f"{verdict} ({values.count('pass')} of {len(values)} classes)"
+    text = f"{verdict} ({values.count('pass')} of {len(values)} classes)"
     if result.get("accepted_until"):
-        told, colour = f"{verdict}, known failures until {result['accepted_until']}", "orange"
+        text, colour = f"{verdict}, known failures until {result['accepted_until']}", "orange"
     if result.get("interrupted"):
-        told, colour = f"{verdict}, interrupted", "red" if verdict == "not conformant" else "lightgrey"
-    return json.dumps({"schemaVersion": 1, "label": "RoAAS", "message": told, "color": colour}, indent=1) + "\n"
+        text, colour = f"{verdict}, interrupted", "red" if verdict == "not conformant" else "lightgrey"
+    return json.dumps({"schemaVersion": 1, "label": "RoAAS", "message": text, "color": colour}, indent=1) + "\n"

@@ -1,18 +1,21 @@
-"""A conformance result as test cases: what every format of a CI system is written from.
+"""A conformance result as test cases, from which every CI format is written.
 
-One case for each requirement. A class whose verdict no case of its own explains (a missing prerequisite, nothing
-executed) gets a case of its own, and so does a run that nothing explains: no reader sees green where the suite
-saw none.
+There is a case for each requirement. A class whose verdict no requirement explains (a missing prerequisite, nothing
+executed) gets a case of its own, and so does a run without any verdict. So no CI system shows green by mistake.
 """
 
 import hashlib
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from reports.findings import Finding, findings
 from reports.pages.untrusted import beginning
 
+MESSAGE = 1000
+"""Characters of a case's message that a format shows on one line."""
 _SHOWN_FAILURES = 10
 _SHOWN_OCTETS = 40_000
 _SHOWN_BODY = 2000
@@ -20,12 +23,12 @@ _SHOWN_CURL = 8000
 
 
 class Outcome(StrEnum):
-    """What became of a case; the worst first."""
+    """The outcome of a case."""
 
     FAILED = "failed"
-    ERROR = "error"  # it could not be judged
-    ACCEPTED = "accepted"  # it failed, and the baseline expects that until a day
-    WARNING = "warning"  # a SHOULD was not kept, which breaks no build
+    ERROR = "error"  # could not be judged
+    ACCEPTED = "accepted"  # failed, and the baseline accepts that until a date
+    WARNING = "warning"  # a SHOULD is not met, which breaks no build
     PASSED = "passed"
     SKIPPED = "skipped"
 
@@ -46,11 +49,12 @@ class Case:
     """One test case: of a requirement, a class or the run.
 
     Attributes:
-        name: the requirement's id, `class NAME`, or `run`.
+        name: id of the requirement, `class NAME`, or `run`.
         class_name: the conformance class; empty for the run.
-        outcome: what became of it.
-        message: one line for it; empty where there is nothing to say.
+        outcome: its outcome.
+        message: one line on it, or empty.
         requirement: as result.json has it; None for a class or the run.
+        findings: the requirement's findings, in the order in which a vendor should look at them.
     """
 
     name: str
@@ -58,31 +62,32 @@ class Case:
     outcome: Outcome
     message: str = ""
     requirement: Mapping[str, Any] | None = None
+    findings: Sequence[Finding] = ()
 
     @property
     def detail(self) -> str:
-        """What belongs to it in full; empty where nothing was judged."""
+        """Return all details; empty if nothing was judged."""
         if self.requirement is None or self.outcome is Outcome.SKIPPED:
             return ""
-        told = f"{self.requirement['level']}: {self.requirement['text']}\nSource: {self.requirement['source']}"
+        rule = f"{self.requirement['level']}: {self.requirement['text']}\nSource: {self.requirement['source']}"
         evidence = f"{self.requirement['cases']} cases by {', '.join(self.requirement['checks']) or 'no check'}"
         if self.outcome is Outcome.PASSED:
-            return f"{told}\n{evidence}"
-        return "\n\n".join([told, evidence, *_findings(self.requirement["failures"])])
+            return f"{rule}\n{evidence}"
+        return "\n\n".join([rule, evidence, *_in_full(self.findings)])
 
     @property
     def rule(self) -> str:
-        """A name that stays the same from run to run."""
+        """Return a name that is the same in every run."""
         return self.name.replace(" ", "/")
 
     @property
     def fingerprint(self) -> str:
-        """The rule's name as 64 hexadecimal digits."""
+        """Return a digest of the rule's name, 64 hexadecimal digits."""
         return hashlib.sha256(f"roaas/1 {self.rule}".encode()).hexdigest()
 
 
 def cases(result: Mapping[str, Any]) -> list[Case]:
-    """The cases of a valid `roaas-result/1` document, class by class."""
+    """Return the cases of a valid `roaas-result/1` document, class by class."""
     found = [case for name in classes(result) for case in _of_class(result, name)]
     if not found or (
         result["verdict"] != "conformant"
@@ -93,18 +98,24 @@ def cases(result: Mapping[str, Any]) -> list[Case]:
 
 
 def worst_first(found: Sequence[Case]) -> list[Case]:
-    """The cases that somebody has to look at: failed, not judged, accepted, warnings."""
+    """Return the cases that need attention: failed, not judged, accepted, warnings; the most urgent finding first."""
     order = [Outcome.FAILED, Outcome.ERROR, Outcome.ACCEPTED, Outcome.WARNING]
-    return sorted((case for case in found if case.outcome in order), key=lambda case: order.index(case.outcome))
+    shown = (case for case in found if case.outcome in order)
+    return sorted(shown, key=lambda case: (order.index(case.outcome), _first(case)))
+
+
+def _first(case: Case) -> float:
+    """Return the number of the case's first finding; cases without a finding come last."""
+    return case.findings[0].number or 0 if case.findings else math.inf
 
 
 def classes(result: Mapping[str, Any]) -> list[str]:
-    """The names of all classes, those of requirements whose class has no verdict included."""
+    """Return the names of all classes, including classes without a verdict."""
     return list(dict.fromkeys([*result["classes"], *(r["class"] for r in result["requirements"])]))
 
 
 def _of_class(result: Mapping[str, Any], name: str) -> Iterator[Case]:
-    own = [_of_requirement(requirement) for requirement in result["requirements"] if requirement["class"] == name]
+    own = [_of_requirement(item, findings([item], result)) for item in result["requirements"] if item["class"] == name]
     verdict = result["classes"].get(name, "inconclusive")
     outcomes = {case.outcome for case in own}
     reason = result["class_reasons"].get(name, "")
@@ -115,48 +126,48 @@ def _of_class(result: Mapping[str, Any], name: str) -> Iterator[Case]:
     yield from own
 
 
-def _of_requirement(requirement: Mapping[str, Any]) -> Case:
-    outcome, message = _outcome(requirement)
-    return Case(requirement["id"], requirement["class"], outcome, message, requirement)
+def _of_requirement(requirement: Mapping[str, Any], found: Sequence[Finding]) -> Case:
+    outcome, message = _outcome(requirement, found)
+    return Case(requirement["id"], requirement["class"], outcome, message, requirement, found)
 
 
-def _outcome(requirement: Mapping[str, Any]) -> tuple[Outcome, str]:
+def _outcome(requirement: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Outcome, str]:
     expected = requirement.get("expected_failure")
     if expected is not None:
         until = f" until {expected['expires']}" if expected.get("expires") else ""
-        return Outcome.ACCEPTED, f"Expected by the baseline{until}: {expected['reason']}"
+        return Outcome.ACCEPTED, f"Accepted by the baseline{until}: {expected['reason']}"
     verdict, reason = requirement["verdict"], requirement["untestable"] or requirement["reason"]
     outcome = _OUTCOMES[verdict]
     if outcome in {Outcome.FAILED, Outcome.WARNING}:
-        return outcome, _headline(requirement)
+        return outcome, _headline(found) or requirement["reason"] or requirement["text"]
     if verdict == "not-claimed":
         return outcome, "The class is not claimed."
     return outcome, "" if outcome is Outcome.PASSED else reason or _UNEXPLAINED[outcome]
 
 
-def _headline(requirement: Mapping[str, Any]) -> str:
-    failures = requirement["failures"]
-    if not failures:
-        return str(requirement["reason"] or requirement["text"])
-    more = f" (and {len(failures) - 1} more findings)" if len(failures) > 1 else ""
-    return f"{failures[0]['message']}{more}"
+def _headline(found: Sequence[Finding]) -> str:
+    if not found:
+        return ""
+    more = f" (and {len(found) - 1} more findings)" if len(found) > 1 else ""
+    return f"{found[0].text}{more}"
 
 
-def _findings(failures: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _in_full(found: Sequence[Finding]) -> Iterator[str]:
     shown, octets = 0, 0
-    for number, failure in enumerate(failures[:_SHOWN_FAILURES], start=1):
+    for place, finding in enumerate(found[:_SHOWN_FAILURES], start=1):
         if octets > _SHOWN_OCTETS:
             break
-        lines = [f"[{number}] {failure['message']}", f"expected: {failure['expected']}"]
-        if failure["seen"] > 1:
-            lines.append(f"seen in {failure['seen']} cases")
+        failure = finding.failure
+        lines = [f"[{finding.number or place}] {finding.text}"]
+        if finding.blocks:
+            lines.append(f"Not tested because of it: {', '.join(finding.blocks)}.")
         if failure["request"]:
-            lines.append(f"send it again: {_cut(failure['request']['curl'], _SHOWN_CURL)}")
-        told = "\n".join([*lines, *_response(failure["response"])])
-        yield told
-        shown, octets = number, octets + len(told.encode("utf-8", "surrogatepass"))
-    if len(failures) > shown:
-        yield f"{len(failures) - shown} more findings are in result.json."
+            lines.append(f"Send it again: {_cut(failure['request']['curl'], _SHOWN_CURL)}")
+        text = "\n".join([*lines, *_response(failure["response"])])
+        yield text
+        shown, octets = place, octets + len(text.encode("utf-8", "surrogatepass"))
+    if len(found) > shown:
+        yield f"{len(found) - shown} more findings are in result.json."
 
 
 def _response(response: Mapping[str, Any] | None) -> Iterator[str]:
@@ -164,9 +175,9 @@ def _response(response: Mapping[str, Any] | None) -> Iterator[str]:
         return
     took = "" if response["elapsed_ms"] is None else f" after {response['elapsed_ms']:.1f} ms"
     if response["status"] is None:
-        yield f"no response{took}: {response.get('error') or 'no reason was recorded'}"
+        yield f"No response{took}: {response.get('error') or 'no reason was recorded'}"
         return
-    yield f"answered {response['status']}{took}"
+    yield f"Response {response['status']}{took}"
     if response["body"]:
         yield _cut(response["body"], _SHOWN_BODY, response.get("body_length"))
 

@@ -1,4 +1,4 @@
-"""All formats by the name that `roaas report --format` takes, with the file that each becomes."""
+"""All formats by the name that `roaas report --format` takes, with their file names."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ from reports.formats.sarif import sarif
 
 
 class Format(NamedTuple):
-    """A format: the name of its file, which is what its readers look for, and what writes it."""
+    """A format: the file name that its readers expect, and the function that writes it."""
 
     file: str
     write: Callable[[Mapping[str, Any]], str]

@@ -3,7 +3,7 @@
 | outcome | becomes |
 |---|---|
 | passed, warning | `passed`; a warning has its message |
-| failed, error | `failed`: readers show `other` in no colour, and what was not judged is not green |
+| failed, error | `failed`: readers show `other` without a colour, and a case without a verdict must not look green |
 | accepted | `other` |
 | skipped | `skipped` |
 """
@@ -13,12 +13,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from reports.formats.cases import Case, Outcome, cases
+from reports.formats.cases import MESSAGE, Case, Outcome, cases
 from reports.formats.places import places_of
 from reports.pages.untrusted import excerpt, visible
 
 _SPEC = "0.0.0"
-_MESSAGE = 1000
 _STATUSES = {
     Outcome.PASSED: "passed",
     Outcome.WARNING: "passed",
@@ -30,7 +29,7 @@ _STATUSES = {
 
 
 def ctrf(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as a CTRF report."""
+    """Return a valid `roaas-result/1` document as a CTRF report."""
     tests = [_test(result, case) for case in cases(result)]
     statuses = [test["status"] for test in tests]
     start = _milliseconds(result["started"])
@@ -61,13 +60,13 @@ def _test(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
         "name": case.name,
         "status": _STATUSES[case.outcome],
         "rawStatus": case.outcome,
-        # No time is known for a single requirement.
+        # The time of a single requirement is not measured.
         "duration": 0,
         "suite": [case.class_name or "roaas"],
         "filePath": place.file,
         "line": place.line,
         **({"tags": [case.requirement["level"]]} if case.requirement else {}),
-        **({"message": excerpt(case.message, _MESSAGE)} if case.message else {}),
+        **({"message": excerpt(case.message, MESSAGE)} if case.message else {}),
         **({"trace": visible(case.detail)} if case.message and case.detail else {}),
     }
 

@@ -1,13 +1,13 @@
-"""junit.xml: a conformance result in the form that CI systems read.
+"""junit.xml: a conformance result in the format that most CI systems read.
 
-One test suite for each conformance class, one test case for each requirement. The form is the one that
-Jenkins' xUnit plugin checks (its junit-10.xsd), without the extensions that some other reader would refuse.
+It has a test suite for each conformance class and a test case for each requirement. It is valid by the junit-10.xsd of
+Jenkins' xUnit plugin, without the extensions that other readers refuse.
 
 | outcome | becomes |
 |---|---|
 | passed | a passed test case |
-| accepted | skipped: the baseline expects it until a day, which the message names |
-| warning | a passed test case that says so in its output: a SHOULD breaks no build |
+| accepted | skipped: the baseline accepts the failure until the date in the message |
+| warning | a passed test case with the warning in its output: a SHOULD breaks no build |
 | failed | a failure |
 | error | an error |
 | skipped | skipped, with the reason |
@@ -19,15 +19,14 @@ from typing import Any
 
 from lxml import etree
 
-from reports.formats.cases import Case, Outcome, cases
+from reports.formats.cases import MESSAGE, Case, Outcome, cases
 from reports.pages.untrusted import excerpt, visible
 
-_MESSAGE = 600
 _ELEMENTS = {Outcome.FAILED: "failure", Outcome.ERROR: "error", Outcome.ACCEPTED: "skipped", Outcome.SKIPPED: "skipped"}
 
 
 def junit(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as JUnit XML, which declares UTF-8."""
+    """Return a valid `roaas-result/1` document as JUnit XML, which declares UTF-8."""
     found = cases(result)
     robot = result["statement"]["robot"].get("name") or result["target"].get("rest") or "robot"
     root = etree.Element(
@@ -71,12 +70,12 @@ def _suite(name: str, own: Sequence[Case], result: Mapping[str, Any]) -> etree._
 
 
 def _element(suite: str, case: Case) -> etree._Element:
-    # No time is known for a single requirement; 0 keeps readers happy that want a number.
+    # The time of a single requirement is not measured; some readers need a number.
     element = etree.Element(
         "testcase", classname=excerpt(f"roaas.{suite}", 200), name=excerpt(case.name, 300), time="0"
     )
     if case.outcome in _ELEMENTS:
-        outcome = etree.SubElement(element, _ELEMENTS[case.outcome], message=excerpt(case.message, _MESSAGE))
+        outcome = etree.SubElement(element, _ELEMENTS[case.outcome], message=excerpt(case.message, MESSAGE))
         if case.outcome in {Outcome.FAILED, Outcome.ERROR}:
             outcome.set("type", "nonconformity" if case.outcome is Outcome.FAILED else "no-verdict")
             outcome.text = visible(case.detail)

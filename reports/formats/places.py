@@ -1,7 +1,6 @@
-"""Where a reader is sent for a case: a line of the vendor's statement, or of the contract's ledger.
+"""The line to which a code host links a case: in the vendor's statement, or in the contract's ledger.
 
-result.json says where things stand (`places`). Robots have no source code that a code host could show: what a vendor
-can look at, and change, is the claim in its statement.
+result.json has the lines (`places`). The robot's source code is unknown, so a case links to the claim in the statement.
 """
 
 from collections.abc import Iterator, Mapping
@@ -27,7 +26,7 @@ class Place:
 
 
 def places_of(result: Mapping[str, Any], case: Case) -> list[Place]:
-    """Where the robot promises to keep it, and where the contract asks for it; at least one of the two."""
+    """Return where the vendor claims it and where the contract requires it; at least one of the two."""
     return list(_places(result, case))
 
 

@@ -1,10 +1,10 @@
-"""SARIF 2.1.0 (OASIS, errata 01): what code hosts show beside a repository's files.
+"""SARIF 2.1.0 (OASIS, errata 01), which code hosts show beside a repository's files.
 
-A result for each case that somebody has to look at; what passed or was skipped is left out, because some hosts show
-every result as a problem, whatever its kind. What could not be judged is of kind `open`, and the run
-is a result of level `error` then: a host that counts errors never shows green for an inconclusive run.
+There is a result for each case that needs attention. Passed and skipped cases are left out, because some hosts show
+every result as a problem, whatever its kind. A case without a verdict is of kind `open`; the run is then another result
+of level `error`, so that a host that counts errors does not show an inconclusive run as green.
 
-Failures that the baseline accepts are warnings, not suppressed results: hosts hide those.
+Failures that the baseline accepts are warnings and not suppressed results, because hosts hide suppressed results.
 """
 
 import json
@@ -13,19 +13,18 @@ from typing import Any
 from urllib.parse import quote
 
 from reports.certificate.page import certificate
-from reports.formats.cases import Case, Outcome, cases, worst_first
+from reports.formats.cases import MESSAGE, Case, Outcome, cases, worst_first
 from reports.formats.places import Place, places_of
 from reports.formats.source_pages import page_of
 from reports.pages.untrusted import excerpt, visible
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
-_MESSAGE = 1000
 _DETAIL = 6000
 _LEVELS = {Outcome.FAILED: "error", Outcome.ERROR: "none", Outcome.ACCEPTED: "warning", Outcome.WARNING: "warning"}
 
 
 def sarif(result: Mapping[str, Any]) -> str:
-    """Write a valid `roaas-result/1` document as a SARIF log of one run."""
+    """Return a valid `roaas-result/1` document as a SARIF log of one run."""
     found = worst_first(cases(result))
     if any(case.outcome is Outcome.ERROR for case in found) and not any(case.name == "run" for case in found):
         found.append(Case("run", "", Outcome.ERROR, certificate(result).headline))
@@ -45,7 +44,7 @@ def _invocation(result: Mapping[str, Any], found: Sequence[Case]) -> dict[str, A
     judged = result["verdict"] != "inconclusive" and not result.get("interrupted")
     open_cases = [case for case in found if case.outcome is Outcome.ERROR]
     return {
-        # Of the run, not of the robot: false where no verdict was reached.
+        # This is about the run, not the robot: false if there is no verdict.
         "executionSuccessful": judged,
         "startTimeUtc": result["started"],
         **({"endTimeUtc": result["finished"]} if result["finished"] else {}),
@@ -98,6 +97,6 @@ def _location(place: Place) -> dict[str, Any]:
 
 
 def _text(text: str) -> str:
-    """One line that a viewer shows as it is: no placeholder (SARIF 3.11.5), no link (3.11.6) comes alive in it."""
-    line = excerpt(text, _MESSAGE)
+    """Return one line in which placeholders (SARIF 3.11.5) and links (3.11.6) are escaped."""
+    line = excerpt(text, MESSAGE)
     return line.replace("{", "{{").replace("}", "}}").replace("\\", "\\\\").replace("[", "\\[").replace("]", "\\]")

@@ -1,8 +1,8 @@
-"""The web page of a requirement's source: RFCs, the Basic Profile and W3C's documents have one for each clause."""
+"""Links from a requirement's source to its web page: RFCs, the Basic Profile, W3C documents, CWE."""
 
 import re
 
-# The first octets of a source, as the ledger writes them, and the page that has the clause.
+# Beginning of a source as the ledger writes it, and the page of the clause.
 _PAGES = (
     (r"RFC (\d+) (\d+(?:\.\d+)*)", "https://www.rfc-editor.org/rfc/rfc{0}#section-{1}"),
     (r"RFC (\d+) Appendix ([A-Z])", "https://www.rfc-editor.org/rfc/rfc{0}#appendix-{1}"),
@@ -18,7 +18,7 @@ _PAGES = (
 
 
 def page_of(source: str) -> str | None:
-    """The web page, on https, of the first of a requirement's sources that has one."""
+    """Return the web page, on https, of the first source that has one."""
     for part in source.split("; "):
         for pattern, page in _PAGES:
             if found := re.match(pattern, part):

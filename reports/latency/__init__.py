@@ -1,1 +1,1 @@
-"""What becomes of latency.json: the report of one measurement, and the comparison of two."""
+"""Reports from latency.json: of one measurement, of two compared, and of a robot's history."""

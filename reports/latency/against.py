@@ -1,4 +1,4 @@
-"""Two robots that took turns in one run (`roaas load --against`): the verdicts' signs, and the ratios as a figure."""
+"""Two robots measured alternately in one run (`roaas load --against`): verdict signs, and the ratios as a figure."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,12 +12,12 @@ TAGS = {"slower": ("bad", "✗"), "not slower": ("good", "✓"), "unclear": ("wa
 
 
 def tag(change: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Tone and sign of one change's verdict; None where it is not judged."""
+    """Return tone and sign of a change's verdict; None if it was not judged."""
     return TAGS.get(change["verdict"])
 
 
 def picture(result: Mapping[str, Any]) -> Picture | None:
-    """The ratios with their intervals, the tolerance as a dashed line."""
+    """Return a figure of the ratios with their intervals, and of the tolerance as a dashed line."""
     compared = result.get("against")
     if compared is None:
         return None
@@ -35,7 +35,7 @@ def picture(result: Mapping[str, Any]) -> Picture | None:
         "against",
         "this robot over the other",
         rows,
-        "Service time: how many times as long requests take on this robot as on the other one, with 95 % intervals. "
-        "Right of 1 this robot is slower; the dashed line is what is tolerated.",
+        "Service time on this robot divided by service time on the other one, with 95 % intervals. Right of 1 this "
+        "robot is slower. The dashed line is the tolerance.",
         mark=(1 + compared["tolerance"], f"tolerance, {share(compared['tolerance'])}"),
     )

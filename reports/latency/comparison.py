@@ -1,15 +1,13 @@
-"""Did it get slower? Two latency results, compared quantile by quantile with an interval and a noise threshold.
+"""Two latency results, compared quantile by quantile with a confidence interval and a threshold.
 
-For each series that both results hold, the ratio new / old of the median and of the 99th percentile gets an
-interval from the two intervals that the results carry (which come from resampled blocks): on the logarithmic
-scale, where a ratio is a difference, by the method of variance estimates recovery (Zou and Donner, Statistics
-in Medicine 27, 2008). The more quantiles are looked at, the likelier is one of them to look slower by chance:
-the intervals are widened so that all of them hold together at 95 % (Bonferroni).
+For each series that both results hold, the ratio new / old of the median and of the 99th percentile gets an interval.
+It is computed from the intervals in the two results (which come from resampled blocks) on the logarithmic scale, by the
+method of variance estimates recovery (Zou and Donner, Statistics in Medicine 27, 2008). With many quantiles one of them
+looks slower by chance, so the intervals are widened until they hold simultaneously at 95 % (Bonferroni).
 
-A change counts only where its whole interval lies beyond the threshold: the greater of what was asked for and
-of what either result measured of an interface against itself. Two runs differ for more reasons than one run's
-blocks do, and that is what the threshold is there for. A response time also carries the generator's own lag;
-a difference that is no greater than that lag is none of the robot's.
+A change counts only if its whole interval is beyond the threshold. The threshold is the greater of the one given and of
+the A/A noise in either result, because two runs differ more than the blocks of one run do. A response time includes the
+load generator's own lag, so a difference smaller than that lag is not the robot's.
 """
 
 import math
@@ -19,7 +17,7 @@ from statistics import NormalDist
 from typing import Any
 
 from reports.errors import ResultsIncompatibleError
-from reports.latency.distributions import Series, all_series
+from reports.latency.distributions import AllSeries, Series, all_series
 from reports.latency.numbers import rate
 
 QUANTILES = ("p50", "p99")
@@ -27,7 +25,7 @@ _ASCENDING = ("p50", "p90", "p99")
 _CONFIDENCE = 0.95
 TIMES = {"service": ("service_ms", "ci95_ms"), "response": ("response_ms", "response_ci95_ms")}
 _SAME_RATE = 0.02
-"""Rates that differ by less than this share count as one."""
+"""Rates that differ by less than this share count as equal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +35,13 @@ class Change:
     Attributes:
         time: "service" or "response".
         quantile: "p50" or "p99".
-        old_ms, new_ms: the values; None where that run supports none.
+        old_ms, new_ms: the values; None if that run has too few requests for one.
         ratio: new / old.
-        interval: the ratio's interval; those of all changes hold together at 95 %.
-        threshold: the share by which it has to change to count, 0.05 for 5 %.
-        lag_ms: the generator's own lag at the quantile, which is in a response time; 0 for a service time.
-        verdict: "slower", "faster", "same", "unclear" (the interval lies neither beyond the threshold nor within the
-            one that was asked for) or "no figure".
+        interval: the ratio's interval; the intervals of all changes hold simultaneously at 95 %.
+        threshold: the share by which the value must change to count, 0.05 for 5 %.
+        lag_ms: the generator's own lag at the quantile, which a response time includes; 0 for a service time.
+        verdict: "slower", "faster", "same", "unclear" (the interval is neither beyond the threshold nor within the one
+            that was given) or "no figure".
     """
 
     operation: str
@@ -61,39 +59,39 @@ class Change:
 
     @property
     def series(self) -> str:
-        """What the page calls the series."""
+        """Return the name of the series on the page."""
         return f"{self.operation}, {self.interface.upper()}, {self.client}"
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two results and what changed between them.
+    """Two results and the changes between them.
 
     Attributes:
-        changes: one for each series, time and quantile that both hold.
-        remarks: what else a reader has to know: other machine, more errors, series that only one result holds.
+        changes: one for each series, time and quantile in both results.
+        remarks: other differences: another machine, more errors, series that only one result holds.
     """
 
     old: Mapping[str, Any]
     new: Mapping[str, Any]
-    old_series: Mapping[tuple[str, str, str], Series]
-    new_series: Mapping[tuple[str, str, str], Series]
+    old_series: AllSeries
+    new_series: AllSeries
     changes: tuple[Change, ...]
     remarks: tuple[str, ...]
 
     @property
     def valid(self) -> bool:
-        """Whether both measurements say something, and at least one quantile could be compared."""
+        """Return whether both results are valid, and at least one quantile could be compared."""
         return bool(self.old["valid"] and self.new["valid"] and any(c.interval for c in self.changes))
 
     def with_verdict(self, verdict: str) -> list[Change]:
-        """Changes of that verdict, the greatest first."""
+        """Return the changes with that verdict, the greatest first."""
         found = [change for change in self.changes if change.verdict == verdict]
         return sorted(found, key=lambda change: -abs(math.log(change.ratio or 1.0)))
 
     @property
     def slower(self) -> bool:
-        """Whether anything got slower beyond its threshold."""
+        """Return whether any quantile got slower beyond its threshold."""
         return bool(self.with_verdict("slower"))
 
 
@@ -101,7 +99,7 @@ def compare(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, st
     """Compare two valid `roaas-latency/1` documents; `threshold` is a share, 0.05 for 5 %, and `names` are their paths.
 
     Raises:
-        ResultsIncompatibleError: they were measured under different loads, or have no series in common.
+        ResultsIncompatibleError: they were measured under different loads, or share no series.
         ResultInvalidError: a histogram cannot be decoded.
     """
     _same_load(old["plan"], new["plan"], names)
@@ -128,12 +126,12 @@ def compare(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, st
 def _same_load(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, str]) -> None:
     if old["model"] != new["model"]:
         raise ResultsIncompatibleError(
-            f"{names[0]} measured in the {old['model']} model and {names[1]} in the {new['model']} one: "
+            f"{names[0]} was measured in the {old['model']} model and {names[1]} in the {new['model']} model: "
             "their times mean different things"
         )
     if old.get("users") != new.get("users"):
         raise ResultsIncompatibleError(
-            f"{names[0]} measured with {old.get('users')} users and {names[1]} with {new.get('users')}"
+            f"{names[0]} was measured with {old.get('users')} users and {names[1]} with {new.get('users')}"
         )
     _same_cap(old, new, names)
     before, after = old.get("rate"), new.get("rate")
@@ -141,26 +139,26 @@ def _same_load(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str,
         before is not None and after is not None and abs(after - before) > _SAME_RATE * max(before, after)
     ):
         raise ResultsIncompatibleError(
-            f"{names[0]} measured at {rate(before)} requests/s and {names[1]} at {rate(after)}: "
-            "only what ran under the same load can be compared"
+            f"{names[0]} was measured at {rate(before)} requests/s and {names[1]} at {rate(after)}: "
+            "only results under the same load can be compared"
         )
 
 
 def _same_cap(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, str]) -> None:
-    """A closed model under a cap measures the cap as well; in the open one the rate is what it is."""
+    """Refuse two closed-model results with different caps, because times under a cap include waiting for the cap."""
     caps = [(plan.get("limits") or {}).get("max_rate") for plan in (old, new)]
     if new["model"] == "closed" and caps[0] != caps[1]:
-        told = [f"a cap of {rate(cap)} requests/s" if cap is not None else "no cap" for cap in caps]
+        limits = [f"a cap of {rate(cap)} requests/s" if cap is not None else "no cap" for cap in caps]
         raise ResultsIncompatibleError(
-            f"{names[0]} measured under {told[0]} and {names[1]} under {told[1]}: users that are held back wait for "
-            "the cap, not for the robot; measure both under the same [load] max_rate"
+            f"{names[0]} was measured under {limits[0]} and {names[1]} under {limits[1]}: throttled users wait for the "
+            "cap and not for the robot. Measure both under the same [load] max_rate."
         )
 
 
 def _changes(old: Series, new: Series, noise: Sequence[Mapping[str, Any]], threshold: float) -> Iterator[Change]:
     for time, (values, bounds) in TIMES.items():
         if time == "response" and new.data[values] == new.data["service_ms"]:
-            continue  # the closed model: both are one time
+            continue  # in the closed model both times are the same
         for quantile in QUANTILES:
             before, after = old.data[values].get(quantile), new.data[values].get(quantile)
             intervals = (old.data.get(bounds, {}).get(quantile), new.data.get(bounds, {}).get(quantile))
@@ -172,7 +170,7 @@ def _changes(old: Series, new: Series, noise: Sequence[Mapping[str, Any]], thres
 
 
 def _settled(change: Change, together: int, asked: float) -> Change:
-    """Widen a change's interval so that `together` of them hold at once, and judge it."""
+    """Widen a change's interval so that `together` intervals hold simultaneously, and set its verdict."""
     if change.interval is None or change.ratio is None or change.old_ms is None or change.new_ms is None:
         return change
     interval = widened(change.ratio, change.interval, together)
@@ -183,7 +181,7 @@ def _settled(change: Change, together: int, asked: float) -> Change:
 
 
 def widened(ratio: float, interval: tuple[float, float], together: int) -> tuple[float, float]:
-    """The interval of one ratio of many at the confidence at which all of them hold together, normal on a log scale."""
+    """Return one of `together` intervals, widened so that all hold simultaneously (normal on a log scale)."""
     alone, all_of_them = (NormalDist().inv_cdf(1 - (1 - _CONFIDENCE) / 2 / count) for count in (1, together))
     factor = all_of_them / alone
     low, high = (math.log(bound / ratio) * factor for bound in interval)
@@ -196,10 +194,9 @@ def _lag(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, float]:
 
 
 def noise_of(noise: Sequence[Mapping[str, Any]], series: Series, quantile: str) -> float:
-    """How far an interface's ratio to itself may lie from 1: the farthest bound measured for these; 0 if none was.
+    """Return how far an interface's ratio to itself was from 1 (A/A control), as a share; 0 if it was not measured.
 
-    A higher quantile is never the steadier one: it takes the noise of the lower ones where its own is not
-    known.
+    The noise of a quantile is at least that of the lower quantiles, also if its own was not measured.
     """
     lower = _ASCENDING[: _ASCENDING.index(quantile) + 1]
     operation, client, _ = series.key
@@ -216,7 +213,7 @@ def noise_of(noise: Sequence[Mapping[str, Any]], series: Series, quantile: str) 
 def ratio_interval(
     old: float | None, old_bounds: Sequence[float] | None, new: float | None, new_bounds: Sequence[float] | None
 ) -> tuple[float, float] | None:
-    """The 95 % interval of new / old from the intervals of both; None where one of the four is missing or not above 0.
+    """Return the 95 % interval of new / old from both intervals; None if a value is missing or not above 0.
 
     With log ratio d and arms a of each estimate: d - sqrt(a_new_low² + a_old_high²), d + sqrt(a_new_high² +
     a_old_low²).
@@ -226,17 +223,17 @@ def ratio_interval(
     if min(old, new, *old_bounds, *new_bounds) <= 0:
         return None
     change = math.log(new / old)
-    # A skewed bootstrap may leave the estimate outside of its own interval: an arm is never negative.
+    # With a skewed bootstrap the estimate may lie outside its own interval; an arm must not be negative.
     new_low, new_high = (max(0.0, math.log(new / new_bounds[0])), max(0.0, math.log(new_bounds[1] / new)))
     old_low, old_high = (max(0.0, math.log(old / old_bounds[0])), max(0.0, math.log(old_bounds[1] / old)))
     return math.exp(change - math.hypot(new_low, old_high)), math.exp(change + math.hypot(new_high, old_low))
 
 
 def judge(interval: tuple[float, float], threshold: float, asked: float) -> str:
-    """What an interval of new / old says.
+    """Return the verdict on an interval of new / old.
 
-    Beyond the share `threshold` a change is none of the noise's; within `asked`, which no noise makes greater, there
-    is none worth a word.
+    "slower" and "faster" need the whole interval beyond `threshold`, which includes the noise. "same" needs the whole
+    interval within `asked`, the threshold that was given.
     """
     low, high = interval
     if low > 1 + threshold:
@@ -247,10 +244,7 @@ def judge(interval: tuple[float, float], threshold: float, asked: float) -> str:
 
 
 def _remarks(
-    old: Mapping[str, Any],
-    new: Mapping[str, Any],
-    old_series: Mapping[tuple[str, str, str], Series],
-    new_series: Mapping[tuple[str, str, str], Series],
+    old: Mapping[str, Any], new: Mapping[str, Any], old_series: AllSeries, new_series: AllSeries
 ) -> Iterator[str]:
     for word, result in (("old", old), ("new", new)):
         if not result["valid"]:
@@ -258,29 +252,27 @@ def _remarks(
     for key in ("cpu", "cpus", "kernel", "python"):
         before, after = old["environment"][key], new["environment"][key]
         if before != after:
-            yield f"Measured on different machines or systems: {key} was {before}, and is {after}."
+            yield f"The two were measured on different machines or systems: {key} was {before}, and is {after}."
     for word, series, other in (("old", old_series, new_series), ("new", new_series, old_series)):
         alone = [f"{one.name} ({one.data['client']})" for key, one in series.items() if key not in other]
         if alone:
             yield f"Only in the {word} result: {', '.join(alone)}."
     before, after = (_failed(series) for series in (old_series, new_series))
     if after > before:
-        yield f"More requests failed: {after:.2%} instead of {before:.2%}."
+        yield f"More requests failed: {after:.2%} now, {before:.2%} before."
     yield from _uncounted(old_series, new_series)
     for interface, (was, now) in _knees(old, new).items():
         if was != now:
-            yield f"{interface.upper()} held up to {rate(was)} requests/s, and now holds up to {rate(now)}."
+            yield f"{interface.upper()} met the criterion up to {rate(was)} requests/s, and now up to {rate(now)}."
 
 
-def _uncounted(
-    old_series: Mapping[tuple[str, str, str], Series], new_series: Mapping[tuple[str, str, str], Series]
-) -> Iterator[str]:
+def _uncounted(old_series: AllSeries, new_series: AllSeries) -> Iterator[str]:
     for word, series in (("old", old_series), ("new", new_series)):
         if any(one.data["errors"] and "counted" not in one.data for one in series.values()):
-            yield f"In the {word} result, of an earlier version, failed requests are in no figure of time."
+            yield f"The {word} result is of an earlier version: its times do not include failed requests."
 
 
-def _failed(series: Mapping[tuple[str, str, str], Series]) -> float:
+def _failed(series: AllSeries) -> float:
     failed = sum(int(one.data["errors"]) for one in series.values())
     return failed / max(1, failed + sum(int(one.data["count"]) for one in series.values()))
 

@@ -1,4 +1,4 @@
-"""What `roaas compare` says: as a table for the terminal, as a page that draws both runs, and as Markdown."""
+"""The output of `roaas compare`: a table for the terminal, a page with figures, and Markdown."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -18,10 +18,10 @@ _HEAD = ("series", "time", "at", "old ms", "new ms", "new/old", "95 % interval",
 
 
 def verdict(comparison: Comparison) -> Verdict:
-    """The answer in a sentence, with the greatest change's interval."""
+    """Return the verdict on the comparison, with the greatest change and its interval."""
     if not comparison.valid:
         because = " ".join(comparison.remarks) or "No quantile has an interval in both results."
-        return Verdict("warning", "?", "Cannot be told", because)
+        return Verdict("warning", "?", "Not comparable", because)
     slower, faster = comparison.with_verdict("slower"), comparison.with_verdict("faster")
     counted = f"(Of {len(comparison.changes)} quantiles {len(slower)} got slower and {len(faster)} faster.)"
     if slower:
@@ -31,12 +31,14 @@ def verdict(comparison: Comparison) -> Verdict:
     unclear = comparison.with_verdict("unclear")
     if unclear:
         widest = sentence(max(unclear, key=_width))
-        return Verdict("quiet", "=", "No change can be shown", f"The least certain: {widest} Longer runs narrow it.")
+        return Verdict(
+            "quiet", "=", "No change can be shown", f"The least certain: {widest} Longer runs give narrower intervals."
+        )
     return Verdict("quiet", "=", "No change", "Every quantile with an interval stayed within the threshold.")
 
 
 def sentence(of: Change) -> str:
-    """One change in words."""
+    """Return one change in words."""
     return (
         f"{of.series}: the {of.time} time at {QUANTILE_WORDS[of.quantile]} went from {ms(of.old_ms)} to "
         f"{ms(of.new_ms)} ms, {ratio(of.ratio)} times (95 % interval {interval(of.interval, of_ratio=True)}, "
@@ -45,10 +47,10 @@ def sentence(of: Change) -> str:
 
 
 def table(comparison: Comparison) -> str:
-    """All changes in aligned columns, for a terminal."""
+    """Return all changes in aligned columns, for a terminal."""
     rows = [_HEAD, *(_row(one) for one in comparison.changes)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD))]
-    # Words to the left, figures to the right.
+    # Words are aligned to the left, numbers to the right.
     lines = (
         "  ".join(
             cell.ljust(width) if column in {0, 1, 8} else cell.rjust(width)
@@ -60,13 +62,13 @@ def table(comparison: Comparison) -> str:
 
 
 def comparison_html(comparison: Comparison, names: tuple[str, str]) -> str:
-    """The page; `names` are the two files."""
+    """Return the page; `names` are the two files."""
     pictures = {"ratios": _ratios(comparison.changes), "change": change(comparison.old_series, comparison.new_series)}
     return html_page("compare.html.j2", pictures=pictures, **_values(comparison, names))
 
 
 def comparison_markdown(comparison: Comparison, names: tuple[str, str]) -> str:
-    """The short form for a pull request; `names` are the two files."""
+    """Return the short form for a pull request; `names` are the two files."""
     return markdown_page("compare.md.j2", **_values(comparison, names))
 
 
@@ -106,8 +108,8 @@ def _ratios(changes: Sequence[Change]) -> Any:
         "ratios",
         "new over old, service time",
         rows,
-        "How many times as long requests take now, with 95 % intervals. Right of 1 they got slower. What lies within "
-        "the noise threshold of the table is no change.",
+        "New service time divided by the old one, with 95 % intervals. Right of 1 requests got slower. A change within "
+        "the noise, which is in the table, does not count.",
     )
 
 

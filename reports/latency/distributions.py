@@ -1,7 +1,7 @@
-"""Distributions of latencies, out of the HDR histograms that a result file carries.
+"""Distributions of latencies, decoded from the HDR histograms of a result file.
 
-A histogram is HdrHistogram's V2 encoding, compressed, in base64, of whole microseconds. It is decoded once
-into three arrays, from which every curve is drawn; all times that leave this module are milliseconds.
+A histogram holds whole microseconds in HdrHistogram's V2 encoding, compressed, in base64. It is decoded once into three
+arrays in milliseconds, from which every curve is drawn.
 """
 
 import math
@@ -21,7 +21,7 @@ from reports.pages.untrusted import excerpt
 Floats = NDArray[np.float64]
 _US_PER_MS = 1000.0
 _TAIL = 0.025
-"""What a two-sided 95 % interval leaves on each side."""
+"""Share beyond each bound of a two-sided 95 % interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Distribution:
     """Recorded values, grouped by the histogram's own buckets.
 
     Attributes:
-        low_ms: lower edge of each bucket that holds something, ascending.
+        low_ms: lower edge of each bucket that is not empty, ascending.
         high_ms: its upper edge (half a microsecond beyond its highest value).
         counts: how many values it holds.
     """
@@ -40,11 +40,11 @@ class Distribution:
 
     @property
     def total(self) -> int:
-        """How many values there are."""
+        """Return the number of values."""
         return int(self.counts.sum())
 
     def quantiles(self, at: Floats) -> Floats:
-        """Values below which the shares `at` (0 to 1) of all values lie; interpolated inside a bucket."""
+        """Return the values at the quantiles `at` (0 to 1), interpolated inside a bucket."""
         reached = np.cumsum(self.counts)
         rank = np.clip(at, 0.0, 1.0) * self.total
         index = np.minimum(np.searchsorted(reached, rank, side="left"), len(reached) - 1)
@@ -55,7 +55,7 @@ class Distribution:
 
     @property
     def highest_supported(self) -> float:
-        """The highest quantile for which these many values support a 95 % interval with an upper bound.
+        """Return the highest quantile for which so many values give a 95 % interval with an upper bound.
 
         The largest of n values lies above the q-quantile with probability 1 - q**n; that is at least 97.5 %
         up to q = 0.025**(1/n).
@@ -64,20 +64,20 @@ class Distribution:
 
 
 def distribution(encoded: str, where: str) -> Distribution | None:
-    """Decode a histogram; None where it holds nothing.
+    """Decode a histogram; return None if it is empty.
 
     Args:
         encoded: base64 of the V2 encoding.
-        where: the place in the result file, for the message.
+        where: the place in the result file, for the error message.
 
     Raises:
-        ResultInvalidError: it is no such histogram.
+        ResultInvalidError: it cannot be decoded.
     """
     if not encoded:
         return None
     try:
         histogram = HdrHistogram.decode(encoded)
-        # The library's own iterator visits every empty bucket on its way, in Python.
+        # The library's own iterator visits every empty bucket, which is slow.
         held = np.flatnonzero(np.asarray(histogram.counts))
         values = [histogram.get_value_from_index(int(index)) for index in held]
     except (HdrCookieException, HdrLengthException, zlib.error, TypeError, ValueError, IndexError) as error:
@@ -101,8 +101,8 @@ class Series:
 
     Attributes:
         data: the series as in the file.
-        service: time from the actual start; None without values.
-        response: time from the intended start; None without values or where it was not recorded.
+        service: times from the actual start; None without values.
+        response: times from the intended start; None without values, or if they were not recorded.
     """
 
     data: Mapping[str, Any]
@@ -111,17 +111,21 @@ class Series:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Operation, client and interface: what a series is known by."""
+        """Return operation, client and interface, which identify a series."""
         return self.data["operation"], self.data["client"], self.data["interface"]
 
     @property
     def name(self) -> str:
-        """How the page calls it."""
+        """Return the name of the series on the page."""
         return f"{self.data['operation']}, {self.data['interface'].upper()}"
 
 
-def all_series(result: Mapping[str, Any], path: str) -> dict[tuple[str, str, str], Series]:
-    """Every series of a result by operation, client and interface, wire before zeep and REST before SOAP."""
+AllSeries = Mapping[tuple[str, str, str], Series]
+"""The series of a result by operation, client and interface."""
+
+
+def all_series(result: Mapping[str, Any], path: str) -> AllSeries:
+    """Return every series by operation, client and interface, wire before zeep and REST before SOAP."""
     found = {}
     for index, data in enumerate(result["series"]):
         where = f"{path}: at $.series[{index}]"

@@ -1,18 +1,18 @@
-"""The history of a robot's latency: the stored results of `roaas load --save NAME` as a page, and as CSV.
+"""The history of a robot's latency: the stored results of `roaas load --save NAME` as a page and as CSV.
 
-The CSV is for a change-point tool such as Apache Otava: a row for each run, in order of time, and a column for each
-figure that every run has.
+The CSV is for a change-point detector such as Apache Otava. It has a row for each run, in order of time, and a column
+for each quantile that every run has.
 """
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from reports.errors import ResultMissingError
-from reports.latency.figures.canvas import COLOUR, MARK, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, picture
 from reports.latency.numbers import interval, ms, rate
 from reports.pages.page import html_page, write_pages
 from reports.reading import read_latency
@@ -36,14 +36,14 @@ class Run:
 
 
 def write_history(folder: Path) -> list[Path]:
-    """Write history.html and history.csv beside the stored results of a baseline; returns their paths.
+    """Write history.html and history.csv beside the stored results in a folder, and return their paths.
 
     Raises:
-        ReportError: there is none, or one cannot be read.
+        ReportError: there is no result, or one cannot be read.
     """
     files = sorted(folder.glob("20*.json"))
     if not files:
-        raise ResultMissingError(f"{folder}: no result is stored there")
+        raise ResultMissingError(f"{folder}: no result is stored in it")
     runs = [_run(read_latency(path)) for path in files]
     return write_pages(folder, {"history.html": history_html(folder.name, runs), "history.csv": history_csv(runs)})
 
@@ -60,7 +60,7 @@ def _run(result: Mapping[str, Any]) -> Run:
 
 
 def history_csv(runs: Sequence[Run]) -> str:
-    """A row for each run: when, the robot's version, and the figures that every run has, in milliseconds."""
+    """Return a row for each run: time, robot's version, and the quantiles that every run has, in milliseconds."""
     columns = {
         f"{operation}_{interface}_{client}_{quantile}_ms": ((operation, client, interface), quantile)
         for operation, client, interface in runs[-1].series
@@ -76,7 +76,7 @@ def history_csv(runs: Sequence[Run]) -> str:
 
 
 def history_html(name: str, runs: Sequence[Run]) -> str:
-    """The page: medians over the runs with their intervals, and a table of them."""
+    """Return the page: the medians of all runs with their intervals, as a figure and as a table."""
     keys = list(dict.fromkeys(key for run in runs for key in run.series))
     rows = [
         (
@@ -88,7 +88,7 @@ def history_html(name: str, runs: Sequence[Run]) -> str:
         )
         for run in reversed(runs)
     ]
-    return html_page("history.html.j2", name=name, keys=keys, rows=rows, picture_of_runs=_picture(runs, keys))
+    return html_page("history.html.j2", name=name, keys=keys, rows=rows, picture_of_runs=_medians(runs, keys))
 
 
 def _figure(run: Run, key: Key, quantile: str) -> float | None:
@@ -97,38 +97,35 @@ def _figure(run: Run, key: Key, quantile: str) -> float | None:
     return value
 
 
-def _picture(runs: Sequence[Run], keys: Sequence[Key]) -> Picture | None:
-    panels = []
-    with drawing():
-        for operation, client in dict.fromkeys(key[:2] for key in keys):
-            panel = Panel(f"{operation}, {client} client", f"Medians of {operation}, {client} client, run by run.")
-            for interface in (key[2] for key in keys if key[:2] == (operation, client)):
-                places = [
-                    (number, one["service_ms"]["p50"], one["ci95_ms"]["p50"])
-                    for number, run in enumerate(runs, 1)
-                    if (one := run.series.get((operation, client, interface))) and one["service_ms"]["p50"] is not None
-                ]
-                # A skewed bootstrap may leave the estimate outside of its own interval: an arm is never negative.
-                arms = [(max(m - b[0], 0.0), max(b[1] - m, 0.0)) if b else (0.0, 0.0) for _, m, b in places]
-                panel.axes.errorbar(
-                    [number for number, *_ in places],
-                    [median for _, median, _ in places],
-                    [[low for low, _ in arms], [high for _, high in arms]],
-                    fmt=f"-{MARK[interface]}",
-                    color=COLOUR[interface],
-                    markersize=4,
-                    linewidth=1.2,
-                    capsize=3,
-                    label=interface.upper(),
-                )
-            log_time_axis(panel.axes, "y", "median service time, ms")
-            panel.axes.set_xlabel("run")
-            panel.axes.set_xticks(sorted({1, len(runs), (len(runs) + 1) // 2}))
-            panel.legend()
-            panels.append(panel)
-        return gather(
-            "history",
-            "The median of each stored run, with its 95 % interval. Runs at different times differ for more reasons "
-            "than one run's blocks do: before blaming the robot, have both versions take turns (--against).",
-            panels,
-        )
+@picture(
+    "history",
+    "The median of each stored run, with its 95 % interval. Runs at different times also differ because the machine "
+    "changed. To compare two versions of a robot, measure them alternately in one run (--against).",
+)
+def _medians(runs: Sequence[Run], keys: Sequence[Key]) -> Iterator[Panel]:
+    for operation, client in dict.fromkeys(key[:2] for key in keys):
+        panel = Panel(f"{operation}, {client} client", f"Medians of {operation}, {client} client, run by run.")
+        for interface in (key[2] for key in keys if key[:2] == (operation, client)):
+            places = [
+                (number, one["service_ms"]["p50"], one["ci95_ms"]["p50"])
+                for number, run in enumerate(runs, 1)
+                if (one := run.series.get((operation, client, interface))) and one["service_ms"]["p50"] is not None
+            ]
+            # With a skewed bootstrap the estimate may lie outside its own interval; an arm must not be negative.
+            arms = [(max(m - b[0], 0.0), max(b[1] - m, 0.0)) if b else (0.0, 0.0) for _, m, b in places]
+            panel.axes.errorbar(
+                [number for number, *_ in places],
+                [median for _, median, _ in places],
+                [[low for low, _ in arms], [high for _, high in arms]],
+                fmt=f"-{MARK[interface]}",
+                color=COLOUR[interface],
+                markersize=4,
+                linewidth=1.2,
+                capsize=3,
+                label=interface.upper(),
+            )
+        log_time_axis(panel.axes, "median service time, ms")
+        panel.axes.set_xlabel("run")
+        panel.axes.set_xticks(sorted({1, len(runs), (len(runs) + 1) // 2}))
+        panel.legend()
+        yield panel

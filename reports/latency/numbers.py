@@ -1,10 +1,10 @@
-"""How figures are written: as many digits as they carry, units apart, and a dash where there is none."""
+"""How numbers are written: with their significant digits, and a dash where there is no number."""
 
 from collections.abc import Sequence
 
 NONE = "\N{EN DASH}"
 
-# From these figures on, further digits say nothing.
+# From these values on, further digits are not significant.
 _TENTHS_MS = 10
 _WHOLE_MS = 1000
 _WHOLE_RATE = 100
@@ -12,7 +12,7 @@ _WHOLE_PERCENT = 10
 
 
 def ms(value: float | None) -> str:
-    """Milliseconds with microsecond resolution below 10, fewer digits above: 0.074, 12.3, 1,810."""
+    """Return milliseconds with three decimals below 10, and fewer above: 0.074, 12.3, 1,810."""
     if value is None:
         return NONE
     size = abs(value)
@@ -21,19 +21,19 @@ def ms(value: float | None) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """A ratio with two decimals."""
+    """Return a ratio with two decimals."""
     return NONE if value is None else f"{value:.2f}"
 
 
 def rate(value: float | None) -> str:
-    """Requests a second: 4,000, or 12.5."""
+    """Return requests per second: 4,000, or 12.5."""
     if value is None:
         return NONE
     return f"{value:,.0f}" if value >= _WHOLE_RATE or value == int(value) else f"{value:.1f}"
 
 
 def share(value: float | None) -> str:
-    """A share as a percentage with two significant digits, and whole from 10 % on: 0.043 %, 120 %."""
+    """Return a share as a percentage with two significant digits, whole from 10 %: 0.043 %, 120 %."""
     if value is None:
         return NONE
     percent = value * 100
@@ -41,7 +41,7 @@ def share(value: float | None) -> str:
 
 
 def interval(bounds: Sequence[float] | None, *, of_ratio: bool = False) -> str:
-    """An interval as "1.58 to 1.63"; both bounds in the form of their kind."""
+    """Return an interval of milliseconds or of ratios: 1.58 to 1.63."""
     if bounds is None:
         return NONE
     write = ratio if of_ratio else ms

@@ -1,64 +1,59 @@
-"""What is said of each series by itself: after a pause, over several repeats, and of the robot's own part in it."""
+"""Remarks on single series: the robot's own work, requests after a pause, and repeats."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 
-from reports.latency.distributions import Series
+from reports.latency.distributions import AllSeries
 from reports.latency.numbers import interval, ms, rate
 
-#: Where the robot's own parts differ by this factor, the interfaces make it do different work.
+#: If the robot's own times over two interfaces differ by this factor, it does different work for them.
 _OTHER_WORK = 1.5
 
 
-def work(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """Where the robot says that it is itself busy for longer over one interface than over the other."""
-    told = []
+def work(series: AllSeries) -> Iterator[str]:
+    """Yield a remark for each operation on which the robot itself works longer over one interface than the other."""
     for (operation, client, interface), rest in series.items():
         soap = series.get((operation, client, "soap"))
         if interface != "rest" or client != "wire" or soap is None:
             continue
         spent = [float((one.data["spans_ms"]["server"] or {}).get("p50") or 0.0) for one in (rest, soap)]
         if 0 < _OTHER_WORK * min(spent) <= max(spent):
-            told.append(
-                f"{operation.capitalize()}: the robot itself is busy for {ms(spent[0])} ms over REST and "
-                f"{ms(spent[1])} ms over SOAP at the median (its Server-Timing): that is not the same work."
+            yield (
+                f"{operation.capitalize()}: by its Server-Timing header the robot itself works for {ms(spent[0])} ms "
+                f"over REST and {ms(spent[1])} ms over SOAP at the median. That is not the same work."
             )
-    return told
 
 
-def cold(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """What a request costs after a pause, beside one right behind another: a sentence for all series."""
-    told, after, behind = [], "", ""
+def cold(series: AllSeries) -> Iterator[str]:
+    """Yield one sentence that compares requests after a pause with requests without one, for all series."""
+    text, after, behind = [], "", ""
     for one in series.values():
         pause = one.data.get("after_pause")
         if pause and pause["cold_ms"]["p50"] is not None and pause["warm_ms"]["p50"] is not None:
             bounds = pause["cold_ci95_ms"]
             sure = f" ({interval(bounds)})" if bounds else ""
             after, behind = f"after a pause of {pause['pause_s']:g} s", _behind(pause["spacing_s"])
-            told.append(f"{one.name} {ms(pause['cold_ms']['p50'])} ms{sure} and {ms(pause['warm_ms']['p50'])} ms")
-    if not told:
-        return []
-    return [f"Medians {after}, and {behind}: {'; '.join(told)}."]
+            text.append(f"{one.name} {ms(pause['cold_ms']['p50'])} ms{sure} and {ms(pause['warm_ms']['p50'])} ms")
+    if text:
+        yield f"Medians {after}, and {behind}: {'; '.join(text)}."
 
 
 def _behind(spacing_s: float) -> str:
-    """How closely requests followed one another where there was no pause."""
+    """Return how closely requests followed one another without a pause."""
     if not spacing_s:
         return "right behind another request"
     limit = f"the limit of {rate(1 / spacing_s)} requests/s allows no less"
     return f"{spacing_s * 1e3:g} ms after the start of the one before ({limit})"
 
 
-def repeated(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """Whether the repeats' own intervals cover what the repeats differ by."""
-    told = []
+def repeated(series: AllSeries) -> Iterator[str]:
+    """Yield a remark for each series with repeats: how their medians differ, and whether their intervals cover it."""
     for one in series.values():
         repeats = [repeat for repeat in one.data.get("repeats", []) if repeat["p50"] and repeat["ci95_ms"]["p50"]]
         whole = one.data["service_ms"]["p50"]
         if len(repeats) > 1 and whole:
             missed = sum(not low <= whole <= high for low, high in (repeat["ci95_ms"]["p50"] for repeat in repeats))
             medians = [repeat["p50"] for repeat in repeats]
-            told.append(
+            yield (
                 f"{one.name}, {one.data['client']}: medians of {len(repeats)} repeats from {ms(min(medians))} to "
-                f"{ms(max(medians))} ms; the intervals of {missed} of them leave the median of all out."
+                f"{ms(max(medians))} ms; the intervals of {missed} of them do not contain the overall median."
             )
-    return told

@@ -1,11 +1,11 @@
-"""The latency report: a measurement of SOAP against REST as a page and as Markdown."""
+"""The latency report: a measurement of SOAP and REST as a page and as Markdown."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from reports.latency import against
-from reports.latency.distributions import Series, all_series
+from reports.latency.distributions import AllSeries, all_series
 from reports.latency.figures.canvas import COLOUR, INK, Picture
 from reports.latency.figures.heat import blocks, heat
 from reports.latency.figures.load import load
@@ -31,17 +31,17 @@ QUANTILE_WORDS = {
 
 JUDGED = {
     "differs": "a difference",
-    "bounded": "a difference, bound",
-    "noise": "noise; excluded: beyond",
-    "none": "nothing",
+    "bounded": "a difference beyond",
+    "noise": "within noise, below a factor of",
+    "none": "not significant",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class PaperRow:
-    """One line of the comparison with the paper: means, because that is what it gives; None where not measured.
+    """One row of the comparison with the paper, which gives means; None if not measured.
 
-    `bounds` are the ratio's 95 % interval.
+    `bounds` is the 95 % interval of the ratio.
     """
 
     label: str
@@ -52,22 +52,22 @@ class PaperRow:
 
 
 def latency_html(result: Mapping[str, Any], path: str = "latency.json") -> str:
-    """A valid `roaas-latency/1` document as one HTML file; `path` is where it came from, for messages.
+    """Return a valid `roaas-latency/1` document as an HTML page; `path` is its file, for error messages.
 
     Raises:
-        ResultInvalidError: a histogram in it cannot be decoded.
+        ResultInvalidError: a histogram cannot be decoded.
     """
     series = all_series(result, path)
     return html_page("latency.html.j2", pictures=_pictures(result, series), **_values(result, series))
 
 
 def latency_markdown(result: Mapping[str, Any], path: str = "latency.json") -> str:
-    """The short form for a pull request; arguments and errors as for the page."""
+    """Return the short form for a pull request; arguments and errors as for the page."""
     series = all_series(result, path)
     return markdown_page("latency.md.j2", **_values(result, series))
 
 
-def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> dict[str, Any]:
+def _values(result: Mapping[str, Any], series: AllSeries) -> dict[str, Any]:
     return {
         "result": result,
         "series": list(series.values()),
@@ -91,29 +91,29 @@ def _values(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Ser
     }
 
 
-def _missing(series: Mapping[tuple[str, str, str], Series]) -> list[str]:
-    """Why figures are missing, each reason once however many requests a series had."""
+def _missing(series: AllSeries) -> list[str]:
+    """Return why values are missing, each reason once."""
     reasons = (reason for one in series.values() for reason in one.data.get("reasons", {}).values())
     return sorted({reason.rpartition("; ")[2] for reason in reasons})
 
 
 def _rounds(result: Mapping[str, Any]) -> list[str]:
-    """What the medians' intervals were drawn from, by operation and client."""
-    told = []
+    """Return what the medians' intervals were resampled from, by operation and client."""
+    lines = []
     for entry in result["comparisons"]:
         rounds = entry.get("rounds")
         if entry["quantile"] == "p50" and rounds:
             before, after = (rounds["autocorrelation"][key] for key in ("pairs", "rounds"))
             known = "" if before is None or after is None else f", autocorrelation {after:.2f} (of pairs {before:.2f})"
-            told.append(
+            lines.append(
                 f"{rounds['number']} rounds of {rounds['pairs']} pairs of blocks for {entry['operation']}, "
                 f"{entry['client']}{known}"
             )
-    return told
+    return lines
 
 
-def paper_rows(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> list[PaperRow]:
-    """The paper's figures, and under them this run's for each operation and client."""
+def paper_rows(result: Mapping[str, Any], series: AllSeries) -> list[PaperRow]:
+    """Return the paper's means, followed by this run's for each operation and client."""
     means_compared = {(c["operation"], c["client"]): c for c in result["comparisons"] if c["quantile"] == "mean"}
     rows = [PaperRow("the paper, delivery", PAPER["rest_ms"], PAPER["soap_ms"], PAPER["ratio"], None)]
     for operation, client in dict.fromkeys(key[:2] for key in series):
@@ -132,7 +132,7 @@ def paper_rows(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], 
     return rows
 
 
-def _pictures(result: Mapping[str, Any], series: Mapping[tuple[str, str, str], Series]) -> dict[str, Picture | None]:
+def _pictures(result: Mapping[str, Any], series: AllSeries) -> dict[str, Picture | None]:
     return {
         "against": against.picture(result),
         "ratios": _ratio_picture(result),
@@ -160,7 +160,7 @@ def _ratio_picture(result: Mapping[str, Any]) -> Picture | None:
         "ratios",
         "SOAP's service time over REST's",
         rows,
-        "How many times as long SOAP takes as REST, at the median (50 %) and at the 99th percentile, with 95 % "
-        "intervals. Right of 1 SOAP is slower. The dashed line is the ratio of the paper's two means.",
+        "SOAP's service time divided by REST's, at the median (50 %) and at the 99th percentile, with 95 % intervals. "
+        "Right of 1 SOAP is slower. The dashed line is the ratio of the paper's two means.",
         mark=(PAPER["ratio"], f"the paper's {PAPER['ratio']}"),
     )

@@ -1,1 +1,1 @@
-"""What every page is made by: templates, and text that a robot controls made fit to be shown."""
+"""What all pages share: templates, and the escaping of text from a robot."""

@@ -1,4 +1,4 @@
-"""Who may do what: robots by conformance classes, as the pages of a fleet and of a registry show them."""
+"""A table of robots and conformance classes, as the pages of a fleet and of a registry show it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -6,28 +6,28 @@ from enum import Enum
 
 
 class Mark(Enum):
-    """What stands where a robot meets a class: tone, sign and words; green is one of them alone."""
+    """The cell of a robot and a class: tone, sign and words. Only TRUSTED is green."""
 
     TRUSTED = ("good", "✓", "passed")
-    ACCEPTED = ("warning", "!", "passed but for failures that are accepted")
+    ACCEPTED = ("warning", "!", "passed except for accepted failures")
     FAILED = ("bad", "✗", "failed")
     INCONCLUSIVE = ("warning", "?", "could not be judged")
-    STALE = ("quiet", "○", "passed, and does not count")
+    STALE = ("quiet", "○", "passed, but does not count")
     NOT_CLAIMED = ("quiet", "·", "not claimed")
 
     @property
     def tone(self) -> str:
-        """Class of the style sheet."""
+        """Return the class in the style sheet."""
         return self.value[0]
 
     @property
     def sign(self) -> str:
-        """What is read where colours are not."""
+        """Return the sign beside the colour."""
         return self.value[1]
 
     @property
     def words(self) -> str:
-        """What is read aloud."""
+        """Return the words that a screen reader reads."""
         return self.value[2]
 
 
@@ -41,11 +41,11 @@ class Row:
     Attributes:
         name: of the robot.
         marks: by class.
-        tone: of the word beside the name.
-        word: what is said of the robot as a whole.
-        notes: lines in small print under the name.
-        href: page of the robot, made by us, or empty.
-        until: RFC 3339 time after which nothing of it is green, or empty.
+        tone: style of the word beside the name.
+        word: the verdict on the robot as a whole.
+        notes: lines under the name.
+        href: relative link to the robot's page, or empty.
+        until: RFC 3339 time after which no cell is green, or empty.
     """
 
     name: str
@@ -59,29 +59,29 @@ class Row:
 
 @dataclass(frozen=True)
 class Matrix:
-    """The rows, and the classes that at least one of them speaks of, in the order of their first mention."""
+    """The rows, and the classes that occur in them, in the order of their first occurrence."""
 
     rows: tuple[Row, ...]
     titles: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """The columns."""
+        """Return the columns."""
         return tuple(dict.fromkeys(name for row in self.rows for name in row.marks))
 
     def trusted(self, row: Row) -> str:
-        """Numbers of the columns that are green in a row, for the filter: no name goes into the style sheet."""
+        """Return the numbers of a row's green columns; the filter uses numbers, so that no name enters the CSS."""
         numbers = (number for number, name in enumerate(self.classes) if row.marks.get(name) is Mark.TRUSTED)
         return " ".join(map(str, numbers))
 
 
 def marks(classes: Mapping[str, str], trusted: Iterable[str], *, stands: bool = True) -> dict[str, Mark]:
-    """What stands at each class.
+    """Return the mark of each class.
 
     Args:
-        classes: verdict of each.
-        trusted: those that passed without an accepted failure.
-        stands: whether anything may be green.
+        classes: the verdict of each class.
+        trusted: the classes that passed without an accepted failure.
+        stands: whether any class may be green.
     """
     green = set(trusted)
     found = {}

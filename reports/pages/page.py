@@ -1,9 +1,9 @@
-"""Makes the pages: Jinja templates to self-contained files that nothing leaves and nothing enters.
+"""Makes the pages: Jinja templates become self-contained files that load nothing and send nothing.
 
-Each page carries its style and its script, and a Content-Security-Policy that allows these and no other
-source. The script is named in the policy by its digest (CSP Level 3, section 2.3.1), so that nothing a robot
-answered could run even if an escape were forgotten. Every page works without its script: it only adds copy
-buttons and a search box, and opens what is folded before printing.
+Each page includes its style and its script, and a Content-Security-Policy that allows nothing else. The policy names
+the script by its digest (CSP Level 3, section 2.3.1), so that text from a robot could not run as a script even if its
+escaping were forgotten. Every page works without its script, which only adds copy buttons and a search box, and unfolds
+everything for printing.
 """
 
 import base64
@@ -17,13 +17,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports.errors import ResultUnreadableError
-from reports.pages.untrusted import beginning, code_block, code_span, excerpt, plain, visible
+from reports.pages.untrusted import beginning, code_block, code_span, coded, excerpt, plain, visible
 
 TEMPLATE_DIR = Path(__file__).parent / "templates"
 
 
 def html_page(template: str, **values: Any) -> str:
-    """Fill one of the HTML templates; everything that is no `Markup` is escaped."""
+    """Return an HTML template filled with values; everything except `Markup` is escaped."""
     script = _asset("page.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
@@ -35,7 +35,7 @@ def html_page(template: str, **values: Any) -> str:
         .get_template(template)
         .render(
             policy=policy,
-            # These two are files of this folder and carry nothing of a result.
+            # These two are our own files and contain nothing from a result.
             script=Markup(script),  # noqa: S704 - our own file
             style=Markup(_asset("page.css")),  # noqa: S704 - our own file
             generator_name=f"RoAAS {suite_version()}",
@@ -45,14 +45,14 @@ def html_page(template: str, **values: Any) -> str:
 
 
 def markdown_page(template: str, **values: Any) -> str:
-    """Fill one of the Markdown templates; they put all foreign text into code spans and blocks."""
+    """Return a Markdown template filled with values; the templates escape text from outside by filters."""
     return _environment(html=False).get_template(template).render(generator_name=f"RoAAS {suite_version()}", **values)
 
 
 def write_pages(directory: Path, pages: dict[str, str]) -> list[Path]:
-    """Write pages by their names; returns their paths.
+    """Write pages by their file names, and return their paths.
 
-    Each is written beside its final name first: whoever is interrupted leaves the old page or the new one.
+    Each is written to a temporary file first, so that an interrupted run leaves the old page or the new one.
 
     Raises:
         ResultUnreadableError: the directory cannot be made or written to.
@@ -69,7 +69,7 @@ def write_pages(directory: Path, pages: dict[str, str]) -> list[Path]:
 
 
 def suite_version() -> str:
-    """Version of the installed distribution; "unknown" where the code runs without being installed."""
+    """Return the version of the installed distribution, or "unknown" if it is not installed."""
     try:
         return version("roaas")
     except PackageNotFoundError:
@@ -90,6 +90,7 @@ def _environment(*, html: bool) -> Environment:
     environment.filters.update(
         beginning=beginning,
         code_span=code_span,
+        coded=coded,
         code_block=code_block,
         excerpt=excerpt,
         grouped=grouped,
@@ -100,19 +101,19 @@ def _environment(*, html: bool) -> Environment:
 
 
 def _finalize(value: Any) -> Any:
-    """What every `{{ … }}` goes through: text becomes visible text; markup of our own stays as it is."""
+    """Make the text of every `{{ … }}` visible; our own markup stays as it is."""
     if isinstance(value, str) and not isinstance(value, Markup):
         return visible(value)
     return value
 
 
 def opened(text: str) -> str:
-    """The text with a capital letter at its beginning: a reason that stands as a sentence of its own."""
+    """Return the text with a capital letter at its beginning."""
     return text[:1].upper() + text[1:]
 
 
 def grouped(number: float) -> str:
-    """A whole number with its thousands apart: 12,345."""
+    """Return a number with separated thousands: 12,345."""
     return f"{number:,}"
 
 

@@ -1,23 +1,24 @@
-"""Makes text that a robot controls fit to be shown: nothing invisible, nothing endless.
+"""Makes text from a robot safe to show: without invisible characters, and of limited length.
 
-A robot under test may answer with anything: terminal escapes, a right-to-left override that turns a verdict
-around, lone surrogates that no encoder takes, a gigabyte of one letter. What is shown has every character
-that does not print written out as its escape, and is cut with its length told. Escaping for HTML, XML or
-Markdown comes after.
+A robot may send anything: terminal escapes, a right-to-left override that reverses a verdict, lone surrogates that
+cannot be encoded, a gigabyte of one letter. Unprintable characters are shown as their escapes, and a long text is cut
+and its length stated. Escaping for HTML, XML or Markdown is done afterwards.
 """
 
 import re
 from dataclasses import dataclass
 
+from markupsafe import Markup, escape
+
 _KEPT = "\n\t"
 
 
 def visible(text: str) -> str:
-    r"""Write every unprintable character out as its escape (`\x1b`, `\u202e`), but for line feed and tab.
+    r"""Return the text with escapes (`\x1b`, `\u202e`) for unprintable characters, except line feed and tab.
 
-    "Unprintable" is Python's notion: control, format (bidirectional overrides, zero width), surrogates,
-    private and unassigned code points, and separators other than the space. The outcome can be encoded as
-    UTF-8 and is made of characters that XML 1.0 allows.
+    Unprintable, by Python's definition, are control and format characters (bidirectional overrides, zero width),
+    surrogates, private and unassigned code points, and separators other than the space. The returned text can be
+    encoded as UTF-8, and XML 1.0 allows all its characters.
     """
     if text.isprintable():
         return text
@@ -25,7 +26,7 @@ def visible(text: str) -> str:
 
 
 class _Escapes(dict[int, int | str]):
-    """Code points to what stands for them; each is worked out once, which makes long texts ten times faster."""
+    """Code points and their replacements; each is computed once, which is ten times faster for long texts."""
 
     def __missing__(self, code: int) -> int | str:
         character = chr(code)
@@ -38,7 +39,7 @@ _ESCAPES = _Escapes()
 
 
 def excerpt(text: str, limit: int) -> str:
-    """The text on one line, cut to about `limit` characters: for messages and table cells."""
+    """Return the text on one line, cut to about `limit` characters: for messages and table cells."""
     line = " ".join(visible(text[: limit + 1]).split())
     return line if len(text) <= limit else f"{line[:limit]}…"
 
@@ -48,11 +49,10 @@ class Excerpt:
     """The beginning of a long text.
 
     Attributes:
-        text: what is shown.
-        omitted: how many characters of the text at hand are not shown.
-        total: characters of the whole text, or its octets where the producer had cut it before (`unit` says
-            which).
-        unit: "characters" or "octets".
+        text: the beginning.
+        omitted: number of characters or bytes that are not shown.
+        total: length of the whole text.
+        unit: "characters", or "bytes" if the text had been cut before it was stored.
     """
 
     text: str
@@ -62,24 +62,24 @@ class Excerpt:
 
     @property
     def cut(self) -> bool:
-        """Whether the reader sees less than there was."""
+        """Return whether something is not shown."""
         return self.omitted > 0
 
 
 def beginning(text: str, limit: int, octets: int | None = None) -> Excerpt:
-    """The first `limit` characters of a body, which was `octets` long before its producer cut it, where it did."""
+    """Return the first `limit` characters of a body; `octets` is its length if it had been cut before it was stored."""
     shown = visible(text[:limit])
     present = len(text.encode("utf-8", "surrogatepass"))
     if octets is not None and octets > present:
-        return Excerpt(shown, octets - len(text[:limit].encode("utf-8", "surrogatepass")), octets, "octets")
+        return Excerpt(shown, octets - len(text[:limit].encode("utf-8", "surrogatepass")), octets, "bytes")
     return Excerpt(shown, max(0, len(text) - limit), len(text))
 
 
 def code_span(text: str, limit: int = 300) -> str:
-    """A Markdown code span (GFM 6.3) that shows the text and nothing else.
+    """Return a Markdown code span (GFM 6.3), in which HTML, mentions and links have no effect.
 
-    In a code span neither HTML nor a mention nor a link comes alive. The fence is longer than any run of
-    backticks inside, and bars are escaped because GFM cuts table rows before it looks at code (GFM 4.10).
+    The fence is longer than any run of backticks inside. Bars are escaped, because GFM splits table rows before it
+    parses code spans (GFM 4.10).
     """
     line = excerpt(text, limit) or " "
     fence = "`" * (1 + max((len(run) for run in re.findall("`+", line)), default=0))
@@ -87,8 +87,15 @@ def code_span(text: str, limit: int = 300) -> str:
     return f"{fence}{pad}{line.replace('|', chr(92) + '|')}{pad}{fence}"
 
 
+def coded(text: str) -> Markup:
+    """Return the text as HTML, with `<code>` around what stands between backticks."""
+    parts = (escape(part) if number % 2 == 0 else Markup("<code>{}</code>").format(part)
+             for number, part in enumerate(text.split("`")))  # fmt: skip
+    return Markup().join(parts)
+
+
 def code_block(text: str, limit: int = 4000) -> str:
-    """A fenced Markdown code block (GFM 4.5) whose fence no line of the text can close."""
+    """Return a fenced Markdown code block (GFM 4.5) whose fence no line of the text can close."""
     shown = beginning(text, limit)
     fence = "`" * max(3, 1 + max((len(run) for run in re.findall("`+", shown.text)), default=0))
     note = f"\n… {shown.omitted} more {shown.unit}" if shown.cut else ""
@@ -96,10 +103,10 @@ def code_block(text: str, limit: int = 4000) -> str:
 
 
 def plain(text: str, limit: int = 600) -> str:
-    """One line of running Markdown text in which nothing comes alive: markup, HTML, mention or reference.
+    """Return one line of Markdown text in which markup, HTML, mentions and references have no effect.
 
-    Punctuation is escaped (GFM 6.1); an empty comment after `@` and `#` keeps a forge from notifying the
-    person or linking the issue that a robot happens to name.
+    Punctuation is escaped (GFM 6.1). An empty comment after `@` and `#` keeps a code host from notifying a person or
+    linking an issue.
     """
     line = re.sub(r"([\\`*_\[\]<>|~$&])", r"\\\1", excerpt(text, limit))
     return re.sub(r"([@#])(?=\w)", r"\1<!-- -->", line)

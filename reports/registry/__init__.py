@@ -1,1 +1,1 @@
-"""A static site from signed certificates alone: which robot may be trusted with what, by whose word, since when."""
+"""A static site from signed certificates: which robot passed which classes, signed by whom, and when."""

@@ -1,4 +1,4 @@
-"""What changed between two firmwares, by the rules of `roaas diff`, from what their certificates carry."""
+"""What changed between two firmwares, by the rules of `roaas diff`, from their certificates."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,12 +14,10 @@ from reports.registry.entries import Certificate
 
 @dataclass(frozen=True)
 class FirmwareChange:
-    """Two certificates of one robot.
+    """Certificates of two firmwares of one robot.
 
     Attributes:
-        old: of the firmware before.
-        new: of the firmware after.
-        found: requirement by requirement, or None where one of the two was signed before certificates named them.
+        found: the difference by requirement, or None if an older certificate does not list its requirements.
     """
 
     old: Certificate
@@ -28,7 +26,7 @@ class FirmwareChange:
 
     @property
     def classes(self) -> list[tuple[str, str, str]]:
-        """Classes whose verdict changed: name, before, after."""
+        """Return the classes whose verdict changed: name, before, after."""
         before, after = self.old.run.classes, self.new.run.classes
         names = dict.fromkeys((*before, *after))
         courses = ((name, before.get(name, "not-claimed"), after.get(name, "not-claimed")) for name in names)
@@ -36,7 +34,7 @@ class FirmwareChange:
 
 
 def firmware_changes(latest_first: tuple[Certificate, ...]) -> list[FirmwareChange]:
-    """Each firmware beside the one before it, the latest first."""
+    """Return the change from each firmware to the next, the latest first."""
     return [FirmwareChange(old, new, _difference(old.run, new.run)) for new, old in pairwise(latest_first)]
 
 
@@ -45,7 +43,7 @@ def _difference(old: Run, new: Run) -> Difference | None:
 
 
 def _as_result(run: Run) -> Mapping[str, Any]:
-    """What a certificate says, in the shape of the result that it was made from, as far as a comparison reads it."""
+    """Return the parts of a result that a comparison reads, taken from a certificate."""
     accepted = set(run.accepted)
     return {
         "requirements": [

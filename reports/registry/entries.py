@@ -1,7 +1,7 @@
-"""What a registry is made of: envelopes that one of its keys signed, and those that are refused.
+"""The envelopes of a registry: those that one of its keys signed, and those that are refused.
 
-Of an envelope that does not verify nothing is believed, so nothing of it is shown either: the site says why in words of
-its own, and names the file by its digest. What is wrong in detail is for whoever builds the site.
+Nothing from a refused envelope is shown. The site identifies its file by digest and gives a reason in its own words.
+The person who builds the site sees the details.
 """
 
 from collections.abc import Iterable, Mapping
@@ -22,14 +22,13 @@ _PRIVATE = b"PRIVATE KEY-----"
 
 @dataclass(frozen=True)
 class Certificate:
-    """An envelope that verifies.
+    """An envelope whose signature verifies.
 
     Attributes:
-        octets: the envelope's file.
-        statement: what was signed.
-        key: fingerprint of the key that signed it, which is one of the registry's.
-        publishable: whether the signed octets hold what is known here and nothing beside it; what is not known might
-            be an address.
+        octets: content of the envelope's file.
+        statement: the signed statement.
+        key: fingerprint of the signing key, which is one of the registry's.
+        publishable: whether the signed content has no fields that are unknown here, which might be addresses.
     """
 
     octets: bytes
@@ -39,23 +38,23 @@ class Certificate:
 
     @property
     def run(self) -> Run:
-        """What it says of the run."""
+        """Return what it says about the run."""
         return self.statement.predicate.roaas
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the envelope's file, in hexadecimal."""
+        """Return the SHA-256 of the envelope's file, in hexadecimal."""
         return sha256(self.octets)
 
 
 @dataclass(frozen=True)
 class Refused:
-    """An envelope that proves nothing.
+    """An envelope that was refused.
 
     Attributes:
         digest: SHA-256 of its file, in hexadecimal.
-        reason: for the site: nothing of the envelope is in it.
-        detail: for whoever builds the site: the file, and what is wrong with it.
+        reason: for the site; it contains nothing from the envelope.
+        detail: for the person who builds the site: the file, and what is wrong with it.
     """
 
     digest: str
@@ -64,26 +63,26 @@ class Refused:
 
 
 def find_envelopes(places: Iterable[Path]) -> list[Path]:
-    """Files as they are named; of folders, each certificate.intoto.json that is somewhere in them.
+    """Return the given files, and every certificate.intoto.json at any depth in the given folders.
 
     Raises:
-        ResultMissingError: there is no such file or folder, or no certificate in a folder.
+        ResultMissingError: a folder holds no certificate.
     """
     found: dict[Path, None] = {}
     for place in places:
-        # What others put into a folder may be a pipe, or a device that never ends.
+        # A folder from others may hold a pipe, or a device that never ends.
         inside = sorted(filter(Path.is_file, place.rglob(ENVELOPE_NAME))) if place.is_dir() else [place]
         if not inside:
-            raise ResultMissingError(f"{place}: there is no {ENVELOPE_NAME} in it")
+            raise ResultMissingError(f"{place}: it holds no {ENVELOPE_NAME}")
         found |= dict.fromkeys(inside)
     return list(found)
 
 
 def read_keys(directory: Path) -> tuple[dict[str, SSlibKey], list[Path]]:
-    """The public keys in a folder (*.pem), by fingerprint, and the private keys, which are left alone.
+    """Return the public keys in a folder (*.pem) by fingerprint, and the paths of private keys, which are not used.
 
     Raises:
-        KeyUnusableError: there is none, or a file is no Ed25519 key.
+        KeyUnusableError: there is no public key, or a file is not an Ed25519 key.
     """
     keys: dict[str, SSlibKey] = {}
     private: list[Path] = []
@@ -97,12 +96,12 @@ def read_keys(directory: Path) -> tuple[dict[str, SSlibKey], list[Path]]:
         key = public_key(path)
         keys[key.keyid] = key
     if not keys:
-        raise KeyUnusableError(f"{directory}: no public key (*.pem) is in it; whom to trust is for you to say")
+        raise KeyUnusableError(f"{directory}: it holds no public key (*.pem) of a signer whom you trust")
     return keys, private
 
 
 def read_entries(paths: Iterable[Path], keys: Mapping[str, SSlibKey]) -> list[Certificate | Refused]:
-    """Read and verify envelopes; a file that is there twice counts once.
+    """Read and verify envelopes; identical files count once.
 
     Raises:
         ResultMissingError: there is no such file.
@@ -120,13 +119,13 @@ def read_entries(paths: Iterable[Path], keys: Mapping[str, SSlibKey]) -> list[Ce
 
 def entry_of(octets: bytes, keys: Mapping[str, SSlibKey]) -> Certificate | Refused:
     """Verify one envelope."""
-    reason = "it is no envelope with one signature"
+    reason = "it is not an envelope with one signature"
     try:
         opened = open_envelope(octets)
-        reason = "it is signed by a key that is none of this registry's"
+        reason = "it is signed by a key that this registry does not trust"
         if opened.keyid not in keys:
             raise EnvelopeRefusedError(f"foreign key: {opened.keyid[:64]!r}")  # noqa: TRY301 - refused as all others are
-        reason = "its signature is not by the key that it names, over a certificate of a run"
+        reason = "its signature does not verify with the key that it names, or it is not a certificate of a run"
         statement = unseal(octets, keys[opened.keyid])
     except EnvelopeRefusedError as error:
         return Refused(sha256(octets), reason, str(error))

@@ -17,18 +17,15 @@ from reports.registry.standing import History, Standing
 
 INDEX = "index.html"
 ROBOTS, ENVELOPES = "robots", "envelopes"
-# Names that a site has of an earlier build: what is not in this one would still be green.
+# File names of an earlier build. Outdated pages are deleted, because they would still be green.
 _OURS = {ROBOTS: re.compile(r"[a-z0-9-]+-[0-9a-f]{12}\.html"), ENVELOPES: re.compile(r"[0-9a-f]{64}\.intoto\.json")}
 _TONES = {"conformant": "good", "not-conformant": "bad"}
-# Nothing of a comparison is green: what was fixed may have been so in a certificate that does not count.
+# No change is green, because the certificate that fixed a failure may not count.
 _CHANGE_TONES = {Kind.NEW_FAILURE: "bad", Kind.LOST: "warning"}
 
 
 def write_site(site: Path, found: Sequence[History], refused: Sequence[Refused], now: dt.datetime) -> list[Path]:
-    """Write the site, and take away what an earlier build left of robots and envelopes that are gone.
-
-    Returns:
-        The files written.
+    """Write the site, delete robots and envelopes of an earlier build, and return the files written.
 
     Raises:
         ResultUnreadableError: the folder cannot be written to.
@@ -111,7 +108,7 @@ def _marks(standing: Standing) -> dict[str, Mark]:
 
 
 def _word(standing: Standing) -> tuple[str, str]:
-    """Tone and words of a certificate: its verdict where it counts, else what is against it."""
+    """Return tone and words: the verdict of a certificate that counts, or else the first reason why it does not."""
     if not standing.stands:
         return "quiet", standing.against[0]
     verdict = standing.certificate.run.verdict

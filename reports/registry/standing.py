@@ -1,4 +1,4 @@
-"""What a registry may still say of each robot: of its certificates the latest counts, where the policy lets it."""
+"""The certificates of each robot: the latest one counts if it meets the policy."""
 
 import datetime as dt
 import re
@@ -14,8 +14,8 @@ from reports.registry.entries import Certificate
 
 SUPERSEDED = "superseded"
 UNNAMED = "names no robot"
-# The points of a policy that keep a certificate from counting, and how the site calls that. The others ask about whole
-# runs (verdicts, classes: a registry answers class by class) or about one request (nonce).
+# Points of a policy that keep a certificate from counting, with the site's words. The other points concern the whole
+# run (verdicts, classes), while a registry answers class by class, or a single request (nonce).
 _WORDS = {
     "max_age_days": "expired",
     "requirement_sets": "another requirement set",
@@ -23,8 +23,8 @@ _WORDS = {
     "efforts": "too little effort",
     "motion": "was not allowed to move",
     "baseline": "with accepted failures",
-    "interrupted": "a part of a run",
-    "ros": "seen as a black box",
+    "interrupted": "an incomplete run",
+    "ros": "ROS topics not observed",
     "robot": "another robot",
     "vendor": "another vendor",
     "firmware": "another firmware",
@@ -37,9 +37,9 @@ class Standing:
     """A certificate, and whether it counts.
 
     Attributes:
-        against: why it does not, in a word or two each; empty: it counts.
-        details: what was found, for each point of the policy that it does not meet.
-        until: when it expires, or None where its time cannot be read.
+        against: why it does not count, in a few words each; empty if it counts.
+        details: each point of the policy that it does not meet, with what it says.
+        until: when it expires, or None if its time cannot be read.
     """
 
     certificate: Certificate
@@ -49,12 +49,12 @@ class Standing:
 
     @property
     def stands(self) -> bool:
-        """Whether anything of it may be green."""
+        """Return whether it counts."""
         return not self.against
 
     @property
     def trusted(self) -> list[str]:
-        """The classes that it gives."""
+        """Return the classes that it shows as passed."""
         return passed(self.certificate.run) if self.stands else []
 
 
@@ -66,22 +66,22 @@ class History:
 
     @property
     def current(self) -> Standing:
-        """The one that counts, if any does."""
+        """Return the only certificate that may count."""
         return self.standings[0]
 
     @property
     def name(self) -> str:
-        """The robot's name."""
+        """Return the robot's name."""
         return self.current.certificate.run.robot.name or "Unnamed robot"
 
     @property
     def vendor(self) -> str:
-        """Whose it is, or empty."""
+        """Return the robot's vendor, or an empty string."""
         return self.current.certificate.run.robot.vendor or ""
 
     @property
     def page(self) -> str:
-        """File name of its page: letters of its name for the reader, and a digest so that no two robots share one."""
+        """Return the file name of its page: the name for readers, and a digest that makes it unique."""
         letters = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-")[:40].rstrip("-")
         robot = self.current.certificate.run.robot
         digest = sha256(msgspec.json.encode((robot.vendor or "", robot.name or "")))[:12]
@@ -89,7 +89,7 @@ class History:
 
     @property
     def firmwares(self) -> tuple[Certificate, ...]:
-        """The latest certificate of each firmware, the latest first."""
+        """Return the latest certificate of each firmware, the latest first."""
         latest: dict[str | None, Certificate] = {}
         for standing in self.standings:
             latest.setdefault(standing.certificate.run.robot.version, standing.certificate)
@@ -97,10 +97,10 @@ class History:
 
 
 def histories(certificates: Iterable[Certificate], policy: Policy, known: Known, now: dt.datetime) -> list[History]:
-    """Each robot, by name and vendor, in the order of names.
+    """Return the history of each robot, identified by name and vendor, sorted by name.
 
-    A later certificate supersedes an earlier one whichever of the registry's keys signed it, also where it says less or
-    nothing good: what was true before the last look is not known to be true.
+    A later certificate always supersedes an earlier one, whichever trusted key signed it and whatever it says: an older
+    result may no longer hold.
     """
     by_robot: dict[tuple[str, str], list[Certificate]] = defaultdict(list)
     for certificate in certificates:
@@ -121,7 +121,7 @@ def _standing(certificate: Certificate, policy: Policy, known: Known, now: dt.da
     return Standing(
         certificate,
         (*_own(certificate, first=first), *(_word(point, certificate, now) for point in counted)),
-        tuple(point.found for point in counted),
+        tuple(f"{_word(point, certificate, now)}: {point.found}" for point in counted),
         _after(certificate.run.ended, policy.max_age_days),
     )
 
@@ -141,7 +141,7 @@ def _own(certificate: Certificate, *, first: bool) -> Iterator[str]:
 
 
 def _after(finished: dt.datetime | None, days: float) -> dt.datetime | None:
-    """The end of a certificate's life; None where the calendar has no such day."""
+    """Return when a certificate expires; None if the calendar has no such day."""
     try:
         return finished + dt.timedelta(days=days) if finished else None
     except OverflowError:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from conformance.contract.freeze import freeze
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME
 from roaas import main
 
@@ -45,15 +47,17 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lamps")
     keys = folder / "keys"
     roaas("keygen", keys)
+    pack = shutil.copytree(LAMP, folder / "pack")
+    freeze("1.0", pack)
     done = {}
     for name, fault in (("good", None), ("broken", _BROKEN)):
         out = folder / name
         out.mkdir()
         with lamp(out, fault) as url:
-            options = ["--contract", LAMP, "--rest", url, "--allow-motion", "--effort", "quick", "--out", out]
+            options = ["--contract", pack, "--rest", url, "--allow-motion", "--effort", "quick", "--out", out]
             done[name] = roaas("certify", *options, "--sign", keys / PRIVATE_NAME)
             if fault:
-                done["replay"] = roaas("replay", out, "lamp/target", "--allow-motion", "--contract", LAMP)
+                done["replay"] = roaas("replay", out, "lamp/target", "--allow-motion", "--contract", pack)
     return folder, done
 
 
@@ -89,10 +93,17 @@ def test_pages_and_ci_formats_are_written(results):
 def test_a_signed_certificate_is_verified_and_registered(results):
     folder, _ = results
     key = folder / "keys" / PUBLIC_NAME
-    done = roaas("verify", folder / "good" / "certificate.intoto.json", "--key", key, "--result", folder / "good")
-    assert "lamp" in done.output.lower(), done.output
-    site = roaas("registry", "--help")
-    assert site.exit_code == 0
+    policy = folder / "policy.toml"
+    policy.write_text('efforts = ["quick"]\nrequirement_sets = ["1.0"]\n', encoding="utf-8")
+    options = ["--policy", policy, "--contract", folder / "pack"]
+    envelope = folder / "good" / "certificate.intoto.json"
+    done = roaas("verify", envelope, "--key", key, "--result", folder / "good", *options)
+    assert done.exit_code == 0, done.output
+    keys = folder / "trusted"
+    keys.mkdir()
+    (keys / PUBLIC_NAME).write_bytes(key.read_bytes())
+    site = roaas("registry", "build", envelope, "--keys", keys, "--out", folder / "site", *options)
+    assert (site.exit_code, (folder / "site" / "index.html").exists()) == (0, True), site.output
 
 
 def test_recorded_traces_are_judged_again_without_the_device(results):
@@ -125,3 +136,11 @@ def test_a_fleet_is_judged_by_the_pack(tmp_path):
         )
     assert done.exit_code == 0, done.output
     assert json.loads((out / "fleet.json").read_text(encoding="utf-8"))["class_titles"]["lamp"].startswith("The lamp")
+
+
+def test_mutants_by_rule_are_made_for_the_pack(tmp_path):
+    out = tmp_path / "selftest"
+    command = ["selftest", "--contract", LAMP, "--generated", "4", "--seed", "77", "--parallel", "1", "--out", out]
+    done = roaas(*command)
+    assert done.exit_code in {0, 1}, done.output
+    assert re.search(r"Mutants by rule killed: [1-4] of [1-4]", done.output), done.output

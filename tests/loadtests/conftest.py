@@ -12,13 +12,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from conformance.packs.table1.files import CONTRACT_DIR
 from reports.latency.page import latency_markdown
 from reports.pages.untrusted import plain
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in `roaas load`: its threads spin on a busy machine
 
 HERE = Path(__file__).parent
-CONTRACT = HERE.parents[1] / "conformance" / "contract"
 SCHEMA = json.loads((HERE.parents[1] / "reports" / "schemas" / "roaas-latency-1.schema.json").read_text())
 
 
@@ -38,7 +38,7 @@ class Toy:
     def both(self):
         """Options that name both interfaces."""
         services = (
-            f"--{name}-wsdl {CONTRACT / name}.wsdl --{name}-endpoint {self.url}/{name}"
+            f"--{name}-wsdl {CONTRACT_DIR / name}.wsdl --{name}-endpoint {self.url}/{name}"
             for name in ("publishers", "subscribers")
         )
         return f"--rest {self.url} {' '.join(services)}".split()

@@ -5,12 +5,12 @@ import re
 import signal
 import socket
 import urllib.request
-from pathlib import Path
 
 import psutil
 import pytest
 
-CONTRACT = Path(__file__).parents[2] / "conformance" / "contract"
+from conformance.packs.table1.files import CONTRACT_DIR
+
 SHORT = "--rate 60 --duration 2 --warmup 0.4"
 
 
@@ -175,7 +175,7 @@ def test_nobody_there(load, free_port):
 
 
 def test_a_wrong_wsdl(toy, load):
-    run = load("--rest", toy().url, "--publishers-wsdl", CONTRACT / "subscribers.wsdl", SHORT)
+    run = load("--rest", toy().url, "--publishers-wsdl", CONTRACT_DIR / "subscribers.wsdl", SHORT)
     assert run.code == 2
     assert "has no operation 'ExecuteDeliveryRequest'" in run.err
 
@@ -266,7 +266,7 @@ def test_the_closed_model_and_the_histograms_while_they_grow(toy, load, wait_for
         ("--operation delivery", "--allow-motion"),
         ("--thresholds none.toml", "No such file"),
         ("none.toml", "No such file"),
-        ("--step-rates 1,x", "no list of rates"),
+        ("--step-rates 1,x", "not a list of rates"),
     ],
 )
 def test_usage_errors_touch_no_robot(load, options, message):

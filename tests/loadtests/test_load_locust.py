@@ -148,7 +148,7 @@ def test_a_worker_without_a_master_says_so_and_ends(free_port):
     words = ["--worker", "--master-host=127.0.0.1", f"--master-port={free_port}"]
     run = ended(sys.executable, "-c", hasty + NODE, *words)
     assert run.returncode == 3
-    assert f"no master answers at 127.0.0.1:{free_port}" in run.stderr
+    assert f"no master responds at 127.0.0.1:{free_port}" in run.stderr
 
 
 @pytest.mark.parametrize("words", [["--worker"], ["--worker", "--master-port", "1"]])

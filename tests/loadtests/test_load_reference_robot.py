@@ -64,4 +64,4 @@ def test_deliveries_that_nobody_publishes_cannot_be_followed(toy, load, domain_i
         *toy().both(), "--allow-motion --rate 60 --duration 1 --warmup 0.2", f"--end-to-end --ros-domain-id {domain_id}"
     )
     assert run.code == ExitCode.INCONCLUSIVE
-    assert f"nobody publishes /DeliveryRequestMsg/from_json in ROS domain {domain_id}" in run.out
+    assert f"nothing publishes /DeliveryRequestMsg/from_json in ROS domain {domain_id}" in run.out

@@ -116,7 +116,7 @@ def test_nothing_is_lost_in_silence_over_a_slow_network(network, worker, begin, 
     # Of a block's odd number of arrivals one has one more.
     assert abs(lost["requests"] + lost["arrivals_lost"] - kept["requests"]) <= 4, "lost and reported make up a share"
     assert {f"worker {entry['id']} ({entry['host']})" for entry in (lost, idle)} == {
-        note.split(" was lost")[0].split(" came")[0] for note in result["notes"] if note.startswith("worker ")
+        note.split(" was lost")[0].split(" joined")[0] for note in result["notes"] if note.startswith("worker ")
     }
     for entry, ahead_s in ((kept, network.clock_ahead_s), (lost, 0)):
         clock = entry["clock"]
@@ -146,7 +146,7 @@ def test_workers_outlive_no_master_and_leave_what_they_recorded(worker, begin, w
     assert not local.is_running()
     for told, why, folder in (
         (run.err, "has ended", run.folder),
-        (remote.stderr.read(), "nothing was heard of the master at", tmp_path / "left"),
+        (remote.stderr.read(), "has been silent for", tmp_path / "left"),
     ):
         path = Path(re.search(r"recorded is in (.+\.json)", told)[1])
         assert path.parent == folder

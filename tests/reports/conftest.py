@@ -19,8 +19,21 @@ _LATENCY = json.loads((DATA / "latency-example.json").read_text(encoding="utf-8"
 
 @pytest.fixture
 def result() -> dict[str, Any]:
-    """Return a conformance result with every kind of verdict in it."""
+    """Return a conformance result of a real run, with fewer requirements and with the addresses of an example."""
     return copy.deepcopy(_RESULT)
+
+
+@pytest.fixture
+def older(result: dict[str, Any]) -> dict[str, Any]:
+    """Return the result as a suite before version 1.2 wrote it: a failure's message is only what the suite got."""
+    del result["pack"], result["causes"]
+    for requirement in result["requirements"]:
+        requirement.pop("because_of", None)
+        for failure in requirement["failures"]:
+            failure["message"] = failure.pop("observed")
+            for key in ("number", "subject", "cause"):
+                del failure[key]
+    return result
 
 
 @pytest.fixture
@@ -57,7 +70,7 @@ def hostile(result: dict[str, Any]) -> dict[str, Any]:
     for requirement in result["requirements"]:
         requirement["reason"] = HOSTILE
         for failure in requirement["failures"]:
-            failure["message"] = failure["expected"] = HOSTILE
+            failure["message"] = failure["expected"] = failure["subject"] = HOSTILE
             failure["request"].update(
                 method=HOSTILE, url=HOSTILE, headers={HOSTILE: HOSTILE}, body=HOSTILE, curl=HOSTILE
             )

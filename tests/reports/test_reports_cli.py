@@ -108,7 +108,7 @@ def test_compare_of_what_cannot_be_compared(tmp_path, latency):
     latency["plan"]["rate"] = 1000.0
     done = run(compare, old, put(tmp_path / "new", "latency.json", latency))
     assert done.exit_code == 2
-    assert "only what ran under the same load can be compared" in done.stderr
+    assert "only results under the same load can be compared" in done.stderr
     assert run(compare, old, tmp_path / "nowhere").exit_code == 2
 
 

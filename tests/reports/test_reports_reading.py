@@ -47,7 +47,7 @@ def test_keys_may_be_added(tmp_path, result):
         (["classes", "http"], "ok", "$.classes.http"),
         (["seed"], "2026", "$.seed"),
         (["started"], "yesterday", "$.started"),
-        (["requirements", 5, "failures"], [], "$.requirements[5].failures"),
+        (["requirements", 0, "failures"], [], "$.requirements[0].failures"),
     ],
 )
 def test_breach_is_told_with_file_place_and_value(tmp_path, result, path, value, place):

@@ -8,7 +8,7 @@ _QUALITY = re.compile(r"0(?:\.\d{0,3})?|1(?:\.0{0,3})?", re.ASCII)
 
 @lru_cache(maxsize=512)
 def quality(media_type: str, accept: str | None) -> float:
-    """The quality value of a media type, by the most specific range that matches; 0 where none does.
+    """Return the quality value of a media type, by the most specific range that matches; 0 where none does.
 
     A range with parameters counts as matching the type without them: whether it does is the server's choice.
 
@@ -38,6 +38,6 @@ def _weight(parameters: list[str]) -> float:
 
 
 def accept_of(headers: tuple[tuple[str, str], ...]) -> str | None:
-    """The Accept field of a request, several lines as one; None where there is none."""
+    """Return the Accept field of a request, several lines as one; None where there is none."""
     values = [value for name, value in headers if name.lower() == "accept"]
     return ", ".join(values) if values else None

@@ -1,4 +1,4 @@
-"""What of the contract a check can be tried on: with this robot, and with the permission that was given."""
+"""The operations of the contract that a check can be tried on, with this robot and the run's permission."""
 
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
@@ -13,15 +13,16 @@ NO_MOTION = "it moves the robot, and --allow-motion was not given"
 
 
 def reads(api: RestInterface) -> list[Call]:
-    """A valid request for each operation that only reads, the optional ones last."""
+    """Return a valid request for each operation that only reads, the optional ones last; see readable()."""
     found = [item for item in operations_of(api.run.contract) if item.method == "GET" and allowed(api, item)]
     return [readable(api, item) for item in sorted(found, key=lambda item: item.optional)]
 
 
 def readable(api: RestInterface, operation: Operation) -> Call:
-    """A request for an operation that reads, which is answered 200 if any is.
+    """Return a request for an operation that reads, with values that this robot accepts if any.
 
-    Where the contract's example makes no sense to this robot (a place outside its map), small numbers are tried.
+    Where the contract's example makes no sense to this robot (a place outside its map), small numbers do. The first
+    call for an operation finds them: it sends up to four requests.
 
     Raises:
         HarnessError: what was made is not valid by the contract.
@@ -32,12 +33,9 @@ def readable(api: RestInterface, operation: Operation) -> Call:
     if not required:
         return call
     if operation.id not in api.small_numbers:
-        api.small_numbers[operation.id] = ""
-        for text in ("", "0", "1", "0.5"):
-            answer = _with(call, required, text).send(api).response
-            if answer.ok:
-                api.small_numbers[operation.id] = text
-                break
+        texts = ("", "0", "1", "0.5")
+        accepted = (text for text in texts if _with(call, required, text).send(api).response.ok)
+        api.small_numbers[operation.id] = next(accepted, "")
     found = _with(call, required, api.small_numbers[operation.id])
     require_valid(api.run.contract, operation.method, found.path)
     return found
@@ -49,40 +47,51 @@ def _with(call: Call, names: list[str], text: str) -> Call:
     return call
 
 
-def answered(api: RestInterface) -> list[Call]:
-    """Those of reads() that are answered 200 as things are: a robot may lack an extension, or have no goal."""
-    found = []
-    for call in reads(api):
-        answer = call.send(api).response
-        if answer.status == HTTPStatus.OK:
-            found.append(call)
+def answered(api: RestInterface, *ids: str) -> list[Call]:
+    """Send each of reads(), and return those that get 200 now: a robot may lack an extension, or have no goal.
+
+    Where none does, note it at the requirements.
+    """
+    found = [call for call in reads(api) if call.send(api).response.status == HTTPStatus.OK]
+    for id_ in ids if not found else ():
+        api.run.judge.note(id_, "no operation that only reads got status 200")
     return found
 
 
 def allowed(api: RestInterface, operation: Operation) -> bool:
-    """Whether the operation may be sent in this run."""
+    """Return whether the operation may be sent in this run."""
     return api.run.allow_motion or not operation.motion
+
+
+def usable_operations(api: RestInterface, wanted: Callable[[Operation], bool]) -> list[Operation]:
+    """Return the operations of a kind that may be sent; a few of them with a slow robot."""
+    usable = [item for item in operations_of(api.run.contract) if wanted(item) and allowed(api, item)]
+    return api.run.effort.subsample(usable, 2)
+
+
+def record_unusable(api: RestInterface, ids: Sequence[str], wanted: Callable[[Operation], bool], what: str) -> None:
+    """Record why requirements cannot be judged, if no operation of a kind may be sent.
+
+    Where the contract has no such operation, they do not apply; where the run has no permission, they are skipped.
+    """
+    found = [item for item in operations_of(api.run.contract) if wanted(item)]
+    for id_ in ids if not any(allowed(api, item) for item in found) else ():
+        if found:
+            api.run.judge.skip(id_, NO_MOTION)
+        else:
+            api.run.judge.unclaimed(id_, f"the contract has no operation that {what}")
 
 
 def applicable_operations(
     api: RestInterface, ids: Sequence[str], wanted: Callable[[Operation], bool], what: str
 ) -> list[Operation]:
-    """The operations that a check is about.
-
-    Where the contract has none, its requirements do not apply; where none may be sent, they are skipped. Requirements
-    that other checks judge as well are left as they are.
+    """Return the operations that a check is about, after recording why there is none of them.
 
     Args:
         api: the robot's REST interface.
-        ids: of the requirements that depend on it.
+        ids: the requirements that only these operations can show.
         wanted: picks the operations.
-        what: says what they are: "takes JSON".
+        what: describes them: "takes JSON".
     """
-    found = [item for item in operations_of(api.run.contract) if wanted(item)]
-    usable = [item for item in found if allowed(api, item)]
-    for id_ in ids if not usable else ():
-        if found:
-            api.run.judge.skip(id_, NO_MOTION)
-        else:
-            api.run.judge.unclaimed(id_, f"the contract has no operation that {what}")
-    return api.run.effort.subsample(usable, 2)
+    record_unusable(api, ids, wanted, what)
+    return usable_operations(api, wanted)

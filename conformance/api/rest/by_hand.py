@@ -1,33 +1,52 @@
-"""Requests that are written by hand and are valid all the same: read back from their octets before they are sent.
+"""Valid requests over a plain socket: each is read back from its octets before it is sent.
 
-h11 stands for the robot's server: what it does not take as one request or several, no robot is sent as valid.
+h11 stands for the robot's server: octets that it does not read as valid requests are never sent as such.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 from urllib.parse import urlsplit
 
 import h11
 
+from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.transport import raw
+from conformance.transport.exchange import Attempt
 from conformance.verdict.evidence import HarnessError
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
-    from conformance.api.rest.interface import RestInterface
+def ask(api: RestInterface, method: str, path: str, *fields: str, body: bytes = b"", **how: Any) -> Attempt:
+    """Send one valid request over a socket of its own, and return what became of it.
+
+    Args:
+        api: the robot's REST interface.
+        method: as on the wire.
+        path: below the base URL.
+        fields: whole lines, without line ends.
+        body: as on the wire, in chunks if the fields say so.
+        how: deadline and pauses, as raw.talk() has them.
+
+    Raises:
+        HarnessError: the request is not valid by the contract.
+        NoAnswerError: no connection could be opened.
+    """
+    return ask_octets(api, raw.head(api.client, method, path, *fields) + body, method, **how)
+
+
+def ask_octets(api: RestInterface, octets: bytes, method: str = "GET", **how: Any) -> Attempt:
+    """Send the octets of one valid request, and return what became of it; as ask()."""
+    return raw.read_one(api.client, octets, talk(api, octets, answers=1, **how), method)[0]
 
 
 def talk(api: RestInterface, octets: bytes, *, answers: int = 0, refused: bool = False, **how: Any) -> raw.RawAnswer:
-    """Send octets that hold valid requests, and read what comes; see raw.talk().
+    """Send octets that hold valid requests, and return what comes; as raw.talk().
 
     Args:
         api: the robot's REST interface.
         octets: what to send.
-        answers: stop when so many whole answers to GET have come.
-        refused: whether what they ask for may break the contract; the octets hold whole requests all the same.
+        answers: stop after so many complete responses to GET.
+        refused: whether the requests may break the contract; they are complete all the same.
         how: deadline and pauses, as raw.talk() has them.
 
     Raises:
@@ -48,7 +67,7 @@ def talk(api: RestInterface, octets: bytes, *, answers: int = 0, refused: bool =
 
 
 def _requests(octets: bytes) -> Iterator[tuple[h11.Request, bytes]]:
-    """Each request in some octets, with its content.
+    """Yield each request in some octets, with its content.
 
     Raises:
         HarnessError: they are no requests, or not whole.
@@ -65,7 +84,7 @@ def _requests(octets: bytes) -> Iterator[tuple[h11.Request, bytes]]:
                 elif isinstance(event, h11.Data):
                     body += event.data
                 else:
-                    raise HarnessError(f"{octets[:80]!r} was made as a whole request, and is none")
+                    raise HarnessError(f"{octets[:80]!r} was made as a complete request, and is none")
         except h11.RemoteProtocolError as error:
             raise HarnessError(f"{octets[:80]!r} was made as a valid request, and is none: {error}") from error
         if request is None:

@@ -55,16 +55,16 @@ class Call:
         return f"{path}?{query}" if query else path
 
     def having(self, name: str, text: str | None) -> Call:
-        """The same with another text for a parameter, or without it."""
+        """Return the same request with another text for a parameter, or without the parameter."""
         values = {key: item for key, item in self.values.items() if key != name}
         return replace(self, values=values if text is None else {**values, name: text})
 
     def carrying(self, body: bytes) -> Call:
-        """The same with another body, of whatever kind."""
+        """Return the same request with another body, valid or not."""
         return replace(self, body=body)
 
     def rewritten(self, api: RestInterface, body: bytes) -> Call:
-        """The same with another valid body.
+        """Return the same request with another valid body.
 
         Raises:
             HarnessError: it is not valid by the contract.
@@ -75,7 +75,7 @@ class Call:
     def send(
         self, api: RestInterface, *headers: tuple[str, str], method: str | None = None, fresh: bool = False
     ) -> Exchange:
-        """Send it; a read that the robot puts off for a moment (no odometry just now), a few times in a run once more.
+        """Send the request; send a read again, a few times in a run, that the robot puts off for a moment.
 
         Raises:
             NoAnswerError: no HTTP response came.
@@ -96,14 +96,14 @@ class Call:
 
 
 def _put_off(exchange: Exchange) -> int | None:
-    """After how many seconds a robot wants to be asked again (RFC 9110 10.2.3), where it is not long; else None."""
+    """Return the seconds of Retry-After (RFC 9110 10.2.3), where they are few; else None."""
     after = exchange.response.header("retry-after") or ""
     put_off = exchange.response.status == HTTPStatus.SERVICE_UNAVAILABLE and after.isdecimal() and after.isascii()
     return int(after) if put_off and len(after) == 1 and int(after) <= _MOMENT_S else None
 
 
 def example_call(api: RestInterface, operation: Operation, media_type: str = JSON) -> Call:
-    """A valid request for an operation, by the contract's examples.
+    """Return a valid request for an operation, by the contract's examples.
 
     Optional query parameters are given where the contract has an example for them.
 
@@ -141,13 +141,13 @@ def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
 
 
 def root_name(schema: Schema) -> str:
-    """The name that a schema gives its XML element; empty where it gives none."""
+    """Return the name that a schema gives its XML element; empty where it gives none."""
     return str(schema.get("xml", {}).get("name", ""))
 
 
 def minimal(schema: Schema, depth: int = 0) -> Any:
-    """A small value that a schema allows (patterns aside)."""
-    schema = flat(schema)
+    """Return a small value that a schema allows (patterns aside)."""
+    schema = flat(_without_null(schema))
     given = [schema[key] for key in ("example", "const", "default") if key in schema]
     given += [schema[key][0] for key in ("examples", "enum") if schema.get(key)]
     if given:
@@ -164,6 +164,12 @@ def minimal(schema: Schema, depth: int = 0) -> Any:
     return True if kind == "boolean" else "a" * max(1, schema.get("minLength", 1))
 
 
+def _without_null(schema: Schema) -> Schema:
+    """Return a schema without the alternatives that allow only null."""
+    unions = {key: schema[key] for key in ("anyOf", "oneOf") if key in schema}
+    return {**schema, **{key: [part for part in parts if part != {"type": "null"}] for key, parts in unions.items()}}
+
+
 def _fitted(api: RestInterface, operation: Operation, value: Any) -> Any:
-    """A value made fit for this robot: within its limits, near where it is."""
+    """Return a value made fit for this robot: within its limits, near where it is."""
     return api.device.fit(api, operation.id, value)

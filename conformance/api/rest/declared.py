@@ -1,7 +1,8 @@
-"""Whether an answer is one that the contract declares for its operation: status, media type, shape, Vary."""
+"""Whether a response is one that the contract declares for its operation: status, media type, shape, Vary."""
 
 from http import HTTPStatus
 
+from conformance.api.expectation import expect
 from conformance.api.rest.accept import quality
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
@@ -10,25 +11,23 @@ from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.representation import UnreadableError, read
 from conformance.transport.exchange import Exchange, Response
 
-# RFC 9110 and RFC 6585 give these to any request: authentication, rate, and 5xx, which a requirement of its own judges.
+# RFC 9110 and RFC 6585 allow these for any request: authentication and rate. Another requirement judges 5xx.
 _ANY_REQUEST = frozenset({401, 429})
-# ... and these to a request that has more in it than method, path and Accept.
+# ... and these for a request that has more in it than method, path and Accept.
 _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
 _OK, _NO_CONTENT, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 404, 405, 406, 500
 
 
 def judge(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:
-    """Judge one answer to a request that is for an operation of the contract."""
+    """Judge one response to a request that is for an operation of the contract."""
     operation = context.operation
     if operation is None:
         return
     if answer.status < _SERVER_ERROR:
-        api.run.judge.check(
-            "http/declared-status",
+        expect(api.run.judge, "http/declared-status", exchange).that(
             _status_fits(operation, answer, context),
-            exchange,
             f"a status that the contract declares for {operation.id}: {', '.join(operation.responses)}",
-            found=f"status {answer.status}",
+            f"status {answer.status}",
             cause=f"{operation.id} {answer.status}",
         )
     if answer.ok and not context.is_head:
@@ -42,7 +41,7 @@ def _status_fits(operation: Operation, answer: Response, context: RequestContext
     if status in _ANY_REQUEST or operation.declared(status) is not None:
         return True
     if status == _OK and operation.declared(_NO_CONTENT) is not None:
-        return True  # a robot may say 200 for 204
+        return True  # a robot may send 200 instead of 204
     if status == _NOT_ACCEPTABLE:
         return context.accept not in {None, "*/*"}
     if context.plain and not operation.parameters:
@@ -61,23 +60,16 @@ def _judge_body(api: RestInterface, exchange: Exchange, answer: Response, contex
     if operation is None or not content:
         return
     if not answer.body:
-        # Only what was asked for has to come: a PUT may be answered without the accepted representation.
+        # Only GET must return a body: the response to a PUT need not repeat what it accepted.
         if operation.method == "GET" and answer.status != _NO_CONTENT:
-            api.run.judge.check(
-                "http/declared-body",
-                holds=False,
-                exchange=exchange,
-                expected=f"a body, as {' or '.join(content)}",
-                found="no body",
-            )
+            expected = f"a body as {' or '.join(content)}"
+            expect(api.run.judge, "http/declared-body", exchange).that(holds=False, expected=expected, got="no body")
         return
     media_type = answer.media_type
-    declared = api.run.judge.check(
-        "http/declared-body",
+    declared = expect(api.run.judge, "http/declared-body", exchange).that(
         media_type in content,
-        exchange,
         f"a body as {' or '.join(content)}",
-        found=f"{media_type or 'no media type'}",
+        f"a body as {media_type}" if media_type else "a body without Content-Type",
         cause=f"{operation.id} {media_type}",
     )
     if declared:
@@ -97,15 +89,14 @@ def _judge_shape(
     else:
         return
     try:
-        fault = shape_of(schema).problem(read(media_type, answer.body, schema))
+        problem = shape_of(schema).problem(read(media_type, answer.body, schema))
+        fault = f"a body in which {problem}" if problem else ""
     except UnreadableError as error:
         fault = str(error)
-    api.run.judge.check(
-        id_,
+    expect(api.run.judge, id_, exchange).that(
         not fault,
-        exchange,
-        f"{kind} in the shape that the contract declares for {operation.id}",
-        found=fault,
+        f"{kind} that is valid by the schema of {operation.id}",
+        fault,
         cause=f"{operation.id} {kind} {fault.split(':', 1)[0]}",
     )
 
@@ -116,22 +107,16 @@ def _judge_negotiation(api: RestInterface, exchange: Exchange, answer: Response,
         return
     media_type = answer.media_type
     if media_type and context.usual:
-        # To send what q=0 rules out breaks a weaker rule than to send what was never named.
+        # A format that q=0 rules out breaks another rule than a format that Accept does not name.
         ruled_out = "q=0" in (context.accept or "").lower().replace(" ", "")
-        api.run.judge.check(
-            "http/q-zero" if ruled_out else "http/not-acceptable",
+        expect(api.run.judge, "http/q-zero" if ruled_out else "http/not-acceptable", exchange).that(
             quality(media_type, context.accept) > 0,
-            exchange,
-            f"an acceptable format, or 406 (Accept: {context.accept})",
-            found=f"{answer.status} with {media_type}",
+            f"an acceptable format or status 406 when Accept is {context.accept}",
+            f"status {answer.status} with {media_type}",
             cause="not acceptable",
         )
     if len(operation.formats) > 1 and not context.is_head:
         vary = (answer.header("vary") or "").lower()
-        api.run.judge.check(
-            "rest-formats/vary",
-            "*" in vary or "accept" in [name.strip() for name in vary.split(",")],
-            exchange,
-            "Vary: Accept",
-            found=f"Vary: {answer.header('vary')}",
-        )
+        names_accept = "*" in vary or "accept" in [name.strip() for name in vary.split(",")]
+        found = f"Vary: {answer.header('vary')}" if vary else "no header field Vary"
+        expect(api.run.judge, "rest-formats/vary", exchange).that(names_accept, "Vary: Accept", found)

@@ -29,7 +29,7 @@ class Described:
 
 
 def described_by_openapi(document: Any, base_url: str) -> list[Described]:
-    """The operations of a robot's OpenAPI description; what is not built as one has none."""
+    """Return the operations of a robot's OpenAPI description; of a broken one, none."""
     if not isinstance(document, dict):
         return []
     try:
@@ -44,7 +44,7 @@ def described_by_openapi(document: Any, base_url: str) -> list[Described]:
 
 
 def described_by_wadl(body: bytes, base_url: str) -> list[Described]:
-    """The operations of a robot's WADL.
+    """Return the operations of a robot's WADL.
 
     Raises:
         UnreadableError: it is no XML, or its root is no WADL application.
@@ -53,13 +53,13 @@ def described_by_wadl(body: bytes, base_url: str) -> list[Described]:
 
 
 def _below(path: str, base_url: str) -> str:
-    """A path of the server as a path below the base URL."""
+    """Return a path of the server as a path below the base URL."""
     base = urlsplit(base_url).path.rstrip("/")
     return path[len(base) :] if base and path.startswith(f"{base}/") else path
 
 
 def differences(wanted: Iterable[Operation], found: Iterable[Described]) -> list[str]:
-    """What of the contract a description lacks, in words."""
+    """Return what a description lacks of the contract, in words."""
     by_address: dict[tuple[str, str], list[Operation]] = {}
     for item in found:
         by_address.setdefault(item.address, []).append(item.operation)
@@ -69,7 +69,7 @@ def differences(wanted: Iterable[Operation], found: Iterable[Described]) -> list
         if theirs:
             missing += _differences_of_parameters(ours, theirs)
         elif not ours.optional:
-            missing.append(f"{ours.label} is missing")
+            missing.append(f"no {ours.label}")
     return missing
 
 
@@ -79,9 +79,15 @@ def _differences_of_parameters(ours: Operation, theirs: list[Operation]) -> list
     missing = []
     for where, name, required in wanted:
         if (where, name) not in described:
-            missing.append(f"{ours.label} lacks the {where} parameter {name}")
+            missing.append(f"{ours.label} without the {where} parameter {name}")
         elif where == "query" and described[where, name] != required:
-            missing.append(f"{ours.label} says that {name} is {'optional' if required else 'required'}")
+            missing.append(f"{ours.label} with the parameter {name} as {'optional' if required else 'required'}")
     known = {name for where, name, _ in wanted if where == "query"}
     extra = {name for (where, name), required in described.items() if required and where == "query"} - known
-    return [*missing, *(f"{ours.label} requires {name}, which the contract does not know" for name in sorted(extra))]
+    return [
+        *missing,
+        *(
+            f"{ours.label} with the required parameter {name}, which the contract does not have"
+            for name in sorted(extra)
+        ),
+    ]

@@ -1,4 +1,4 @@
-"""Whether what was put is what is then got."""
+"""Whether GET shows what was put."""
 
 import math
 import time
@@ -15,7 +15,7 @@ _PAUSE_S = 0.01
 
 
 def reader_of(api: RestInterface, call: Call) -> Call | None:
-    """The GET of the resource that a PUT is for, with the same values in its path."""
+    """Return the GET of the resource that a PUT is for, with the same values in its path."""
     for operation in operations_of(api.run.contract):
         if operation.method == "GET" and operation.template == call.operation.template:
             read = example_call(api, operation)
@@ -27,7 +27,7 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
     """Wait until GET shows what was put.
 
     Returns:
-        Empty when it does; what it shows instead when the settle time is over (a quarter more than declared, and half
+        Empty when it does; what GET shows instead when the settle time is over (a quarter more than declared, and half
         a second for a loaded machine); None where nothing can be compared.
     """
     read = reader_of(api, call)
@@ -44,7 +44,7 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
         if shown["status"] == HTTPStatus.NOT_FOUND:  # what was put has ended since: a goal that was reached
             return None
         other = [
-            f"{place} is {shown.get(place, 'nothing')!r} for {value!r}"
+            f"{shown.get(place, 'nothing')!r} as {place} instead of {value!r}"
             for place, value in wanted.items()
             if not place.endswith("[]") and not device.is_near(place, shown.get(place), value)
         ]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from conformance.api.expectation import expect
 from conformance.api.rest.calls import JSON, Call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.snapshot import steady
@@ -11,18 +12,18 @@ from conformance.documents.json_schema import Schema
 from conformance.documents.representation import UnreadableError, flattened, read
 from conformance.transport.exchange import Exchange
 
-# A robot at rest jitters; what its formats say otherwise in so many turns in a row is no jitter.
+# A robot at rest jitters; a difference in so many turns in a row is no jitter.
 _TURNS = 10
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """One value that two formats tell differently.
+    """One value that differs between two formats.
 
     Attributes:
         place: which.
-        description: what each says.
-        exchange: the answer that disagrees with JSON.
+        description: the value in each of them.
+        exchange: the response that disagrees with JSON.
     """
 
     place: str
@@ -37,13 +38,13 @@ Found = dict[tuple[str, str], Disagreement]
 def disagreements(
     api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
 ) -> tuple[list[Disagreement], Exchange]:
-    """Read a resource as JSON, in the other formats, and as JSON again, until all say the same.
+    """Read a resource as JSON, in the other formats, and as JSON again, until all agree.
 
-    Only what both JSON answers say alike is compared, so that what changes between two reads blames nobody; what
-    differs in every turn, at the same place, is a disagreement.
+    Only values that are equal in both JSON responses are compared, so that a value that changes between two reads is
+    no failure; a value that differs in every turn, at the same place, is a disagreement.
 
     Returns:
-        What disagrees in every turn; and the last JSON exchange.
+        The values that disagree in every turn; and the last JSON exchange.
     """
     suspects: Found | None = None
     for _ in range(_TURNS):
@@ -80,7 +81,7 @@ def one_turn(api: RestInterface, call: Call, media_types: list[str]) -> tuple[Fo
 def judge_same_values(
     api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
 ) -> Exchange:
-    """Judge that the formats of a resource agree, where it can be read; give the last JSON exchange.
+    """Judge that the formats of a resource agree, where it can be read; return the last JSON exchange.
 
     Args:
         api: the robot's REST interface.
@@ -96,12 +97,10 @@ def judge_same_values(
 
 def judge_disagreement(api: RestInterface, call: Call, found: Disagreement | None, exchange: Exchange) -> None:
     """Judge that the formats of a resource agree."""
-    api.run.judge.check(
-        "rest-formats/same-values",
+    expect(api.run.judge, "rest-formats/same-values", found.exchange if found else exchange).that(
         found is None,
-        found.exchange if found else exchange,
         f"the same values in all formats of {call.operation.template}",
-        found=found.description if found else "",
+        found.description if found else "",
         cause=call.operation.id,
     )
 
@@ -126,13 +125,13 @@ def _compare(
     if other is None:
         return []
     found = [
-        Disagreement(place, f"{place} is {other.get(place, 'nothing')!r} in {name} and {value!r} in JSON", exchange)
+        Disagreement(place, f"{other.get(place, 'nothing')!r} as {place} in {name} and {value!r} in JSON", exchange)
         for place, value in known.items()
         if not _same(value, other.get(place, None if value is None else ...))
     ]
     everywhere = set().union(*(shown or {} for shown in snapshots))
     found += [
-        Disagreement(place, f"{place} is {value!r} in {name} and nothing in JSON", exchange)
+        Disagreement(place, f"{value!r} as {place} in {name} and nothing in JSON", exchange)
         for place, value in other.items()
         if place not in everywhere
     ]

@@ -4,16 +4,15 @@ Its own checks take 5xx for a refusal, and call data negative that is valid once
 is read back from the wire (validity.py) and judged by that.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlsplit
 
 import requests
 import schemathesis
+from hypothesis.strategies import SearchStrategy
 from schemathesis import GenerationMode
 from schemathesis.core.result import Ok
 from schemathesis.core.transport import Response as ThesisResponse
@@ -21,45 +20,11 @@ from schemathesis.generation.drivers import CoverageGenerator, ExamplesGenerator
 from schemathesis.generation.feedback import NO_FEEDBACK
 from schemathesis.generation.overrides import Override
 
-from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange
 
-if TYPE_CHECKING:
-    from hypothesis.strategies import SearchStrategy
-
 _BASE = "http://robot.invalid"
-
-
-@dataclass(frozen=True)
-class GeneratedRequest:
-    """One request that Schemathesis made.
-
-    Attributes:
-        method: as to be sent.
-        target: path and query below the base URL.
-        content_type: whole field; empty where there is none.
-        body: octets.
-    """
-
-    method: str
-    target: str
-    content_type: str
-    body: bytes
-
-    @property
-    def media_type(self) -> str:
-        """Content-Type without parameters."""
-        return self.content_type.split(";", 1)[0].strip().lower()
-
-    def send(self, api: RestInterface) -> Exchange:
-        """Send it through the run's client.
-
-        Raises:
-            NoAnswerError: no HTTP response came.
-        """
-        fields = [("Content-Type", self.content_type)] if self.content_type else []
-        return api.client.send(self.method, self.target, headers=fields, body=self.body)
 
 
 @dataclass(frozen=True)
@@ -82,14 +47,14 @@ class Target:
         return any(True for _ in self.operation.iter_parameters()) or bool(list(self.operation.body))
 
     def examples(self) -> Iterator[GeneratedRequest]:
-        """From the contract's examples."""
+        """Yield requests from the contract's examples."""
         maker = ExamplesGenerator(
             operation=self.operation, override=Override(), feedback=NO_FEEDBACK, fill_missing=False
         )
         yield from _requests(maker)
 
     def coverage(self) -> Iterator[GeneratedRequest]:
-        """Each constraint of the schemas, from its one side and from the other."""
+        """Yield requests on both sides of each constraint of the schemas."""
         config = self.schema.config.generation_for(operation=self.operation, phase="coverage")
         maker = CoverageGenerator(
             operation=self.operation,
@@ -102,14 +67,14 @@ class Target:
         yield from _requests(maker)
 
     def fuzzing(self, *, negative: bool) -> SearchStrategy[GeneratedRequest | None]:
-        """Anything that fits the schemas, or does not; None for what cannot be sent."""
+        """Return a strategy for requests that fit the schemas, or do not; None stands for those that cannot be sent."""
         mode = GenerationMode.NEGATIVE if negative else GenerationMode.POSITIVE
         strategy: SearchStrategy[Any] = self.operation.as_strategy(generation_mode=mode)
         return strategy.map(as_request)
 
 
 def targets(contract: Contract) -> tuple[Target, ...]:
-    """The operations of a contract; those that Schemathesis cannot read are left out.
+    """Return the operations of a contract; those that Schemathesis cannot read are left out.
 
     Read anew each time: Schemathesis keeps in its schema which cases it has made, and makes some only once.
     """
@@ -126,7 +91,7 @@ def targets(contract: Contract) -> tuple[Target, ...]:
 
 
 def state_machine(document: dict[str, Any]) -> Any:
-    """The state machine that the contract's links make; None where it has none."""
+    """Return the state machine that the contract's links make; None where it has none."""
     from schemathesis.core.errors import NoLinksFound  # noqa: PLC0415 - an internal name, used here alone
 
     try:
@@ -147,7 +112,7 @@ def _requests(cases: Any) -> Iterator[GeneratedRequest]:
 
 
 def as_request(case: Any) -> GeneratedRequest | None:
-    """A case as it goes over the wire; None where HTTP cannot carry it."""
+    """Return a case as it goes over the wire; None where HTTP cannot carry it."""
     try:
         given = case.as_transport_kwargs(base_url=_BASE)
         keys = ("method", "url", "files", "data", "json", "params", "cookies")
@@ -169,7 +134,7 @@ def as_request(case: Any) -> GeneratedRequest | None:
 
 
 def as_thesis(exchange: Exchange) -> ThesisResponse:
-    """An answer as Schemathesis's state machine takes it."""
+    """Return a response in the form that Schemathesis's state machine takes."""
     answer = exchange.response
     headers: dict[str, list[str]] = {}
     for name, value in answer.headers:

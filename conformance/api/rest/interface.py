@@ -16,11 +16,10 @@ class RestInterface:
     Attributes:
         run: what is judged, and by what.
         client: sends the requests.
-        alive: whether the robot answers HTTP at all, asked anew.
+        alive: sends a request, and returns whether the robot responds to HTTP at all.
         device: what the contract pack knows of it.
-        small_numbers: by operation, the text for its numbers with which it was found to be answered; empty: the
-            example's own.
-        waits: how often a read is still sent again that the robot puts off for a moment.
+        small_numbers: by operation, the text for its numbers with which the robot accepts it; empty: the example's own.
+        waits: how many more reads that the robot puts off for a moment are sent again.
     """
 
     run: Run
@@ -40,7 +39,7 @@ class RestInterface:
 
 
 def plain_path(contract: Contract) -> str:
-    """A path that a contract lets be read without parameters, for asking whether a robot is there."""
+    """Return a path that a contract lets be read without parameters, for asking whether a robot is there."""
     for path, operations in contract.openapi.get("paths", {}).items():
         if "get" in operations and "{" not in path and not operations["get"].get("x-roaas-optional"):
             return str(path)

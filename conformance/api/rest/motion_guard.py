@@ -1,22 +1,17 @@
 """Random requests made harmless: what a robot accepts of them stays slow, near and seldom."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.calls import JSON, example_call
+from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import INVALID, VALID, Validity, validity
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.writing import json_text
-
-if TYPE_CHECKING:
-    # Schemathesis takes a quarter of a second to import, and quick effort does without it.
-    from conformance.api.rest.generated import GeneratedRequest
 
 # How many valid requests of one moving operation are sent: each may start a mission.
 _ACCEPTED = 3
@@ -36,7 +31,7 @@ class MotionGuard:
         self._valid: Counter[str] = Counter()
 
     def admit(self, item: GeneratedRequest) -> GeneratedRequest | None:
-        """The request as it may be sent; None where it may not."""
+        """Return the request as it may be sent; None where it may not."""
         said = self._validity(item)
         operation = said.operation
         if operation is None:
@@ -62,11 +57,11 @@ class MotionGuard:
         return validity(self._api.run.contract, item.method, item.target, item.media_type, item.body)
 
     def _may_reach(self, item: GeneratedRequest) -> bool:
-        """Whether a request for no operation of the contract may be sent: a method that a resource has not."""
+        """Return whether a request for no operation of the contract may be sent: a method that a resource lacks."""
         return self._api.run.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
 
     def _fitted(self, item: GeneratedRequest, operation: Operation) -> GeneratedRequest | None:
-        """A valid request of a moving operation with the contract's values, fit for this robot; a few of them."""
+        """Return a valid request of a moving operation with values that fit this robot; None after a few."""
         if self._valid[operation.id] >= _ACCEPTED:
             return None
         if not self._api.device.is_known:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from conformance.api.rest.mutations import places, replaced, with_options
+from conformance.api.rest.json_mutations import places, replaced, with_options
 from conformance.documents.json_schema import Schema
 from conformance.documents.writing import Token, json_text
 
@@ -11,7 +11,7 @@ _INT32_ENDS = (-(2**31), 2**31 - 1)
 
 
 def with_numbers(value: Any, write: Callable[[float], str]) -> bytes:
-    """JSON whose doubles are written as ``write`` has it; integers and texts stay as they are."""
+    """Return JSON whose doubles are written by ``write``; integers and texts stay as they are."""
 
     def written(item: Any) -> Any:
         if isinstance(item, dict):
@@ -24,7 +24,7 @@ def with_numbers(value: Any, write: Callable[[float], str]) -> bytes:
 
 
 def at_integer_ends(value: Any, schema: Schema) -> Iterator[Any]:
-    """The value with each int32 of its optional parts at either end of its range."""
+    """Yield the value with each int32 of its optional parts at either end of its range."""
     for whole, part in with_options(value, schema):
         for place in places(part.value, part.schema, part.path):
             if (place.schema.get("minimum"), place.schema.get("maximum")) == _INT32_ENDS:

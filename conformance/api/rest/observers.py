@@ -1,6 +1,6 @@
-"""Observers: they judge every exchange over REST that any check has, so that a fault that comes once in fifty shows.
+"""The observer of REST: judges every exchange of every check, so that a failure in one of fifty responses is noticed.
 
-They judge only what the request itself makes applicable; strange requests are left to the checks that send them.
+It judges only what applies to any such request; unusual requests are left to the checks that send them.
 """
 
 import re
@@ -9,6 +9,7 @@ from email.utils import parsedate_to_datetime
 from functools import lru_cache
 from http import HTTPStatus
 
+from conformance.api.expectation import expect
 from conformance.api.rest import declared, problem
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
@@ -20,11 +21,12 @@ from conformance.documents.traceback import inside_shown
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, Request, Response, Unanswered
 
 _CHARSET = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
-# Fields by which clients act, and which several values make meaningless (RFC 9110 5.3).
+# Fields that clients act on, and that several values make meaningless (RFC 9110 5.3).
 _SINGLE = ("Content-Type", "Location", "Retry-After")
-# What asks for a part, or for an answer on a condition, and the statuses that only such a request has.
+# Fields that ask for a part or set a condition, and the statuses that only such requests get.
 _CONDITIONS = frozenset({"range", "if-none-match", "if-modified-since", "if-match", "if-unmodified-since"})
 _CONDITIONAL = frozenset({206, 304, 412, 416})
+_WELL_FRAMED = "well-framed HTTP"
 
 
 class Observer(Listener):
@@ -40,31 +42,24 @@ class Observer(Listener):
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
 
     def answered(self, exchange: Exchange) -> None:
-        """Judge one exchange; what went to another interface is none of ours."""
+        """Judge one exchange, if the request went to this interface."""
         api, answer = self._api, exchange.response
         context = self._seen(exchange.request)
         if context is None:
             return
         self._judge_fields(exchange, answer, context)
         if answer.status in _CONDITIONAL and _is_conditional(exchange.request):
-            return  # a server's own answer (RFC 9110 13, 14), which no description need have; a part is no document
+            return  # a server's own response (RFC 9110 13, 14), which no description declares; a part is no document
         if answer.body and not context.is_head and is_json(answer.media_type):
             self._judge_json(exchange, answer)
         if answer.ok and answer.body and (is_xml(answer.media_type) or answer.media_type == "text/plain"):
             wrong = _other_charset(answer)
-            api.run.judge.check(
-                "rest-formats/charset", not wrong, exchange, "content in the charset that is named", found=wrong
-            )
+            expected = "content in the charset that Content-Type names"
+            expect(api.run.judge, "rest-formats/charset", exchange).that(not wrong, expected, wrong)
         if answer.status >= HTTPStatus.BAD_REQUEST:
             inside = inside_shown(answer.body)
-            api.run.judge.check(
-                "http/no-traceback",
-                not inside,
-                exchange,
-                "an error without the inside of the program",
-                found=f"the answer shows {inside!r}",
-                cause="traceback",
-            )
+            expected, found = "an error that shows nothing of the program", f"{inside!r} in the response"
+            expect(api.run.judge, "http/no-traceback", exchange).that(not inside, expected, found, cause="traceback")
             problem.judge(api, exchange, answer, context)
         if context.operation is not None:
             if answer.status >= HTTPStatus.BAD_REQUEST and context.usual and not is_cut_off(exchange):
@@ -72,15 +67,15 @@ class Observer(Listener):
             declared.judge(api, exchange, answer, context)
 
     def unanswered(self, request: Unanswered) -> None:
-        """Judge an answer that is no HTTP, where the request gave no reason for it."""
+        """Judge a response that is no HTTP, where the request gave no reason for it."""
         context = self._seen(request.request)
         if context is not None and context.usual and request.kind is NoAnswer.MALFORMED:
-            self._api.run.judge.check(
-                "http/framing", holds=False, exchange=request, expected="well-framed HTTP", found=request.problem
+            expect(self._api.run.judge, "http/framing", request).that(
+                holds=False, expected=_WELL_FRAMED, got=request.problem
             )
 
     def _seen(self, request: Request) -> RequestContext | None:
-        """The request, seen from the contract; None where it went to another interface."""
+        """Return the request as the contract sees it; None where it went to another interface."""
         api = self._api
         if request.url.split("?", 1)[0] in self._elsewhere:
             return None
@@ -88,49 +83,33 @@ class Observer(Listener):
 
     def _judge_fields(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
         judge = self._api.run.judge
-        judge.check("http/framing", holds=True, exchange=exchange, expected="well-framed HTTP")
+        expect(judge, "http/framing", exchange).that(holds=True, expected=_WELL_FRAMED)
         if answer.body:
-            media_type = answer.media_type
-            judge.check(
-                "http/content-type",
-                "/" in media_type,
-                exchange,
-                "Content-Type with a media type",
-                found=f"Content-Type {answer.header('content-type')!r} on {len(answer.body)} octets",
-            )
+            found = f"Content-Type {answer.header('content-type')!r} on {len(answer.body)} octets"
+            is_named = "/" in answer.media_type
+            expect(judge, "http/content-type", exchange).that(is_named, "Content-Type with a media type", found)
         twice = answer.repeated(*_SINGLE)
-        judge.check(
-            "http/field-once", not twice, exchange, "each field once that is no list", found=f"{twice} several times"
-        )
+        expected = "each header field once that is no list"
+        expect(judge, "http/field-once", exchange).that(not twice, expected, f"{twice} several times")
         # RFC 9110 6.6.1 leaves 5xx free.
         if answer.status < HTTPStatus.INTERNAL_SERVER_ERROR and context.request.raw is None:
             date = answer.header("date")
-            judge.check(
-                "http/date", _is_date(date), exchange, "Date with the time of the answer", found=f"Date: {date}"
-            )
+            found = "no header field Date" if date is None else f"Date: {date}"
+            expect(judge, "http/date", exchange).that(_is_date(date), "Date with the time of the response", found)
 
     def _judge_json(self, exchange: Exchange, answer: Response) -> None:
         judge = self._api.run.judge
         text = read_json(answer.body)
-        judge.check(
-            "http/json-finite",
-            not text.non_finite,
-            exchange,
-            "JSON with finite numbers",
-            found=f"the number {text.non_finite}",
-            cause="non-finite",
+        expect(judge, "http/json-finite", exchange).that(
+            not text.non_finite, "JSON with finite numbers", f"the number {text.non_finite}", cause="non-finite"
         )
-        judge.check("http/json-encoding", not text.encoding, exchange, "UTF-8 without a BOM", found=text.encoding)
-        judge.check(
-            "http/json-unique-names",
-            not text.twice,
-            exchange,
-            "each name once in an object",
-            found=f"the name {text.twice!r} twice in one object",
+        expect(judge, "http/json-encoding", exchange).that(not text.encoding, "UTF-8 without a BOM", text.encoding)
+        expect(judge, "http/json-unique-names", exchange).that(
+            not text.twice, "each name once in an object", f"the name {text.twice!r} twice in one object"
         )
 
     def _judge_input(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
-        """Invalid input is no server's error; a valid request is answered as the contract declares."""
+        """Judge 5xx: for an invalid request it is never right, for a valid one it is not declared."""
         api, request = self._api, context.request
         media_type = next((value for name, value in request.headers if name.lower() == "content-type"), "")
         media_type = media_type.split(";", 1)[0].strip().lower()
@@ -142,18 +121,12 @@ class Observer(Listener):
         retry = " without Retry-After" if status == HTTPStatus.SERVICE_UNAVAILABLE else ""
         operation = said.operation.id if said.operation else request.method
         for verdict, id_, expected in (
-            (INVALID, "http/no-server-error", f"no 5xx for invalid input ({said.why})"),
+            (INVALID, "http/no-server-error", f"a status below 500 for invalid input ({said.why})"),
             (VALID, "http/declared-status", f"a status that the contract declares for {operation}"),
         ):
             if said.verdict == verdict and (crashed or verdict == INVALID):
-                api.run.judge.check(
-                    id_,
-                    not crashed,
-                    exchange,
-                    expected,
-                    found=f"status {status}{retry} for {request.method}",
-                    cause=f"{status} {operation}",
-                )
+                found, cause = f"status {status}{retry}", f"{status} {operation}"
+                expect(api.run.judge, id_, exchange).that(not crashed, expected, found, cause=cause)
 
 
 def _is_conditional(request: Request) -> bool:
@@ -161,7 +134,7 @@ def _is_conditional(request: Request) -> bool:
 
 
 def _other_charset(answer: Response) -> str:
-    """How the content is not in the charset that Content-Type names; empty where it is.
+    """Return why the content is not in the charset that Content-Type names; empty where it is.
 
     Without one, XML says its encoding itself, and plain text is UTF-8. A byte order mark is no part of the text.
     """

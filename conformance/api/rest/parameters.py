@@ -1,11 +1,11 @@
-"""Parameter texts that the contract clearly does not allow (contract, fine print: only what is clearly outside)."""
+"""Texts that a parameter clearly does not allow (contract, fine print)."""
 
 from dataclasses import dataclass
 
-from conformance.documents.json_schema import kind_of, shape_of
+from conformance.documents.json_schema import kinds_of, shape_of
 from conformance.documents.openapi import Parameter
 
-# Letters, nothing, and what programming languages take for numbers though the contract does not.
+# Letters, nothing, and texts that programming languages take for numbers and the contract does not.
 _NO_NUMBERS = ("abc", "roaas-no-number", "", "NaN", "Infinity", "-Infinity", "inf", "1e400", "-1e400", "1.5m", "0x1F")
 _NO_INTEGERS = ("3.5", "99999999999999999999")
 # Which of these a problem can name as they are.
@@ -14,7 +14,7 @@ _TELLING = {"abc", "roaas-no-number", "1.5m"}
 
 @dataclass(frozen=True)
 class Wrong:
-    """One text that is refused.
+    """One text that a robot must refuse.
 
     Attributes:
         name: of the parameter.
@@ -30,12 +30,12 @@ class Wrong:
 
 
 def wrong_texts(parameter: Parameter) -> list[Wrong]:
-    """Texts that a parameter does not take; none where it takes any text."""
+    """Return texts that a parameter does not take; none where it takes any text."""
     schema = parameter.schema
-    kind = kind_of(schema)
+    kinds = kinds_of(schema)
     found: list[Wrong] = []
-    if kind in {"number", "integer"}:
-        texts = [*_NO_NUMBERS, *(_NO_INTEGERS if kind == "integer" else ())]
+    if kinds and kinds <= {"number", "integer"}:
+        texts = [*_NO_NUMBERS, *(_NO_INTEGERS if kinds == {"integer"} else ())]
         found += [
             Wrong(parameter.name, text, f"{text or 'nothing'!r} at {parameter.name}", text if text in _TELLING else "")
             for text in texts
@@ -50,7 +50,7 @@ def wrong_texts(parameter: Parameter) -> list[Wrong]:
             for value in dict.fromkeys(outside)
             if shape_of(schema).problem(value)
         ]
-    elif "enum" in schema or "pattern" in schema:
+    elif kinds <= {"string"} and ("enum" in schema or "pattern" in schema):
         text = "roaas-not-one-of-these"
         if shape_of(schema).problem(text):
             found.append(Wrong(parameter.name, text, f"a text that is not allowed at {parameter.name}", text))

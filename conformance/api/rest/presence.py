@@ -1,50 +1,92 @@
 """Whether an operation that a description names is there."""
 
+from dataclasses import replace
 from http import HTTPStatus
 from typing import Final
 
+from conformance.api.expectation import expect
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.parameters import wrong_texts
+from conformance.transport.exchange import Exchange
 
+# A media type that no operation takes.
+_NOT_TAKEN: Final = "image/png"
 _NOT_IMPLEMENTED: Final = frozenset({HTTPStatus.METHOD_NOT_ALLOWED, HTTPStatus.NOT_IMPLEMENTED})
 
 
 def judge_there(api: RestInterface, requirement: str, call: Call, *, known: bool = True) -> None:
-    """Judge by the request itself where it may be sent and needs nothing, else by what OPTIONS says of its path.
+    """Judge whether an operation is there: by its own request, or by what OPTIONS returns for its path.
+
+    The operation's own request is sent where it may be sent and moves nothing; else OPTIONS, which proves something by
+    Allow, by 2xx and by 404. Where OPTIONS leaves it open, an operation of the contract gets a request that it has to
+    refuse, if the run may move the robot.
 
     Args:
         api: the robot's REST interface.
-        requirement: id of what asks for it.
+        requirement: id of the requirement.
         call: a request for the operation.
-        known: whether the contract has the operation. A resource of the robot's own need not know OPTIONS, nor have
-            what a made-up value in its path would name: then nothing is said of it.
+        known: whether the contract has the operation. A resource of the robot's own may lack what a made-up value in
+            its path names.
     """
     operation = call.operation
-    asked = operation.safe and allowed(api, operation)
-    exchange = call.send(api) if asked else Call(operation, call.values).send(api, method="OPTIONS")
+    exchange, there = None, None
+    if operation.safe and allowed(api, operation):
+        exchange = call.send(api)
+        there = _by_itself(call, exchange)
+    if there is None:
+        exchange = Call(operation, call.values).send(api, method="OPTIONS")
+        there = _by_options(call, exchange)
+        is_open = there is None or exchange.response.status == HTTPStatus.NOT_FOUND
+        refused = _to_be_refused(call)
+        if is_open and known and refused is not None and allowed(api, operation):
+            exchange = refused.send(api)
+            there = _by_itself(call, exchange)
+    status = exchange.response.status if exchange is not None else 0
+    if there is None or (status == HTTPStatus.NOT_FOUND and "{" in operation.template and not known):
+        api.run.judge.note(requirement, f"not judged for {operation.label}: no request that may be sent shows it")
+        return
+    found = "" if there or exchange is None else _absence(exchange)
+    expected = f"a response that shows that {operation.label} is there"
+    expect(api.run.judge, requirement, exchange).that(there, expected, found, cause=operation.label)
+
+
+def _to_be_refused(call: Call) -> Call | None:
+    """Return a request that reaches an operation and that it has to refuse; None where there is no such."""
+    operation = call.operation
+    if operation.safe:
+        return None
+    if operation.bodies:
+        return replace(call, media_type=_NOT_TAKEN, body=b"roaas")
+    wrong = [item for parameter in operation.parameter("path") for item in wrong_texts(parameter) if item.text]
+    return call.having(wrong[0].name, wrong[0].text) if wrong else None
+
+
+def _by_itself(call: Call, exchange: Exchange) -> bool | None:
+    """Return whether an operation is there by the response to it; None where the resource may only be empty."""
     status = exchange.response.status
-    if asked and status == HTTPStatus.NOT_FOUND and operation.declared(status) is not None:
-        # The resource may well be there with nothing in it: its methods tell.
-        exchange = call.send(api, method="OPTIONS")
-        status = exchange.response.status
-        asked = False
-    allow = exchange.response.header("allow")
-    named = allow is None or operation.method in {name.strip() for name in allow.split(",")}
-    if asked:
-        there = status not in {HTTPStatus.NOT_FOUND, *_NOT_IMPLEMENTED}
-    elif status in _NOT_IMPLEMENTED and allow is None and not known:
-        return
-    else:
-        refused = status in _NOT_IMPLEMENTED and (known or allow is None)
-        there = status != HTTPStatus.NOT_FOUND and named and not refused
-    if status == HTTPStatus.NOT_FOUND and "{" in operation.template and not known:
-        return
-    api.run.judge.check(
-        requirement,
-        there,
-        exchange,
-        f"{operation.label} to be there",
-        found="Allow does not name it" if not (asked or named) else f"status {status}",
-        cause=operation.label,
+    may_be_empty = call.operation.declared(status) is not None or (
+        not call.operation.safe and "{" in call.operation.template
     )
+    if status == HTTPStatus.NOT_FOUND and may_be_empty:
+        return None
+    return status != HTTPStatus.NOT_FOUND and status not in _NOT_IMPLEMENTED
+
+
+def _by_options(call: Call, exchange: Exchange) -> bool | None:
+    """Return whether an operation is there by the response to OPTIONS; None where that leaves it open."""
+    allow, status = exchange.response.header("allow"), exchange.response.status
+    if status == HTTPStatus.NOT_FOUND:
+        return False
+    if allow is not None:
+        return call.operation.method in {name.strip() for name in allow.split(",")}
+    # A resource that refuses OPTIONS, and does not say what it allows, says nothing of its other methods.
+    return None if status in _NOT_IMPLEMENTED else True
+
+
+def _absence(exchange: Exchange) -> str:
+    """Return in words what shows that an operation is not there."""
+    allow, status = exchange.response.header("allow"), exchange.response.status
+    named = f" with Allow: {allow}" if allow is not None else ""
+    return f"status {status}{named} for {exchange.request.method}"

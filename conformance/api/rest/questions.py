@@ -1,4 +1,4 @@
-"""Questions whose answers can be told apart, so that an answer that went to another client shows."""
+"""Questions whose responses can be told apart, so that a response that went to another client is noticed."""
 
 from __future__ import annotations
 
@@ -12,81 +12,83 @@ from urllib.parse import quote
 from conformance.api.rest.applicable import allowed, answered
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
-from conformance.documents.json_schema import kind_of, shape_of
+from conformance.documents.json_schema import is_numeric, shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.representation import UnreadableError, read
 from conformance.transport.exchange import Response
 from conformance.transport.parallel import Outgoing
 
-# Stands in the questions that only one client asks.
+# Stands in the questions that only one client sends.
 _MARK: Final = "roaas-client-"
 _UNKNOWN: Final = 4
 
 
 @dataclass(frozen=True)
 class Question:
-    """A request that changes nothing, and what shows that an answer belongs to another one.
+    """A request that changes nothing, and a test whether a response belongs to it.
 
     Attributes:
         path: target below the base URL.
         accept: media type.
-        stranger: tells why an answer cannot be the one to this request; empty where it can.
-        comes_and_goes: whether what is asked for may cease to be there, as a goal that ends.
+        mismatch: returns why a response cannot be the one to this request; empty where it can.
+        comes_and_goes: whether the resource may cease to be there, as a goal that ends.
     """
 
     path: str
     accept: str
-    stranger: Callable[[Response], str]
+    mismatch: Callable[[Response], str]
     comes_and_goes: bool = False
 
     def outgoing(self, api: RestInterface) -> Outgoing:
-        """The request."""
+        """Return the request as one of several clients sends it."""
         return Outgoing(api.client, "GET", self.path, (("Accept", self.accept),))
 
 
 def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Question]:
-    """Questions, each of which was asked alone before: what is odd about an answer then is for others to judge.
+    """Send each question alone, and return those with a matching response; other requirements judge the others.
 
     Args:
         api: the robot's REST interface.
-        more: further ones, that only the robot's domain can tell apart.
+        more: further questions, of the contract pack.
     """
     found = [*_reads(api), *_refused(api), *_unknown(), *more]
     alone = [(item, api.client.send("GET", item.path, headers=(("Accept", item.accept),)).response) for item in found]
-    return [_of_status(item, answer.status) for item, answer in alone if not item.stranger(answer)]
+    return [_of_status(item, answer.status) for item, answer in alone if not item.mismatch(answer)]
 
 
 def misplaced(api: RestInterface, question: Question, answer: Response) -> str:
-    """Why an answer cannot be the one to this question; empty where it can.
+    """Return why a response cannot be the one to this question; empty where it can.
 
-    Also where the robot answers so to whoever asks alone: its state has changed meanwhile, as when a goal ends.
+    The question is sent alone once more: the robot's state may have changed meanwhile, as when a goal ends.
     """
-    stranger = question.stranger(answer)
-    if not stranger:
+    mismatch = question.mismatch(answer)
+    if not mismatch:
         return ""
     alone = api.client.send("GET", question.path, headers=(("Accept", question.accept),)).response
-    return "" if question.stranger(alone) and alone.status == answer.status else stranger
+    return "" if question.mismatch(alone) and alone.status == answer.status else mismatch
 
 
 def rounds(asked: Sequence[Question], clients: int, count: int) -> list[list[Question]]:
-    """So many rounds in which the clients ask different things, each of them everything in time."""
+    """Return so many rounds in which the clients send different questions, each of them every question in time."""
     step = max(1, len(asked) // clients)
     return [[asked[(turn + client * step) % len(asked)] for client in range(clients)] for turn in range(count)]
 
 
 def _of_status(question: Question, status: int) -> Question:
-    """The same question, whose answer has this status as well."""
+    """Return the same question, whose response must have this status as well."""
     usual = {status, HTTPStatus.NOT_FOUND} if question.comes_and_goes else {status}
 
-    def stranger(answer: Response) -> str:
-        return question.stranger(answer) or ("" if answer.status in usual else f"status {answer.status} for {status}")
+    def mismatch(answer: Response) -> str:
+        return question.mismatch(answer) or (
+            "" if answer.status in usual else f"status {answer.status} instead of {status}"
+        )
 
-    return Question(question.path, question.accept, stranger)
+    return Question(question.path, question.accept, mismatch)
 
 
 def _reads(api: RestInterface) -> list[Question]:
-    """Each resource in each format."""
+    """Return a question for each resource in each format."""
     return [
         Question(
             call.path,
@@ -102,19 +104,22 @@ def _reads(api: RestInterface) -> list[Question]:
 def _shape_of(call: Call, media_type: str, names: frozenset[str]) -> Callable[[Response], str]:
     schema = call.operation.shape or {}
 
-    def stranger(answer: Response) -> str:
+    def mismatch(answer: Response) -> str:
         if not answer.ok:
             return ""
         if answer.media_type != media_type:
-            return f"{answer.media_type or 'no media type'} for {media_type}"
+            return f"{answer.media_type or 'no media type'} instead of {media_type}"
         try:
             problem = shape_of(schema).problem(read(media_type, answer.body, schema))
         except UnreadableError as error:
             return str(error)
+        if problem:
+            return f"a body in which {problem}"
         found = _names_in(answer)
-        return problem or ("" if not (names and found) or names & found == names else f"no {min(names - found)}")
+        is_other = bool(names and found and names - found)
+        return f"an object without {min(names - found)}" if is_other else ""
 
-    return stranger
+    return mismatch
 
 
 def _names(exchange: Any) -> frozenset[str]:
@@ -122,33 +127,33 @@ def _names(exchange: Any) -> frozenset[str]:
 
 
 def _names_in(answer: Response) -> frozenset[str]:
-    """The names in a JSON object, or in the first of a list: two lists may fit one schema, as it is open to more."""
+    """Return the names in a JSON object, or in the first of a list: two lists may fit one schema, as it is open."""
     value = read_json(answer.body).value if is_json(answer.media_type) else None
     first = value[0] if isinstance(value, list) and value else value
     return frozenset(first) if isinstance(first, dict) else frozenset()
 
 
 def _marked(number: int) -> Callable[[Response], str]:
-    """Whether an answer speaks of another client's question."""
+    """Return a test whether a response names another client's question."""
     own = f"{_MARK}{number}-".encode()
 
-    def stranger(answer: Response) -> str:
+    def mismatch(answer: Response) -> str:
         there = answer.body.find(_MARK.encode())
         while there >= 0:
             if not answer.body.startswith(own, there):
-                return f"{answer.body[there : there + len(own) + 2]!r} in the answer to {own!r}"
+                return f"a response with {answer.body[there : there + len(own) + 2]!r} to the request with {own!r}"
             there = answer.body.find(_MARK.encode(), there + 1)
         return f"status {answer.status}" if answer.status < HTTPStatus.MULTIPLE_CHOICES else ""
 
-    return stranger
+    return mismatch
 
 
 def _refused(api: RestInterface) -> list[Question]:
-    """Reads with a text of its own in place of a number, which a refusal may name."""
+    """Return reads with a text of their own in place of a number, which a refusal may name."""
     numbers = itertools.count(_UNKNOWN)
     found = []
     for operation in operations_of(api.run.contract):
-        named = [item.name for item in operation.parameter("query") if kind_of(item.schema) in {"number", "integer"}]
+        named = [item.name for item in operation.parameter("query") if is_numeric(item.schema)]
         if operation.method != "GET" or not allowed(api, operation) or not named:
             continue
         call = example_call(api, operation)
@@ -160,5 +165,5 @@ def _refused(api: RestInterface) -> list[Question]:
 
 
 def _unknown() -> list[Question]:
-    """Paths that nobody has, each of its own."""
+    """Return questions for unknown paths."""
     return [Question(f"/{quote(f'{_MARK}{number}-')}/", JSON, _marked(number)) for number in range(_UNKNOWN)]

@@ -1,10 +1,11 @@
-"""Whether what breaks the contract is refused: with 4xx, with the fitting one, and with a detail that helps."""
+"""Refusals of invalid requests: by 4xx, by the fitting one, and with a detail that helps."""
 
 from collections.abc import Callable
 
+from conformance.api.expectation import expect
 from conformance.api.rest import problem
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.statuses import is_cut_off, is_refusal, judge_status
+from conformance.api.rest.statuses import is_cut_off, is_refusal
 from conformance.documents.openapi import operations_of
 from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
 
@@ -23,7 +24,7 @@ def judge_refusal(
     closing: bool = False,
     json: bool = True,
 ) -> bool:
-    """Send one invalid request, and judge what comes.
+    """Send one invalid request, judge the response, and return whether the request was refused.
 
     Args:
         api: the robot's REST interface.
@@ -36,39 +37,26 @@ def judge_refusal(
         closing: whether closing the connection refuses it as well.
         json: whether its body is JSON (or meant to be).
 
-    Returns:
-        Whether it was refused.
-
     Raises:
-        NoAnswerError: there was no answer where there had to be one.
+        NoAnswerError: no response came, for a reason that other requirements judge.
     """
     judge = api.run.judge
+    expected, kind = f"status 4xx for {what}", what.split(" at ", 1)[0]
     try:
         exchange = send()
     except NoAnswerError as none:
-        if (closing and none.kind is NoAnswer.CLOSED) or is_cut_off(none.unanswered):
-            return judge.check(
-                requirement, holds=True, exchange=none.unanswered, expected="4xx, or a closed connection"
-            )
-        if none.kind not in {NoAnswer.CLOSED, NoAnswer.MALFORMED} or not api.alive():
+        refused = (closing and none.kind is NoAnswer.CLOSED) or is_cut_off(none.unanswered)
+        if not refused and (none.kind not in {NoAnswer.CLOSED, NoAnswer.MALFORMED} or not api.alive()):
             raise
-        return judge.check(
-            requirement,
-            holds=False,
-            exchange=none.unanswered,
-            expected=f"4xx for {what}",
-            found=str(none),
-            cause=f"{what.split(' at ', 1)[0]} {none.kind}",
-        )
+        return expect(judge, requirement, none.unanswered).that(refused, expected, cause=f"{kind} {none.kind}")
     if is_cut_off(exchange):
-        return judge.check(requirement, holds=True, exchange=exchange, expected="4xx, or a closed connection")
+        return expect(judge, requirement, exchange).that(holds=True, expected=expected)
     status = exchange.response.status
-    cause = f"{what.split(' at ', 1)[0]} {status}"
-    if not judge_status(judge, requirement, is_refusal(exchange), exchange, f"4xx for {what}", cause=cause):
+    if not expect(judge, requirement, exchange).that(is_refusal(exchange), expected, cause=f"{kind} {status}"):
         return False
     if json and malformed is not None:
         fitting, name = (_MALFORMED, "malformed") if malformed else (_INVALID, "invalid")
-        judge_status(judge, f"strict-input/status-{name}", status == fitting, exchange, f"{fitting} for {what}")
+        expect(judge, f"strict-input/status-{name}", exchange).status(fitting, when=f"the request has {what}")
     if status in {_MALFORMED, _INVALID}:
         _judge_detail(api, exchange, what, field, shown)
     return True
@@ -83,11 +71,9 @@ def _judge_detail(api: RestInterface, exchange: Exchange, what: str, field: str,
         ("http/problem-value", f"the value {shown!r}", shown in detail),
     ):
         if field if requirement.endswith("detail") else shown:
-            api.run.judge.check(
-                requirement,
+            expect(api.run.judge, requirement, exchange).that(
                 named,
-                exchange,
-                f"a detail that names {wanted}, for {what}",
-                found=f"detail {detail[:200]!r}" if detail else "no detail",
-                cause=("unnamed" if detail else "no detail"),
+                f"a problem whose detail names {wanted}, for {what}",
+                f"the detail {detail[:200]!r}" if detail else "a problem without detail",
+                cause="unnamed" if detail else "no detail",
             )

@@ -39,7 +39,7 @@ class RequestContext:
 
     @classmethod
     def of(cls, contract: Contract, base_url: str, request: Request) -> RequestContext | None:
-        """See a request; None where it went elsewhere."""
+        """Return a request as the contract sees it; None where it went elsewhere."""
         if not request.url.startswith(base_url):
             return None
         target = request.url[len(base_url) :]

@@ -19,7 +19,7 @@ _WINDOWS = 12
 
 
 def flatten(exchange: Exchange) -> Snapshot:
-    """Status and every single value of a JSON answer, by place."""
+    """Return the status and every single value of a JSON response, by place."""
     answer = exchange.response
     shown: Snapshot = {"status": answer.status}
     if answer.ok and is_json(answer.media_type):
@@ -30,7 +30,7 @@ def flatten(exchange: Exchange) -> Snapshot:
 
 
 def steady(snapshots: Iterable[Snapshot]) -> Snapshot:
-    """What is the same in all snapshots."""
+    """Return the values that are the same in all snapshots."""
     first, *others = snapshots
     return {
         place: value
@@ -40,7 +40,7 @@ def steady(snapshots: Iterable[Snapshot]) -> Snapshot:
 
 
 def take_snapshots(api: RestInterface, calls: Iterable[Call]) -> dict[str, tuple[Snapshot, Exchange]]:
-    """What is steady over some readings of each operation, by its id, with the last reading.
+    """Read each operation several times; return its steady values by its id, with the last exchange.
 
     With a pause between the readings: a robot's sensors speak tens of times a second, and a client asks faster.
     """
@@ -55,14 +55,14 @@ def take_snapshots(api: RestInterface, calls: Iterable[Call]) -> dict[str, tuple
 
 
 def changed(before: Snapshot, after: Snapshot) -> dict[str, tuple[Any, Any]]:
-    """What was steady before and is another after; places that are gone count only where the status is the same."""
+    """Return the values that changed, with old and new; missing places count only where the status is the same."""
     if before.get("status") != after.get("status"):
         return {"status": (before.get("status"), after.get("status"))} if "status" in before else {}
     return {place: (value, after.get(place, "nothing")) for place, value in before.items() if after.get(place) != value}
 
 
 def changes_by_itself(api: RestInterface, call: Call, place: str, seconds: float) -> bool:
-    """Whether one value of a resource goes on changing while nothing else is asked of the robot.
+    """Return whether one value of a resource goes on changing while the suite sends nothing else.
 
     What has set it going may take a while to end (a robot that was set in motion): only a value that does not come
     to rest in any of several such times changes by itself.

@@ -1,4 +1,4 @@
-"""Whether a request is valid by the contract, read back from what really goes over the wire."""
+"""Whether a request is valid by the contract, read back from what goes over the wire."""
 
 import math
 import re
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from urllib.parse import parse_qsl, unquote
 
 from conformance.contract.pack import Contract
-from conformance.documents.json_schema import Schema, kind_of, shape_of
+from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, Parameter, is_json, is_normal, is_xml, matching
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
@@ -16,7 +16,7 @@ VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
 # The contract's grammar of numbers in paths and queries (fine print).
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
-# What no reader takes for a number: nothing, or a letter where none can be.
+# Texts that no reader takes for a number: nothing, or a letter where a number has none.
 _NO_NUMBER = re.compile(r"|.*[A-DF-Za-df-z].*|[eE].*", re.DOTALL)
 # Digits of an integer.
 _BEYOND_EVERY_BOUND = 40
@@ -30,10 +30,10 @@ _RULES = {
 
 @dataclass(frozen=True)
 class Validity:
-    """What is said of a request.
+    """The verdict on a request.
 
     Attributes:
-        verdict: valid, invalid, or unclear (then a robot may do as it likes).
+        verdict: valid, invalid, or unclear (then a robot may accept or refuse it).
         operation: the one that it is for, or None.
         requirement: name in class strict-input of what asks for its refusal.
         why: what is wrong with it.
@@ -46,10 +46,10 @@ class Validity:
 
 
 def validity(contract: Contract, method: str, target: str, media_type: str, body: bytes) -> Validity:
-    """Judge a request.
+    """Return the verdict on a request.
 
     Args:
-        contract: by which.
+        contract: the contract to judge by.
         method: as sent.
         target: path and query below the base URL, as sent.
         media_type: without parameters; empty where there is none.
@@ -68,14 +68,14 @@ def validity(contract: Contract, method: str, target: str, media_type: str, body
 
 
 def require_valid(contract: Contract, method: str, target: str, media_type: str = "", body: bytes = b"") -> None:
-    """See that a request which is to be sent as a valid one is not invalid by the contract.
+    """Check that a request which the suite sends as a valid one is not invalid by the contract.
 
     Raises:
-        HarnessError: it is; the message says why.
+        HarnessError: the request is invalid; the message says why.
     """
     said = validity(contract, method, target, media_type, body)
     if said.verdict == INVALID:
-        raise HarnessError(f"{method} {target[:200]} was made as a valid request, and is none: {said.why}")
+        raise HarnessError(f"{method} {target[:200]} was made as a valid request, and is invalid: {said.why}")
 
 
 _Said = tuple[str, str, str]
@@ -111,23 +111,21 @@ def _of_query(operation: Operation, query: str) -> list[_Said]:
 
 
 def _of_text(parameter: Parameter, text: str, requirement: str) -> _Said:
-    """A parameter's text; near misses of a number are unclear (contract, fine print)."""
-    schema = parameter.schema
-    kind = kind_of(schema)
-    why = f"{text[:40]!r} at {parameter.name}"
-    value: float | int | str = text
-    if kind in {"number", "integer"}:
-        if _NO_NUMBER.fullmatch(text):
-            return INVALID, requirement, why
-        if not (_INTEGER if kind == "integer" else _NUMBER).fullmatch(text):
-            return UNCLEAR, "", ""
-        value = float(text)
-        if not math.isfinite(value):
-            return INVALID, requirement, why
-        value = int(text) if kind == "integer" and len(text) < _BEYOND_EVERY_BOUND else value
-    elif kind != "string" or not text:
+    """Judge a parameter's text, read as each of its types; near misses of a number are unclear (fine print)."""
+    kinds = kinds_of(parameter.schema) or {"string"}
+    if not kinds <= {"number", "integer", "string"} or ("string" in kinds and not text):
         return UNCLEAR, "", ""
-    return (INVALID, requirement, why) if shape_of(schema).problem(value) else (VALID, "", "")
+    readings: list[str | float] = [text] if "string" in kinds else []
+    is_clear = True
+    if kinds != {"string"} and not _NO_NUMBER.fullmatch(text):
+        is_clear = bool((_NUMBER if "number" in kinds else _INTEGER).fullmatch(text))
+        if is_clear and math.isfinite(float(text)):
+            is_whole = "number" not in kinds and len(text) < _BEYOND_EVERY_BOUND
+            readings.append(int(text) if is_whole else float(text))
+    shape = shape_of(parameter.schema)
+    if not all(shape.problem(value) for value in readings):
+        return VALID, "", ""
+    return (INVALID, requirement, f"{text[:40]!r} at {parameter.name}") if is_clear else (UNCLEAR, "", "")
 
 
 def _of_body(operation: Operation, media_type: str, body: bytes) -> _Said:
@@ -144,7 +142,7 @@ def _of_body(operation: Operation, media_type: str, body: bytes) -> _Said:
 
 
 def json_fault(body: bytes, schema: Schema) -> _Said:
-    """What is wrong with a JSON body, by the requirement that asks for its refusal."""
+    """Return what is wrong with a JSON body, and the requirement that asks for its refusal."""
     text = read_json(body)
     for there, requirement in (
         (not body.strip(), "json-empty"),
@@ -164,7 +162,7 @@ def json_fault(body: bytes, schema: Schema) -> _Said:
 
 
 def _xml_fault(body: bytes, schema: Schema) -> _Said:
-    """What is wrong with an XML body; one that looks right may have more in it, and stays unclear."""
+    """Return what is wrong with an XML body; one that looks right may have more in it, and is unclear."""
     try:
         root = parse_xml(body)
     except UnreadableError as error:

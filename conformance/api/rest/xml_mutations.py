@@ -1,68 +1,68 @@
-"""Named mutations of a valid XML body: each breaks the contract in one way, at one place."""
+"""Mutations of a valid XML body: each breaks the contract in one way, at one place."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
-from conformance.api.rest.mutations import STRANGE_NAME, STRANGE_TEXT, places, replaced
-from conformance.documents.json_schema import Schema, numbers_in, shape_of, types_of
+from conformance.api.mutations import STRANGE_NAME, STRANGE_TEXT, Mutation
+from conformance.api.rest.json_mutations import Place, places, replaced
+from conformance.documents.json_schema import Schema, numbers_in, shape_of
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
-from conformance.documents.writing import Pairs, Token, xml_bytes
+from conformance.documents.writing import xml_bytes
 
 _NO_NUMBERS = (STRANGE_TEXT, "NaN", "INF", "-INF", "Infinity", "1e400", "", "0.1 0.2", "1,5")
 
 
-def xml_mutations(value: Any, schema: Schema, root: str) -> list[tuple[str, bytes]]:
-    """Names and octets of invalid bodies, confirmed to be invalid as they are sent.
+def xml_mutations(value: Any, schema: Schema, root: str) -> list[Mutation[bytes]]:
+    """Return every mutation of a valid body that is invalid on the wire.
 
     Args:
         value: a valid one.
         schema: of the body.
         root: name of the root element.
     """
-    found = [*_of_document(value, root), *_of_places(value, schema, root)]
-    return [(name, body) for name, body in found if _is_invalid(body, schema, root)]
+    made = [*_of_document(value, root), *_of_places(value, schema, root)]
+    return [item for item in made if _is_invalid(item.made, schema, root)]
 
 
-def _of_document(value: Any, root: str) -> Iterator[tuple[str, bytes]]:
+def _of_document(value: Any, root: str) -> Iterator[Mutation[bytes]]:
     valid = xml_bytes(value, root)
-    yield "no octets", b""
-    yield "XML cut short", valid[: -len(root) - 1]
-    yield "an end tag without a start", valid + f"</{root}>".encode()
-    yield "JSON as XML", b'{"x": 0.1}'
-    yield "another root element", xml_bytes(value, STRANGE_NAME)
-    yield "an empty root element", f"<{root}/>".encode()
-    yield "text in the root element", f"<{root}>stop</{root}>".encode()
+    for what, body in (
+        ("no octets", b""),
+        ("XML cut short", valid[: -len(root) - 1]),
+        ("an end tag without a start", valid + f"</{root}>".encode()),
+        ("JSON as XML", b'{"x": 0.1}'),
+        ("another root element", xml_bytes(value, STRANGE_NAME)),
+        ("an empty root element", f"<{root}/>".encode()),
+        ("text in the root element", f"<{root}>stop</{root}>".encode()),
+    ):
+        yield Mutation("document", what, body)
 
 
-def _of_places(value: Any, schema: Schema, root: str) -> Iterator[tuple[str, bytes]]:
+def _of_places(value: Any, schema: Schema, root: str) -> Iterator[Mutation[bytes]]:
     for place in places(value, schema):
+        write = _writer(value, place, root)
         if isinstance(place.value, dict):
-            members = place.value
-            for name in place.schema.get("required", ()):
-                rest = {key: item for key, item in members.items() if key != name}
-                yield f"{name} missing at {place.where}", xml_bytes(replaced(value, place.path, rest), root)
-            strange = {**members, STRANGE_NAME: 0}
-            yield f"an unknown element at {place.where}", xml_bytes(replaced(value, place.path, strange), root)
-            for name, item in members.items():
-                twice = Pairs((*members.items(), (name, item)))
-                yield f"{name} twice at {place.where}", xml_bytes(replaced(value, place.path, twice), root)
+            yield from place.members_broken(write)
             if place.path:
-                yield f"text at {place.where}", xml_bytes(replaced(value, place.path, "stop"), root)
-        elif set(types_of(place.schema)) & {"number", "integer"}:
+                yield Mutation("type", f"text at {place.where}", write("stop"))
+        elif place.is_number:
             for text in _NO_NUMBERS:
-                body = xml_bytes(replaced(value, place.path, Token(text)), root)
-                yield f"{text or 'nothing'!r} at {place.where}", body
-            nested = {STRANGE_NAME: 0}
-            yield f"an element at {place.where}", xml_bytes(replaced(value, place.path, nested), root)
+                yield Mutation("lexical", f"{text or 'nothing'!r} at {place.where}", write(text))
+            yield Mutation("type", f"an element at {place.where}", write({STRANGE_NAME: 0}))
+
+
+def _writer(value: Any, place: Place, root: str) -> Callable[[Any], bytes]:
+    """Return a function that writes the whole value with another one at a place."""
+    return lambda new: xml_bytes(replaced(value, place.path, new), root)
 
 
 def _is_invalid(body: bytes, schema: Schema, root: str) -> bool:
-    """Whether what is sent breaks the contract, read as the contract reads XML."""
+    """Return whether a body breaks the contract, read as the contract reads XML."""
     try:
         element = parse_xml(body)
     except UnreadableError:
         return True
-    if local_name(element) != root or b"roaas_unknown" in body:
+    if local_name(element) != root or STRANGE_NAME.encode() in body:
         return True
     value = from_element(element, schema)
     return bool(shape_of(schema).problem(value)) or any(abs(item) == float("inf") for item in numbers_in(value))

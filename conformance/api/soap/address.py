@@ -8,7 +8,7 @@ from conformance.documents.xml_names import WSDL_SOAP, clark
 
 
 def is_http(url: str) -> bool:
-    """Whether a URL names a host and a port that HTTP can be spoken to."""
+    """Return whether a URL is an http or https URL with a host and a port."""
     try:
         parts = urlsplit(url)
         return parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
@@ -17,14 +17,14 @@ def is_http(url: str) -> bool:
 
 
 def split(url: str) -> tuple[str, str]:
-    """Scheme with authority, and path with query."""
+    """Return scheme with authority, and path with query."""
     parts = urlsplit(url)
     path = parts.path or "/"
     return f"{parts.scheme}://{parts.netloc.rsplit('@', 1)[-1]}", f"{path}?{parts.query}" if parts.query else path
 
 
 def soap_address(wsdl: bytes) -> str | None:
-    """The first soap:address in a WSDL, however broken the WSDL is otherwise; None without one."""
+    """Return the first soap:address in a WSDL, however broken the WSDL is otherwise; None without one."""
     try:
         root = parse(wsdl, doctype=True)
     except NotXmlError:
@@ -37,7 +37,7 @@ def soap_address(wsdl: bytes) -> str | None:
 
 
 def may_be_followed(address: str, wsdl: str, *, with_token: bool) -> bool:
-    """Whether to try the address that a WSDL names.
+    """Return whether to try the address that a WSDL names.
 
     Args:
         address: what the soap:address says.

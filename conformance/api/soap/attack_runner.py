@@ -1,21 +1,22 @@
-"""Sending attacks: each over a connection of its own, with the robot asked afterwards whether it is still well."""
+"""Sending attacks: each over a connection of its own, followed by a harmless request."""
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from conformance.api.expectation import expect
 from conformance.api.soap.attack_verdict import attack_verdict, is_closed
 from conformance.api.soap.attacks import Attack
 from conformance.api.soap.callback_server import CallbackServer
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
 from conformance.verdict.evidence import Judge
 
-# A robot is well if it answers within 20 times its usual time, and within a second in any case.
+# A robot is responsive if it responds within 20 times its usual time, or within a second.
 _SLOWER: Final = 20
 _ALWAYS_MS: Final = 1000.0
 _TRIES: Final = 3
-# Attacks that cost a deadline, after which the rest is left out: what a robot does then is known.
+# After so many attacks that cost a deadline the rest is left out.
 _TROUBLES: Final = 3
 
 
@@ -25,13 +26,13 @@ class AttackRunner:
 
     Attributes:
         judge: takes what is seen.
-        send: sends an attack, and returns what became of it, whether the robot answered or not.
+        send: sends an attack, and returns what became of it.
         ask: sends the harmless request.
-        usual_ms: how long the robot takes for that.
+        usual_ms: how long the robot usually takes for that, ms.
         ids: the requirements that an attack is a case of.
-        troubles: how often the robot let a deadline pass or was slow afterwards. After three that is known.
-        with_canary: the attacks so far that name an address of the callback server, with what they are cases of.
-        tempted: when the last of them was answered, s of the monotonic clock.
+        troubles: how often the robot let a deadline pass or was slow afterwards; after three, no more attacks are sent.
+        with_canary: the attacks so far that name an address of the callback server, with their requirements.
+        tempted: when the response to the last of them came, s of the monotonic clock.
     """
 
     judge: Judge
@@ -58,7 +59,7 @@ class AttackRunner:
             self.troubles += 1
         verdict = attack_verdict(attack, attempt)
         for id_ in ids:
-            self.judge.check(id_, verdict.holds, attempt, verdict.expected, found=verdict.found, cause=verdict.cause)
+            expect(self.judge, id_, attempt).that(verdict.holds, verdict.expected, verdict.found, cause=verdict.cause)
         if attack.canary:
             self.with_canary.append((attack, attempt, ids))
             self.tempted = time.monotonic()
@@ -66,7 +67,7 @@ class AttackRunner:
         self.judge.at_risk = ()
 
     def _well(self, attack: Attack, attempt: Attempt) -> None:
-        """Ask the harmless request: one answer in time is enough, for a loaded machine is no attacked robot."""
+        """Send the harmless request; one response in time is enough, as the suite's machine may be loaded."""
         allowed = max(_ALWAYS_MS, _SLOWER * self.usual_ms)
         fastest = float("inf")
         for _ in range(_TRIES):
@@ -75,12 +76,10 @@ class AttackRunner:
                 break
         else:
             self.troubles += 1
-        self.judge.check(
-            "xml-security/responsive",
+        expect(self.judge, "xml-security/responsive", attempt).that(
             fastest <= allowed,
-            attempt,
-            f"an answer within {allowed:.0f} ms after {attack.what}",
-            found=f"{fastest:.0f} ms",
+            f"a response to a harmless request within {allowed:.0f} ms after {attack.what}",
+            f"a response after {fastest:.0f} ms",
             cause=f"slow after {attack.name}",
         )
 
@@ -92,21 +91,19 @@ def judge_calls(judge: Judge, callbacks: CallbackServer, runners: Sequence[Attac
         callbacks.settle(max(runner.tempted for runner in runners))
     for attack, exchange, ids in with_canary:
         for id_ in {"xml-security/no-callback": None, **dict.fromkeys(ids)}:
-            judge.check(
-                id_,
+            expect(judge, id_, exchange).that(
                 not callbacks.calls(attack.canary),
-                exchange,
-                f"no connection for {attack.what}",
-                found=f"the robot asked for {callbacks.url(attack.canary)}",
+                f"no request from the robot for {attack.what}",
+                f"a request from the robot for {callbacks.url(attack.canary)}",
                 cause=f"called for {attack.name}",
             )
 
 
 def outcome(send: Callable[[], Exchange]) -> Attempt:
-    """Send an attack; a connection that breaks is an outcome as well.
+    """Send an attack, and return what became of it; a connection that breaks is an outcome as well.
 
     Raises:
-        NoAnswerError: no connection came about.
+        NoAnswerError: no connection could be opened.
     """
     try:
         return send()

@@ -1,4 +1,4 @@
-"""What an attack's outcome says of a robot: refused, harmless, or a breach."""
+"""The verdict on one attack: refused, harmless, or a breach."""
 
 import re
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ _REFUSED: Final = 400
 
 @dataclass(frozen=True)
 class AttackVerdict:
-    """What became of an attack.
+    """The verdict on one attack.
 
     Attributes:
-        holds: whether the robot did no wrong.
-        expected: what was asked of it.
-        found: what came instead, where what came does not say it by itself.
-        cause: breaches of the same cause are one.
+        holds: whether the robot withstood it.
+        expected: what the requirement asks for, as a noun phrase.
+        found: what came instead, as a noun phrase; empty: status and media type of the response.
+        cause: breaches of the same cause are one finding.
     """
 
     holds: bool
@@ -30,17 +30,21 @@ class AttackVerdict:
 
 
 def attack_verdict(attack: Attack, attempt: Attempt) -> AttackVerdict:
-    """Judge one attack by its answer, or by there being none."""
-    expected = f"a refusal, or the connection closed, for {attack.what}" if attack.must_refuse else "an answer"
+    """Return the verdict on one attack by its response, or by the lack of one."""
+    expected = f"{'a refusal' if attack.must_refuse else 'a response'} or a closed connection for {attack.what}"
     if isinstance(attempt, Unanswered):
         return AttackVerdict(is_closed(attempt), expected)
     body = attempt.response.body
     leak = _LEAK.search(body)
     if leak:
-        found = f"the answer shows {ascii(leak[0][:60])[2:-1]!r}, of a file of the robot"
-        return AttackVerdict(holds=False, expected=f"no file in the answer to {attack.what}", found=found)
+        found = f"a response that shows {ascii(leak[0][:60])[2:-1]!r}, from a file of the robot"
+        return AttackVerdict(
+            holds=False, expected=f"a response without any file of the robot for {attack.what}", found=found
+        )
     if attack.name == "internal-entity" and MARK.encode() in body and MARK.encode() not in attack.body:
-        return AttackVerdict(holds=False, expected="an entity that is not expanded", found="the answer shows its text")
+        return AttackVerdict(
+            holds=False, expected="a response without the text of an entity", found="a response with that text"
+        )
     if not attack.must_refuse:
         return AttackVerdict(holds=True, expected=expected)
     answer = read_exchange(attempt)
@@ -49,5 +53,5 @@ def attack_verdict(attack: Attack, attempt: Attempt) -> AttackVerdict:
 
 
 def is_closed(attempt: Unanswered) -> bool:
-    """Whether the robot broke the connection off, be it in the middle of an answer, which is then malformed."""
+    """Return whether the robot closed the connection, also in the middle of a response, which is then malformed."""
     return attempt.kind is NoAnswer.CLOSED or "closed" in attempt.problem

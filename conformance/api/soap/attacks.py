@@ -62,7 +62,7 @@ class Template:
     value: str
 
     def filled(self, value: str | None = None, ignored: str = "", prolog: str = "") -> str:
-        """The document with something in its places, after a prolog."""
+        """Return the document with texts in its slots, after a prolog."""
         text = self.value if value is None else value
         # Without a place to pass over, what was meant for it stands in the value.
         if IGNORED_SLOT not in self.document:
@@ -70,12 +70,12 @@ class Template:
         return prolog + self.document.replace(VALUE_SLOT, text).replace(IGNORED_SLOT, ignored)
 
     def octets(self, value: str | None = None, ignored: str = "", prolog: str = "") -> bytes:
-        """As filled(), in UTF-8."""
+        """Return the document in UTF-8; as filled()."""
         return self.filled(value, ignored, prolog).encode()
 
 
 def attacks(template: Template, url: Callable[[str], str], each: int, place: str = "") -> Iterator[Attack]:
-    """The attacks on one document.
+    """Yield the attacks on one document.
 
     Args:
         template: the document.
@@ -183,7 +183,7 @@ def _inclusions(template: Template, url: Callable[[str], str]) -> Iterator[Attac
 
 
 def _with_attributes(template: Template, attributes: str) -> bytes:
-    """The document with attributes on its document element."""
+    """Return the document with attributes on its document element."""
     start = f"<{template.root}"
     return template.octets().replace(start.encode(), f"{start}{attributes}".encode(), 1)
 

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 import pytest
 
 from conformance.api.soap.service import SoapService
+from conformance.api.soap.valid_messages import example
 from conformance.contract.interfaces import Interface
+from conformance.documents.wsdl import Operation
+from conformance.documents.xml_node import Node
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
@@ -34,13 +37,13 @@ class SoapServices:
 
 
 def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
-    """The services that may be called, the one that only reads first.
+    """Return the services that may be called, the one that only reads first.
 
-    What was not allowed or does not answer is put down against those of the requirements that need it, so that they are
-    not passed on half of the evidence.
+    A service that may not be called, or does not respond, is recorded at the requirements that need it, so that they do
+    not pass on half of the evidence.
 
     Raises:
-        pytest.skip.Exception: none may be asked.
+        pytest.skip.Exception: no service may be called.
     """
     found: list[SoapService] = []
     reasons: list[str] = []
@@ -59,8 +62,21 @@ def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
     return found
 
 
+def accepted_messages(soap: SoapServices, service: SoapService, *ids: str) -> list[tuple[Operation, Node]]:
+    """Return each operation with a message that the robot accepts; where there is none, note it at the requirements.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    found = [(operation, example(service, operation)) for operation in service.contract.operations]
+    accepted = [(operation, message) for operation, message in found if message is not None]
+    for id_ in ids if not accepted else ():
+        soap.run.judge.note(id_, f"the {service.name} service accepted none of the messages tried")
+    return accepted
+
+
 def _problem(run: Run, service: SoapService) -> str:
-    """Why a service may not be called; empty where it may."""
+    """Return why a service may not be called; empty where it may."""
     if service.name == Interface.PUBLISHERS and not run.allow_motion:
         return _NO_MOTION
     if service.name in run.unreachable:
@@ -69,5 +85,5 @@ def _problem(run: Run, service: SoapService) -> str:
 
 
 def repetitions(effort: Effort, standard: int) -> int:
-    """How often to repeat what one time shows already, for the sake of failures that come now and then."""
+    """Return how often to repeat a request that one time would do for, to notice intermittent failures."""
     return max(1, round(standard * effort.factor))

@@ -36,12 +36,12 @@ class CallbackServer:
         self._socket.close()
 
     def url(self, canary: str) -> str:
-        """The URL that stands for ``canary``."""
+        """Return the URL that stands for ``canary``."""
         host = f"[{self.address[0]}]" if ":" in self.address[0] else self.address[0]
         return f"http://{host}:{self.address[1]}/{canary}"
 
     def calls(self, canary: str) -> int:
-        """How often the URL of ``canary`` has been asked for, or the address alone."""
+        """Return how often the robot requested the URL of ``canary``, or only connected."""
         return sum(1 for line in list(self._seen) if f"/{canary}" in line or line == "")
 
     def settle(self, since: float) -> None:
@@ -64,7 +64,7 @@ class CallbackServer:
 
 
 def _facing(host: str, port: int) -> str:
-    """The address of this machine on the way to the robot. Connecting a datagram socket sends nothing."""
+    """Return this machine's address on the way to the robot. Connecting a datagram socket sends nothing."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         with socket.socket(family, kind, protocol) as probe:

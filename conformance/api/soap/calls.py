@@ -1,18 +1,16 @@
 """Calling a service, and what its response comes to: accepted, refused, or neither."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from lxml import etree
+
+from conformance.api.expectation import Expectation
 from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, envelope, read
 from conformance.api.soap.service import SoapService
 from conformance.documents.xml_node import Node
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 _SHOWN = 200
 
@@ -72,7 +70,7 @@ class SoapResponse:
         return None if self.first is None else str(self.first.tag)
 
     def describe(self) -> str:
-        """What came, in words for a finding."""
+        """Return the response in words for a finding."""
         came = f"status {self.status}"
         if self.fault is not None:
             return f"{came}, fault {self.fault.code or '(no code)'}: {self.fault.string[:_SHOWN]!r}"
@@ -82,7 +80,7 @@ class SoapResponse:
 
 
 def read_exchange(exchange: Exchange) -> SoapResponse:
-    """What an exchange comes to."""
+    """Return the SOAP message in an exchange, or why there is none."""
     if not exchange.response.body:
         return SoapResponse(exchange, None, "an empty body")
     try:
@@ -113,6 +111,32 @@ def call(service: SoapService, *payload: Node, headers: tuple[Node, ...] | None 
     return send(service, envelope(payload, headers), **how)
 
 
+@dataclass(frozen=True)
+class SoapExpectation(Expectation):
+    """An expectation of a SOAP response; a finding describes the message in it.
+
+    Attributes:
+        answer: what the service answered.
+    """
+
+    answer: SoapResponse | None = None
+
+    def accepted(self, when: str) -> bool:
+        """Judge that the request was accepted: 2xx and a message without a fault."""
+        holds = self.answer is not None and self.answer.accepted
+        return self.that(holds, f"status 2xx with a SOAP message when {when}")
+
+    def fault(self, code: str, when: str, *, cause: str = "") -> bool:
+        """Judge that the response is a fault with a standard code."""
+        holds = self.answer is not None and self.answer.code == code
+        return self.that(holds, f"a fault with the code {code} when {when}", cause=cause)
+
+
+def expect_answer(judge: Judge, requirement: str, answer: SoapResponse) -> SoapExpectation:
+    """Return what a requirement expects of one SOAP response, to be judged by one of the methods."""
+    return SoapExpectation(judge, requirement, answer.exchange, answer.describe(), answer)
+
+
 def judge_answer(
     judge: Judge,
     requirement: str,
@@ -123,4 +147,4 @@ def judge_answer(
     cause: str = "",
 ) -> bool:
     """Judge one case by what a service answered, which a finding then describes; see Judge.check()."""
-    return judge.check(requirement, holds, answer.exchange, expected, found=answer.describe(), cause=cause)
+    return expect_answer(judge, requirement, answer).that(holds, expected, cause=cause)

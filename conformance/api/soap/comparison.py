@@ -9,7 +9,7 @@ from conformance.documents.xsd_shapes import Complex, Element, Simple
 
 
 def names(contract: Description, robot: Description) -> Iterator[str]:
-    """In which names the robot's description is another.
+    """Yield the names that differ between the robot's description and the contract's.
 
     Raises:
         DescriptionError: the robot's has no binding or no port type.
@@ -36,7 +36,7 @@ def _services(description: Description) -> set[str]:
 
 
 def operations(contract: Description, robot: Description) -> Iterator[str]:
-    """In which operations the robot's description is another.
+    """Yield the differences between the operations of the robot's description and of the contract's.
 
     Raises:
         DescriptionError: the robot's has no binding or no port type.
@@ -46,7 +46,7 @@ def operations(contract: Description, robot: Description) -> Iterator[str]:
     for wanted in contract.operations:
         found = there.get(wanted.name)
         if found is None:
-            yield f"there is no operation {wanted.name!r}"
+            yield f"no operation {wanted.name!r}"
             continue
         for what, here, other in (
             ("input element", wanted.request, found.request),
@@ -56,11 +56,11 @@ def operations(contract: Description, robot: Description) -> Iterator[str]:
             ("soapAction", actions[0].get(wanted.name), actions[1].get(wanted.name)),
         ):
             if here != other:
-                yield f"{wanted.name} has {what} {other or 'none'}, not {here or 'none'}"
+                yield f"{what} {other or '(none)'} of {wanted.name}, not {here or '(none)'}"
 
 
 def _soap_actions(description: Description) -> dict[str, str]:
-    """SoapAction by operation; left out is the same as empty (WSDL 1.1, 3.4)."""
+    """Return soapAction by operation; a missing one is the same as an empty one (WSDL 1.1, 3.4)."""
     found: dict[str, str] = {}
     for operation in description.binding.findall(clark(WSDL, "operation")):
         bound = operation.find(clark(WSDL_SOAP, "operation"))
@@ -70,7 +70,7 @@ def _soap_actions(description: Description) -> dict[str, str]:
 
 
 def actions(contract: Description, robot: Description) -> Iterator[str]:
-    """Which wsam:Action is none that the contract allows: as printed there, or with ``Request`` as JAX-WS RI has it."""
+    """Yield each wsam:Action that the contract does not allow: as printed, or with ``Request`` as JAX-WS RI has it."""
     there = {operation.name: operation for operation in robot.operations}
     for wanted in contract.operations:
         found = there.get(wanted.name)
@@ -85,11 +85,11 @@ def _action(
 ) -> Iterator[str]:
     allowed = [f"{wanted}{end}" for end in ends]
     if wanted is not None and found not in allowed:
-        yield f"{operation.name}: wsam:Action of the {side} is {found!r}, not {' or '.join(map(repr, allowed))}"
+        yield f"wsam:Action {found!r} of the {side} of {operation.name}, not {' or '.join(map(repr, allowed))}"
 
 
 def types(contract: Description, robot: Description) -> Iterator[str]:
-    """In which types of their messages the descriptions differ, element by element."""
+    """Yield the differences between the types of the messages, element by element."""
     for operation in contract.operations:
         for tag in (operation.request, operation.response):
             if tag is None:
@@ -98,42 +98,42 @@ def types(contract: Description, robot: Description) -> Iterator[str]:
             try:
                 found = robot.shape(tag)
             except SchemaError as error:
-                yield f"the schemas do not compile: {error}"
+                yield f"schemas that do not compile: {error}"
                 return
             if wanted is None:
                 continue
             if found is None:
-                yield f"no schema has the element {tag}"
+                yield f"no element {tag} in any schema"
             else:
                 yield from _element(wanted, found, local(tag))
 
 
 def _element(wanted: Element, found: Element, where: str) -> Iterator[str]:
     if wanted.tag != found.tag:
-        yield f"{where} is {found.tag!r}, not {wanted.tag!r}"
+        yield f"{found.tag!r} as {where}, not {wanted.tag!r}"
         return
     if (wanted.minimum, wanted.maximum) != (found.minimum, found.maximum):
-        yield f"{where} occurs {_often(found)}, not {_often(wanted)}"
+        yield f"{where} that occurs {_often(found)}, not {_often(wanted)}"
     if isinstance(wanted.type, Simple) or isinstance(found.type, Simple):
         yield from _simple(wanted.type, found.type, where)
         return
     here, there = wanted.children, found.children
     if [child.tag for child in here] != [child.tag for child in there]:
-        yield f"{where} holds {_listed(there)}, not {_listed(here)}"
+        yield f"{where} with {_listed(there)}, not {_listed(here)}"
         return
     if len(here) > 1 and _model(wanted.type) != _model(found.type):
-        yield f"{where} is a {_model(found.type)}, not a {_model(wanted.type)}"
+        yield f"{where} as a {_model(found.type)}, not a {_model(wanted.type)}"
     for one, other in zip(here, there, strict=True):
         yield from _element(one, other, f"{where}/{local(one.tag)}")
 
 
 def _simple(wanted: Simple | Complex, found: Simple | Complex, where: str) -> Iterator[str]:
     if not isinstance(wanted, Simple) or not isinstance(found, Simple):
-        yield f"{where} has {'a simple' if isinstance(found, Simple) else 'a complex'} type"
+        yield f"{where} with {'a simple' if isinstance(found, Simple) else 'a complex'} type"
     elif wanted.builtin != found.builtin:
-        yield f"{where} is of type {found.builtin}, not {wanted.builtin}"
+        yield f"{where} of type {found.builtin}, not {wanted.builtin}"
     elif wanted.enumeration and sorted(wanted.enumeration) != sorted(found.enumeration):
-        yield f"{where} takes {', '.join(found.enumeration) or 'anything'}, not {', '.join(wanted.enumeration)}"
+        yield f"{where} with the values {', '.join(found.enumeration) or '(any)'}, not {', '.join(wanted.enumeration)}"
 
 
 def _model(kind: Complex | Simple) -> str:
@@ -149,7 +149,7 @@ def _listed(elements: tuple[Element, ...]) -> str:
 
 
 def broken(robot: Description) -> str:
-    """Why a description cannot be compared; empty where it can."""
+    """Return why a description cannot be compared; empty where it can."""
     try:
         _ = robot.binding, robot.port_type
     except DescriptionError as error:

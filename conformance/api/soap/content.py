@@ -3,20 +3,17 @@
 The wrapper's child has a name in the contract (``return``), but what it holds is the content, whatever it is called.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from lxml import etree
 
 from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import local
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS
 from conformance.documents.xsd_shapes import Element, Simple
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 # XML Schema 1.0 Part 2, 3.2.5.1 without INF and NaN: those never leave a robot (contract, REST).
 _FLOAT: Final = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
@@ -25,12 +22,12 @@ _SHOWN: Final = 40
 
 
 def children_of(element: etree._Element, name: str) -> list[etree._Element]:
-    """Element children of a local name."""
+    """Return the element children of a local name."""
     return [child for child in elements(element) if local(str(child.tag)) == name]
 
 
 def content_of(wrapper: etree._Element, expected: Element) -> etree._Element | None:
-    """The element in a response wrapper that holds what the operation returns; None where there is none.
+    """Return the element in a response wrapper that holds what the operation returns; None where there is none.
 
     A message that has the parts of what is expected right in the wrapper is read as well.
     """
@@ -42,7 +39,7 @@ def content_of(wrapper: etree._Element, expected: Element) -> etree._Element | N
 
 
 def incomplete(element: etree._Element, expected: Element, where: str = "") -> Iterator[str]:
-    """What is missing in an element, or is no value of its type; nothing for a complete one.
+    """Yield what is missing in an element, or is no value of its type.
 
     Further elements of the robot's own are let be (contract, fine print).
     """
@@ -62,7 +59,7 @@ def incomplete(element: etree._Element, expected: Element, where: str = "") -> I
 
 
 def strings(element: etree._Element, expected: Element, where: str = "") -> Iterator[tuple[str, str]]:
-    """The path and the text of each string in an element."""
+    """Yield the path and the text of each string in an element."""
     if isinstance(expected.type, Simple):
         if expected.type.builtin == "string":
             yield where, text_of(element)
@@ -73,7 +70,7 @@ def strings(element: etree._Element, expected: Element, where: str = "") -> Iter
 
 
 def _repeated(element: etree._Element, child: Element) -> list[etree._Element]:
-    """The elements for a particle: beside each other, or within one of its name, as other writers lay out a list."""
+    """Return the elements for a particle: beside each other, or within one element of its name."""
     found = children_of(element, local(child.tag))
     if child.maximum != 1 and len(found) == 1:
         inside = elements(found[0])
@@ -100,7 +97,7 @@ def _beyond(value: int, kind: Simple) -> bool:
 
 
 def items(wrapper: etree._Element, expected: Element) -> list[etree._Element]:
-    """The items of a returned list: elements that have any of the children that ``expected`` has, wherever they are."""
+    """Return the items of a list: elements, at any depth, with any of the children of ``expected``."""
     names = {local(child.tag) for child in expected.children}
     found: list[etree._Element] = []
     for child in elements(wrapper):
@@ -112,7 +109,7 @@ def items(wrapper: etree._Element, expected: Element) -> list[etree._Element]:
 
 
 def find(element: etree._Element, names: Iterable[str]) -> etree._Element | None:
-    """The descendant at a path of local names, whose first step may be below elements of other names."""
+    """Return the descendant at a path of local names, whose first step may be below elements of other names."""
     path = list(names)
     for start in [element, *(item for item in element.iter() if isinstance(item.tag, str))]:
         here: etree._Element | None = start
@@ -125,13 +122,13 @@ def find(element: etree._Element, names: Iterable[str]) -> etree._Element | None
 
 
 def text_at(element: etree._Element, *names: str) -> str | None:
-    """The text at a path of local names (see find()), or None."""
+    """Return the text at a path of local names (see find()), or None."""
     found = find(element, names)
     return None if found is None else text_of(found).strip()
 
 
 def number_at(element: etree._Element, *names: str) -> float | None:
-    """The finite number at a path of local names (see find()), or None."""
+    """Return the finite number at a path of local names (see find()), or None."""
     text = text_at(element, *names)
     if text is None or not _FLOAT.fullmatch(text):
         return None

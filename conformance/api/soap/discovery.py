@@ -53,7 +53,7 @@ def open_service(
 
 
 def _located(published: PublishedWsdl, connection: Connection) -> str | None:
-    """Where a service is by its WSDL; None where a file does not say it."""
+    """Return the address of a service by its WSDL; None where a file does not name one."""
     address = soap_address(published.document) if published.document else None
     if published.url is None:
         return address if address and is_http(address) else None

@@ -1,17 +1,14 @@
 """SOAP 1.1 envelopes: made from body and header elements, and read from a robot's answers as frozen values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from lxml import etree
 
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
 from conformance.documents.xml_names import ENVELOPE, clark, local
 from conformance.documents.xml_node import Node
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 # A message that asks for nothing: whatever answers it handles SOAP, and does nothing.
 EMPTY: Final = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'
@@ -90,13 +87,13 @@ def read_root(root: etree._Element) -> Envelope:
         NotSoapError: it is no SOAP 1.1 envelope with a Body.
     """
     if root.tag != clark(ENVELOPE, "Envelope"):
-        raise NotSoapError(f"the document element is {root.tag}, not SOAP 1.1's Envelope")
+        raise NotSoapError(f"the root element {root.tag} instead of SOAP 1.1's Envelope")
     parts = elements(root)
     headers: list[etree._Element] = []
     if parts and parts[0].tag == clark(ENVELOPE, "Header"):
         headers = elements(parts.pop(0))
     if not parts or parts[0].tag != clark(ENVELOPE, "Body"):
-        raise NotSoapError(f"the Envelope has {parts[0].tag if parts else 'nothing'} where its Body should be")
+        raise NotSoapError(f"an Envelope with {parts[0].tag if parts else 'nothing'} in place of its Body")
     payload = tuple(elements(parts[0]))
     fault = _fault(payload[0]) if payload and payload[0].tag == clark(ENVELOPE, "Fault") else None
     return Envelope(root, tuple(headers), parts[0], payload, fault)

@@ -1,18 +1,14 @@
 """Strategies for the valid forms of simple types, over the whole range of each."""
 
-from __future__ import annotations
-
 import string
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
 
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS, STRINGS, bounds, plain
 from conformance.documents.xsd_shapes import Simple
-
-if TYPE_CHECKING:
-    from hypothesis.strategies import SearchStrategy
 
 # XML Schema 1.0 Part 2, 4.3.6: white space around a value is collapsed before it is read.
 _SPACES: Final = ("", " ", "\n\t ", "  ")
@@ -42,7 +38,7 @@ _CHARACTERS: Final = string.ascii_letters + string.digits + " _-./<>&'\"\u00e4\u
 
 
 def values(simple: Simple) -> SearchStrategy[str]:
-    """Valid forms of valid, finite values.
+    """Return a strategy for valid forms of valid, finite values.
 
     Where a facet's regular expression limits them there is one value only: what an expression means to two validators
     and a robot is no good ground for blame.
@@ -91,14 +87,14 @@ def _padded(numbers: SearchStrategy[Any], write: Callable[[Any, int], str]) -> S
 
 
 def written_integer(value: int, form: int) -> str:
-    """An integer in one of four forms: plain, signed, with leading zeros, with both (3.3.13.1)."""
+    """Return an integer in one of four forms: plain, signed, with leading zeros, with both (3.3.13.1)."""
     sign, digits = ("-" if value < 0 else ""), str(abs(value))
     plus = sign or "+"
     return (f"{sign}{digits}", f"{plus}{digits}", f"{sign}000{digits}", f"{plus}0{digits}")[form % 4]
 
 
 def written_float(value: float, form: int) -> str:
-    """A float in one of eight forms, each of exactly its value (3.2.5.1)."""
+    """Return a float in one of eight forms, each of exactly its value (3.2.5.1)."""
     written = repr(value)
     sign, size = ("-", written[1:]) if written.startswith("-") else ("", written)
     power = "e" in size

@@ -1,12 +1,10 @@
 """Messages made from a schema: an ordinary one, and strategies for all valid ones."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
 
 from conformance.api.soap import forms
 from conformance.documents import xsd_lexical as lexical
@@ -14,12 +12,9 @@ from conformance.documents.xml_names import local
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
 
-if TYPE_CHECKING:
-    from hypothesis.strategies import SearchStrategy
-
 
 def padded(document: bytes, octets: int) -> bytes:
-    """A document of so many octets: blanks before its last end tag are no part of what it says."""
+    """Return a document filled to so many octets with blanks before its last end tag."""
     end = document.rindex(b"</")
     return document[:end] + b" " * (octets - len(document)) + document[end:]
 
@@ -54,7 +49,7 @@ def _some(item: Element | Group, *, optional: bool) -> tuple[Node, ...]:
 
 
 def filled(element: Element, values: Mapping[str, str]) -> Node:
-    """A message of given values (text by the local name of its element), in the order of the schema.
+    """Return a message of given values (text by the local name of its element), in the order of the schema.
 
     Elements without a value are left out, and so are those that would be empty.
     """
@@ -64,7 +59,7 @@ def filled(element: Element, values: Mapping[str, str]) -> Node:
 
 
 def variants(element: Element, base: Node, fixed: frozenset[tuple[int, ...]] = frozenset()) -> SearchStrategy[Node]:
-    """Valid messages of the same structure as ``base``, with other values.
+    """Return a strategy for valid messages of the same structure as ``base``, with other values.
 
     Those at ``fixed`` paths are left as they are, because the contract limits them beyond the schema.
     """
@@ -82,12 +77,12 @@ def variants(element: Element, base: Node, fixed: frozenset[tuple[int, ...]] = f
 
 
 def with_text(node: Node, path: tuple[int, ...], text: str) -> Node:
-    """A copy of a message with another text at a path."""
+    """Return a copy of a message with another text at a path."""
     return node.replaced(path, replace(node.at(path), text=text))
 
 
 def declarations(element: Element, node: Node) -> list[tuple[tuple[int, ...], Element]]:
-    """The declaration of each descendant of a valid message, with its path; those that have none are left out."""
+    """Return path and declaration of each descendant of a valid message, if it has one."""
     found: list[tuple[tuple[int, ...], Element]] = []
     by_tag = {child.tag: child for child in element.children}
     for index, child in enumerate(node.children):
@@ -99,7 +94,7 @@ def declarations(element: Element, node: Node) -> list[tuple[tuple[int, ...], El
 
 
 def simple_leaves(element: Element, node: Node) -> list[tuple[tuple[int, ...], Simple]]:
-    """Paths of the values in a valid message, each with its type."""
+    """Return the paths of the values in a valid message, each with its type."""
     own = [((), element.type)] if isinstance(element.type, Simple) else []
     return own + [
         (path, declared.type) for path, declared in declarations(element, node) if isinstance(declared.type, Simple)
@@ -107,7 +102,7 @@ def simple_leaves(element: Element, node: Node) -> list[tuple[tuple[int, ...], S
 
 
 def sequences(element: Element, node: Node) -> list[tuple[int, ...]]:
-    """Paths of the elements of a message whose children have a fixed order."""
+    """Return the paths of the elements whose children have a fixed order."""
     found: list[tuple[int, ...]] = [()] if _is_sequence(element) else []
     return found + [path for path, declared in declarations(element, node) if _is_sequence(declared)]
 

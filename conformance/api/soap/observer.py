@@ -1,11 +1,13 @@
-"""Watches every SOAP answer of a run for what must hold of all of them, so that rare failures are seen as well."""
+"""The observer of SOAP: judges every response of a run, so that a failure in one of many is noticed."""
 
 import re
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from typing import Final
 
 from lxml import etree
 
+from conformance.api.expectation import expect
 from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, read_root
 from conformance.api.soap.service import SoapService
 from conformance.documents.traceback import inside_shown
@@ -24,6 +26,7 @@ _FAULT_CODES: Final = frozenset({"VersionMismatch", "MustUnderstand", "Client", 
 #: The namespace of SOAP 1.2, as its envelopes have it.
 _SOAP_12: Final = b"http://www.w3.org/2003/05/soap-envelope"
 _CHARSET: Final = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
+_UTF: Final = "UTF-8 or UTF-16"
 _DECLARED: Final = re.compile(rb"""\A(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 PASSIVE: Final = tuple(
     f"soap-basic-profile/{name}"
@@ -54,10 +57,10 @@ PASSIVE: Final = tuple(
 
 
 class SoapObserver(Listener):
-    """Judges every answer to a POST at one of the endpoints.
+    """Judges every response to a POST at one of the endpoints.
 
     Args:
-        judge: takes what is seen.
+        judge: takes the evidence.
         endpoints: URL of each service, with the tags of the elements that its responses may hold.
     """
 
@@ -66,149 +69,136 @@ class SoapObserver(Listener):
         self._endpoints = endpoints
 
     def answered(self, exchange: Exchange) -> None:
-        """Take an exchange, whatever it is."""
+        """Judge one exchange, if it is a call of one of the services."""
         request, response = exchange.request, exchange.response
         if request.method != "POST" or request.url not in self._endpoints or _SOAP_12 in request.body:
             # A node that has SOAP 1.2 as well answers a request of that version in it.
             return
-        self._that("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, exchange, "HTTP/1.1 or HTTP/1.0")
+        rules = _Rules(self._judge, exchange)
+        rules.judge("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, "HTTP/1.1 or HTTP/1.0")
         inside = inside_shown(response.body)
-        self._that(
-            "fault-no-traceback",
-            not inside,
-            exchange,
-            "an answer without a traceback",
-            lambda: f"the answer shows {inside!r}",
-        )
+        expected = "a response that shows nothing of the program"
+        rules.judge("fault-no-traceback", not inside, expected, lambda: f"{inside!r} in the response")
         if response.body:
-            self._document(exchange, response, self._endpoints[request.url])
+            _judge_document(rules, response, self._endpoints[request.url])
 
-    def _document(self, exchange: Exchange, response: Response, answers: Collection[str]) -> None:
-        claims_xml = response.media_type == "text/xml"
-        encoding = _encoding(response)
-        try:
-            root = parse(response.body, doctype=True)
-        except NotXmlError as error:
-            problem = str(error)
-            if claims_xml:
-                self._that(
-                    "R1012", encoding in _ENCODINGS, exchange, "UTF-8 or UTF-16", lambda: f"it says {encoding!r}"
-                )
-            self._that(
-                "content-type",
-                not (response.ok or claims_xml),
-                exchange,
-                "a SOAP message as text/xml",
-                lambda: f"{exchange.came}, and the body is {problem}",
-            )
-            return
-        if local(str(root.tag)) != "Envelope":
-            # An HTML page or a problem document with 4xx is no SOAP answer, and none is asked for there.
-            self._that(
-                "content-type",
-                not response.ok,
-                exchange,
-                "a SOAP message",
-                lambda: f"{exchange.came}, and a document that begins with {root.tag}",
-            )
-            return
-        self._message(exchange, response, root, answers, encoding)
 
-    def _message(
-        self, exchange: Exchange, response: Response, root: etree._Element, answers: Collection[str], encoding: str
-    ) -> None:
-        that = self._that
-        once = not response.repeated("Content-Type")
-        that("content-type", response.media_type == "text/xml" and once, exchange, "text/xml", lambda: _type(response))
-        that("R1012", encoding in _ENCODINGS, exchange, "UTF-8 or UTF-16", lambda: f"the encoding {encoding!r}")
-        that("R1018", _fits(response), exchange, "a charset that is the body's", lambda: _type(response))
-        that("R1008", not has_doctype(root), exchange, "no DOCTYPE", lambda: "a DOCTYPE")
-        that("R1009", not _has_instruction(root), exchange, "no processing instruction", lambda: "one")
-        try:
-            message = read_root(root)
-        except NotSoapError as error:
-            problem = str(error)
-            that("R2712", holds=False, exchange=exchange, expected="a SOAP 1.1 message", found=lambda: problem)
-            return
-        after = elements(root)[elements(root).index(message.body) + 1 :]
-        that("R1011", not after, exchange, "nothing after Body", lambda: f"{after[0].tag} after it")
-        self._encoding_styles(exchange, message)
-        bare = [str(child.tag) for child in message.payload if not namespace(str(child.tag))]
-        that("R1014", not bare, exchange, "qualified children of Body", lambda: f"{bare[0]!r} in no namespace")
-        odd = [value for block in message.headers if (value := block.get(_MUST_UNDERSTAND)) not in {None, "0", "1"}]
-        that("R1013", not odd, exchange, "mustUnderstand 0 or 1", lambda: f"mustUnderstand={odd[0]!r}")
-        if message.fault is not None:
-            self._fault(exchange, response, message.fault)
-            return
-        that("R1124", response.ok, exchange, "2xx for a response without a fault")
-        that("R1111", response.status == 200, exchange, "200 for a response without a fault")  # noqa: PLR2004 - R1111
-        tag = str(message.first.tag) if message.first is not None else "nothing"
-        that(
-            "R2712",
-            tag in answers and len(message.payload) == 1,
-            exchange,
-            "the response element of an operation, alone in the Body",
-            lambda: f"{len(message.payload)} children, first {tag}",
-        )
+@dataclass(frozen=True)
+class _Rules:
+    """The rules for one SOAP response."""
 
-    def _encoding_styles(self, exchange: Exchange, message: Envelope) -> None:
-        soap = [
-            str(element.tag)
-            for element in message.root.iter()
-            if isinstance(element.tag, str) and namespace(element.tag) == ENVELOPE and element.get(_ENCODING_STYLE)
-        ]
-        self._that("R1005", not soap, exchange, "no encodingStyle", lambda: f"one on {soap[0]}")
-        inside = [str(child.tag) for child in message.payload if child.get(_ENCODING_STYLE) is not None]
-        self._that("R1006", not inside, exchange, "no encodingStyle in Body", lambda: f"one on {inside[0]}")
+    judging: Judge
+    exchange: Exchange
 
-    def _fault(self, exchange: Exchange, response: Response, fault: Fault) -> None:
-        that = self._that
-        that("R1126", response.status == 500, exchange, "status 500 with a fault")  # noqa: PLR2004 - R1126
-        odd = [tag for tag in fault.names if local(tag) not in _FAULT_CHILDREN]
-        that("R1000", not odd, exchange, "only faultcode, faultstring, faultactor, detail", lambda: f"{odd[0]}")
-        spaced = [tag for tag in fault.names if namespace(tag)]
-        that("R1001", not spaced, exchange, "unqualified children of Fault", lambda: f"{spaced[0]}")
-        there = {local(tag) for tag in fault.names}
-        that(
-            "fault-complete",
-            {"faultcode", "faultstring"} <= there and bool(fault.code),
-            exchange,
-            "faultcode and faultstring",
-            lambda: f"only {', '.join(sorted(there)) or 'nothing'}" if fault.code else "an empty or missing faultcode",
-        )
-        if "faultcode" not in there:
-            return
-        that(
-            "faultcode-qualified",
-            bool(fault.code_namespace),
-            exchange,
-            "a faultcode with a prefix that is bound",
-            lambda: f"faultcode {fault.code!r} with no namespace",
-        )
-        if not fault.code_namespace:
-            return
-        that(
-            "R1004",
-            fault.code_namespace != ENVELOPE or fault.code in _FAULT_CODES,
-            exchange,
-            "one of SOAP's fault codes, or one of its own namespace",
-            lambda: f"{fault.code!r} in SOAP's namespace",
-        )
-
-    def _that(
+    def judge(
         self,
         name: str,
         holds: bool,  # noqa: FBT001 - as Judge.check()
-        exchange: Exchange,
         expected: str,
-        found: Callable[[], str] | None = None,
+        got: Callable[[], str] = str,
     ) -> None:
-        text = found() if found is not None and not holds else ""
-        self._judge.check(f"soap-basic-profile/{name}", holds, exchange, expected, found=text)
+        """Judge one rule; ``got`` is called only where it is broken."""
+        id_ = f"soap-basic-profile/{name}"
+        expect(self.judging, id_, self.exchange).that(holds, expected, "" if holds else got())
+
+
+def _judge_document(rules: _Rules, response: Response, answers: Collection[str]) -> None:
+    is_text_xml = response.media_type == "text/xml"
+    encoding = _encoding(response)
+    try:
+        root = parse(response.body, doctype=True)
+    except NotXmlError as error:
+        problem = str(error)
+        if is_text_xml:
+            rules.judge("R1012", encoding in _ENCODINGS, _UTF, lambda: f"the encoding {encoding!r}")
+        is_other = not (response.ok or is_text_xml)
+        rules.judge("content-type", is_other, "a SOAP message as text/xml", lambda: f"a body that is {problem}")
+        return
+    if local(str(root.tag)) != "Envelope":
+        # An HTML page or a problem document with 4xx is no SOAP response, and none is required there.
+        rules.judge("content-type", not response.ok, "a SOAP message", lambda: f"the root element {root.tag}")
+        return
+    _judge_message(rules, response, root, answers, encoding)
+
+
+def _judge_message(
+    rules: _Rules, response: Response, root: etree._Element, answers: Collection[str], encoding: str
+) -> None:
+    judge = rules.judge
+    once = not response.repeated("Content-Type")
+    judge("content-type", response.media_type == "text/xml" and once, "Content-Type: text/xml", lambda: _type(response))
+    judge("R1012", encoding in _ENCODINGS, _UTF, lambda: f"the encoding {encoding!r}")
+    judge("R1018", _fits(response), "the charset of the body in Content-Type", lambda: _type(response))
+    judge("R1008", not has_doctype(root), "a message without DOCTYPE", lambda: "a message with a DOCTYPE")
+    is_plain = not _has_instruction(root)
+    judge("R1009", is_plain, "a message without processing instructions", lambda: "a processing instruction")
+    try:
+        message = read_root(root)
+    except NotSoapError as error:
+        problem = str(error)
+        judge("R2712", holds=False, expected="a SOAP 1.1 message", got=lambda: problem)
+        return
+    after = elements(root)[elements(root).index(message.body) + 1 :]
+    judge("R1011", not after, "no element after Body", lambda: f"{after[0].tag} after Body")
+    _judge_encoding_styles(rules, message)
+    bare = [str(child.tag) for child in message.payload if not namespace(str(child.tag))]
+    judge("R1014", not bare, "children of Body with a namespace", lambda: f"{bare[0]!r} without a namespace")
+    odd = [value for block in message.headers if (value := block.get(_MUST_UNDERSTAND)) not in {None, "0", "1"}]
+    judge("R1013", not odd, 'mustUnderstand="0" or "1"', lambda: f"mustUnderstand={odd[0]!r}")
+    if message.fault is not None:
+        _judge_fault(rules, response, message.fault)
+        return
+    judge("R1124", response.ok, "status 2xx for a message without a fault")
+    judge("R1111", response.status == 200, "status 200 for a message without a fault")  # noqa: PLR2004 - R1111
+    tag = str(message.first.tag) if message.first is not None else "none"
+    judge(
+        "R2712",
+        tag in answers and len(message.payload) == 1,
+        "the response element of an operation, alone in the Body",
+        lambda: f"{len(message.payload)} children of the Body, the first {tag}",
+    )
+
+
+def _judge_encoding_styles(rules: _Rules, message: Envelope) -> None:
+    soap = [
+        str(element.tag)
+        for element in message.root.iter()
+        if isinstance(element.tag, str) and namespace(element.tag) == ENVELOPE and element.get(_ENCODING_STYLE)
+    ]
+    rules.judge("R1005", not soap, "no encodingStyle on SOAP's elements", lambda: f"encodingStyle on {soap[0]}")
+    inside = [str(child.tag) for child in message.payload if child.get(_ENCODING_STYLE) is not None]
+    rules.judge("R1006", not inside, "no encodingStyle in Body", lambda: f"encodingStyle on {inside[0]}")
+
+
+def _judge_fault(rules: _Rules, response: Response, fault: Fault) -> None:
+    judge = rules.judge
+    judge("R1126", response.status == 500, "status 500 with a fault")  # noqa: PLR2004 - R1126
+    odd = [tag for tag in fault.names if local(tag) not in _FAULT_CHILDREN]
+    expected = "no other children of Fault than faultcode, faultstring, faultactor and detail"
+    judge("R1000", not odd, expected, lambda: f"the child {odd[0]}")
+    spaced = [tag for tag in fault.names if namespace(tag)]
+    judge("R1001", not spaced, "children of Fault without a namespace", lambda: f"the child {spaced[0]}")
+    there = {local(tag) for tag in fault.names}
+    judge(
+        "fault-complete",
+        {"faultcode", "faultstring"} <= there and bool(fault.code),
+        "a faultcode and a faultstring",
+        lambda: (
+            f"only {', '.join(sorted(there)) or 'an empty Fault'}" if fault.code else "an empty or missing faultcode"
+        ),
+    )
+    if "faultcode" not in there:
+        return
+    bound = "a faultcode whose prefix is bound"
+    judge("faultcode-qualified", bool(fault.code_namespace), bound, lambda: f"{fault.code!r} without a namespace")
+    if fault.code_namespace:
+        is_standard = fault.code_namespace != ENVELOPE or fault.code in _FAULT_CODES
+        expected = "one of SOAP's fault codes, or a fault code in a namespace of its own"
+        judge("R1004", is_standard, expected, lambda: f"{fault.code!r} in SOAP's namespace")
 
 
 def _encoding(response: Response) -> str:
-    """The character encoding that an answer says it has: Content-Type's word outranks the document's (RFC 7303 3.2)."""
+    """Return the character encoding that a response names: Content-Type outranks the document (RFC 7303 3.2)."""
     charset = _CHARSET.search(response.header("content-type") or "")
     if charset:
         return charset[1].lower()
@@ -217,7 +207,7 @@ def _encoding(response: Response) -> str:
 
 
 def _fits(response: Response) -> bool:
-    """Whether the body is in the character encoding that Content-Type names; R1012 judges others than UTF-8 and -16."""
+    """Return whether the body is in the encoding that Content-Type names; R1012 judges others than UTF-8 and -16."""
     charset = _CHARSET.search(response.header("content-type") or "")
     if charset is None or charset[1].lower() not in _ENCODINGS:
         return True
@@ -238,7 +228,7 @@ def _type(response: Response) -> str:
 
 
 def answers_of(service: SoapService) -> frozenset[str]:
-    """Tags of the elements with which the operations of a service answer, by the contract and by the robot's word."""
+    """Return the tags of the response elements of a service, by the contract and by the robot's own description."""
     described = [service.own] if service.own is not None else []
     if service.contract_wsdl_path is not None:
         described.append(service.contract)

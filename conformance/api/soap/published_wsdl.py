@@ -35,7 +35,7 @@ class PublishedWsdl:
         return self.source if self.source is not None and "://" in self.source else None
 
     def interpreted(self, beside: str, connection: Connection) -> tuple[Description | None, str]:
-        """What it says, and why that cannot be read (one of the two).
+        """Return the description, or why it cannot be read.
 
         A WSDL from a file may refer to documents on the robot, which are looked for ``beside`` the service.
         """
@@ -51,7 +51,7 @@ class PublishedWsdl:
 
 
 def get(url: str, connection: Connection, *, timeout_s: float | None = None) -> Exchange:
-    """GET a URL over a connection of its own.
+    """Send GET for a URL over a connection of its own, and return the exchange.
 
     Raises:
         NoAnswerError: no HTTP response came.
@@ -62,7 +62,7 @@ def get(url: str, connection: Connection, *, timeout_s: float | None = None) -> 
 
 
 def obtain(name: str, source: str | None, connection: Connection) -> PublishedWsdl:
-    """The WSDL at a URL or in a file.
+    """Read the WSDL at a URL or in a file.
 
     Raises:
         StatementError: the file cannot be read.
@@ -79,12 +79,12 @@ def obtain(name: str, source: str | None, connection: Connection) -> PublishedWs
     except NoAnswerError as none:
         return PublishedWsdl(source, None, str(none), none.unanswered)
     if exchange.response.status != _OK:
-        return PublishedWsdl(source, None, f"GET {source} is answered with {exchange.came}", exchange)
+        return PublishedWsdl(source, None, f"{exchange.came} for GET {source}", exchange)
     return PublishedWsdl(source, exchange.response.body, "", exchange)
 
 
 def fetch(location: str, robot: str, connection: Connection) -> bytes:
-    """A document at a resolved location that a WSDL refers to: a file, else from the robot and no other host.
+    """Read a document that a WSDL refers to, at its resolved location: a file, or from the robot and no other host.
 
     A robot behind a proxy or another name writes locations with its own; the same path is asked for at the URL
     ``robot``.
@@ -100,5 +100,5 @@ def fetch(location: str, robot: str, connection: Connection) -> bytes:
     except NoAnswerError as none:
         raise OSError(str(none)) from none
     if exchange.response.status != _OK:
-        raise OSError(f"GET {path} is answered with {exchange.came}")
+        raise OSError(f"{exchange.came} for GET {path}")
     return exchange.response.body

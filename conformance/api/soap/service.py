@@ -78,7 +78,7 @@ class SoapService:
         return self.client.send("POST", self.path, headers=fields, body=body, fresh=fresh, timeout_s=timeout_s)
 
     def apart(self) -> SoapService:
-        """The same service through a client of its own.
+        """Return the same service with a client of its own.
 
         A client no longer asks an endpoint that let deadlines pass. Messages on which a robot may wait for more are
         sent apart, so that they do not silence the rest.
@@ -118,7 +118,7 @@ class SoapService:
         return self.own if self.own is not None and not next(faults(self.own), "") else self.contract
 
     def fetch(self, location: str) -> bytes:
-        """A document that the robot's WSDL refers to.
+        """Read a document that the robot's WSDL refers to.
 
         Raises:
             OSError: it cannot be had.

@@ -1,6 +1,6 @@
-"""Messages that a robot takes: what mutations start from, and what shows that it still answers.
+"""Messages that a robot accepts: mutations start from them, and they show that it still responds.
 
-A contract may limit values beyond its schema. So a message is not believed to be valid before the robot has taken it.
+A contract may limit values beyond its schema. So a message counts as accepted only after the robot has accepted it.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ _NUMBERS: Final = (0, 1, 2, 3, 4, 5)
 
 
 def require_valid_message(service: SoapService, message: Node) -> Node:
-    """See that a message which is to be sent as a valid one is valid by the contract, and give it back.
+    """Check that a message which the suite sends as a valid one is valid by the contract, and return it.
 
     Raises:
         HarnessError: it is not; the message says why.
@@ -37,7 +37,7 @@ def require_valid_message(service: SoapService, message: Node) -> Node:
 
 
 def require_valid_document(service: SoapService, document: bytes | str) -> bytes:
-    """See that octets which are to be sent as a valid message are one by the contract, and give them back.
+    """Check that octets which the suite sends as a valid message are one by the contract, and return them.
 
     Raises:
         HarnessError: they are not; the message says why.
@@ -67,7 +67,7 @@ def call_valid(service: SoapService, payload: Node, *, headers: tuple[Node, ...]
 
 
 def example(service: SoapService, operation: Operation) -> Node | None:
-    """A message that the robot takes for the operation, found once; None where it takes none of those tried.
+    """Return a message that the robot accepts for the operation; the first call tries several, and sends them.
 
     Raises:
         NoAnswerError: no HTTP response came.
@@ -101,7 +101,7 @@ def _found(service: SoapService, operation: Operation) -> Node | None:
 
 
 def candidates(service: SoapService, operation: Operation, declared: Element) -> Iterator[Node]:
-    """Messages of an operation to try, likeliest first, at least one.
+    """Yield messages of an operation to try, likeliest first, at least one.
 
     Raises:
         NoAnswerError: no HTTP response came.
@@ -122,7 +122,7 @@ def candidates(service: SoapService, operation: Operation, declared: Element) ->
 
 
 def quiet_example(service: SoapService) -> tuple[Operation, Node] | None:
-    """The first operation of the service with a message that the robot takes; None where there is none.
+    """Return the first operation with a message that the robot accepts; None where there is none.
 
     Raises:
         NoAnswerError: no HTTP response came.
@@ -142,7 +142,7 @@ def _size(service: SoapService, operation: Operation) -> int:
 
 
 def typed(message: Node, declared: Element, payload: Node) -> bytes:
-    """A message in which each value of the payload says its type by xsi:type, as RPC-encoded SOAP did."""
+    """Return a message in which each value of the payload has xsi:type, as in RPC-encoded SOAP."""
     made = payload
     for path, simple in simple_leaves(declared, payload):
         if path:

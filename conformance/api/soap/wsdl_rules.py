@@ -1,18 +1,15 @@
-"""Rules of the Basic Profile 1.1 for descriptions, each a function that tells what breaks it, under its id."""
-
-from __future__ import annotations
+"""Rules of the Basic Profile 1.1 for descriptions: each function yields what breaks the rule that it is named after."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from lxml import etree
 
 from conformance.documents.wsdl import Description, name, qname
 from conformance.documents.xml import elements
 from conformance.documents.xml_names import WSDL, WSDL_SOAP, XSD, clark, local, namespace
 from conformance.documents.xsd import SchemaError
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 _HTTP: Final = "http://schemas.xmlsoap.org/soap/http"
 _ENCODINGS: Final = frozenset({"UTF-8", "UTF-16", "UTF-16LE", "UTF-16BE", "US-ASCII", "ASCII"})
@@ -49,7 +46,7 @@ _ORDER: Final = {"import": 0, "types": 1}
 def r2003(description: Description) -> Iterator[str]:
     """Types with XML Schema, and xsd:import only inside xsd:schema."""
     if not description.schemas:
-        yield "there is no xsd:schema in wsdl:types"
+        yield "no xsd:schema in wsdl:types"
     for element in description.all(".//*"):
         parent = element.getparent()
         if element.tag == clark(XSD, "import") and parent is not None and parent.tag != clark(XSD, "schema"):
@@ -61,7 +58,7 @@ def r2028(description: Description) -> Iterator[str]:
     for root in description.definitions:
         ranks = [_ORDER.get(local(str(child.tag)), 2) for child in elements(root) if _is_part(child)]
         if ranks != sorted(ranks):
-            yield "wsdl:import comes first, then wsdl:types, then the rest"
+            yield "an order other than wsdl:import, wsdl:types and then the rest"
         for element in root.iter():
             if isinstance(element.tag, str) and namespace(element.tag) == WSDL:
                 yield from _structure(element)
@@ -76,7 +73,7 @@ def _structure(element: etree._Element) -> Iterator[str]:
     if kind == "documentation":
         return
     if kind not in _CHILDREN:
-        yield f"there is no wsdl:{kind} in WSDL 1.1"
+        yield f"a wsdl:{kind}, which WSDL 1.1 does not have"
         return
     for attribute in _ATTRIBUTES.get(kind, ()):
         if not element.get(attribute):
@@ -122,7 +119,7 @@ def r2201(description: Description) -> Iterator[str]:
         named = body.get("parts")
         count = len(named.split()) if named is not None else len(message.findall(clark(WSDL, "part")))
         if count > 1:
-            yield f"{operation}: {count} parts in one soap:body"
+            yield f"{count} parts in one soap:body of {operation}"
 
 
 def r2204(description: Description) -> Iterator[str]:
@@ -130,21 +127,21 @@ def r2204(description: Description) -> Iterator[str]:
     for _, operation, message in _bodies(description):
         for part in message.findall(clark(WSDL, "part")):
             if not part.get("element"):
-                yield f"{operation}: part {name(part)!r} of {name(message)} has no element"
+                yield f"part {name(part)!r} of {name(message)} without element, for {operation}"
 
 
 def r2206(description: Description) -> Iterator[str]:
     """A type or an element, which is a global one that exists."""
     for part in description.all("w:message/w:part"):
         if bool(part.get("element")) == bool(part.get("type")):
-            yield f"part {name(part)!r} has {'both' if part.get('type') else 'neither'} type and element"
+            yield f"part {name(part)!r} with {'both' if part.get('type') else 'neither'} type and element"
         elif part.get("element"):
             tag = qname(part, part.get("element"))
             try:
                 if tag is None or description.shape(tag) is None:
-                    yield f"part {name(part)!r} refers to {part.get('element')!r}, which no schema has"
+                    yield f"part {name(part)!r} with the element {part.get('element')!r}, which no schema has"
             except SchemaError as error:
-                yield f"the schemas do not compile: {error}"
+                yield f"schemas that do not compile: {error}"
                 return
 
 
@@ -152,13 +149,15 @@ def r2304(description: Description) -> Iterator[str]:
     """Operations of different names."""
     for port_type in description.all("w:portType"):
         counted = Counter(name(operation) for operation in port_type.findall(clark(WSDL, "operation")))
-        yield from (f"{operation!r} stands {count} times" for operation, count in counted.items() if count > 1)
+        yield from (
+            f"{count} operations of the name {operation!r}" for operation, count in counted.items() if count > 1
+        )
 
 
 def r2401(description: Description) -> Iterator[str]:
     """A soap:binding of WSDL 1.1."""
     if not description.all("w:binding[s:binding]"):
-        yield "no wsdl:binding has a soap:binding"
+        yield "no wsdl:binding with a soap:binding"
 
 
 def r2701(description: Description) -> Iterator[str]:
@@ -199,7 +198,9 @@ def r2706(description: Description) -> Iterator[str]:
 def r2710(description: Description) -> Iterator[str]:
     """Different elements in the Body for different operations."""
     counted = Counter(operation.request for operation in description.operations)
-    yield from (f"{count} operations are asked for by {tag}" for tag, count in counted.items() if count > 1)
+    yield from (
+        f"{count} operations with the same request element {tag}" for tag, count in counted.items() if count > 1
+    )
 
 
 def r2716(description: Description) -> Iterator[str]:
@@ -220,7 +221,7 @@ def r2718(description: Description) -> Iterator[str]:
         )
         bound = Counter(name(item) for item in binding.findall(clark(WSDL, "operation")))
         if wanted != bound:
-            yield f"{name(binding)} binds {', '.join(sorted(bound)) or 'nothing'}, not {', '.join(sorted(wanted))}"
+            yield f"{name(binding)} with {', '.join(sorted(bound)) or 'nothing'}, not {', '.join(sorted(wanted))}"
 
 
 def r2801(description: Description) -> Iterator[str]:
@@ -232,7 +233,7 @@ def r2801(description: Description) -> Iterator[str]:
     try:
         _ = description.types
     except SchemaError as error:
-        yield f"the schemas do not compile: {error}"
+        yield f"schemas that do not compile: {error}"
 
 
 def r4003(description: Description) -> Iterator[str]:

@@ -1,18 +1,14 @@
 """One message in many styles: what XML and its namespaces let a writer choose, and a reader must not care about."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 from xml.sax.saxutils import escape
 
 from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
 
 from conformance.documents.xml_names import ENVELOPE, XSI, clark, local, namespace
 from conformance.documents.xml_node import Node
-
-if TYPE_CHECKING:
-    from hypothesis.strategies import SearchStrategy
 
 DECLARATIONS: Final = (
     "",
@@ -60,7 +56,7 @@ class XmlStyle:
 
 
 def single_changes() -> tuple[tuple[str, XmlStyle], ...]:
-    """Styles that differ from the plain one in one choice each, with a name for the choice."""
+    """Return styles that differ from the plain one in one choice each, with a name for the choice."""
     return (
         ("plain", XmlStyle()),
         ("other prefixes", XmlStyle(envelope_prefix="S", payload_prefix="a")),
@@ -81,13 +77,13 @@ def single_changes() -> tuple[tuple[str, XmlStyle], ...]:
 
 
 def value_styles() -> tuple[XmlStyle, ...]:
-    """Styles by which a reader may mistake a value, and then all others."""
+    """Return the styles, those first by which a reader may mistake a value."""
     styles = [style for _, style in single_changes()]
     return tuple(sorted(styles, key=lambda style: style.text == "plain"))
 
 
 def xml_styles() -> SearchStrategy[XmlStyle]:
-    """Any combination of choices."""
+    """Return a strategy for any combination of choices."""
     return st.builds(
         XmlStyle,
         envelope_prefix=st.sampled_from(("", *_PREFIXES)),
@@ -111,7 +107,7 @@ class _Writer:
     prefixes: dict[str, str] = field(default_factory=dict)
 
     def prefix(self, space: str) -> str:
-        """The prefix of a namespace; the same one wherever it is asked for."""
+        """Return the prefix of a namespace; the same one wherever it is asked for."""
         if space not in self.prefixes:
             given = self.style.envelope_prefix if space == ENVELOPE else self.style.payload_prefix
             number = sum(1 for other in self.prefixes if other != ENVELOPE)
@@ -162,7 +158,7 @@ class _Writer:
         return made
 
     def _attribute(self, key: str, scope: dict[str, str], made: list[str]) -> str:
-        """The name of an attribute; a qualified one needs a prefix, whatever the default namespace is."""
+        """Return the name of an attribute; a qualified one needs a prefix, whatever the default namespace is."""
         space = namespace(key)
         if not space:
             return key

@@ -38,7 +38,7 @@ class _Transport(Transport):
         self.last: Exchange | None = None
 
     def load(self, url: str) -> bytes:
-        """A document of the description."""
+        """Return a document of the description."""
         published = self._service.published
         if published.document is not None and url == published.source:
             return published.document

@@ -1,10 +1,11 @@
-"""/openapi.json: served, valid, the contract's operations in it, and all of them there (contract, describe)."""
+"""/openapi.json: served, valid, complete, and true (contract, describe)."""
 
 from functools import lru_cache
 from typing import Any
 
 import pytest
 
+from conformance.api.expectation import expect
 from conformance.api.rest.calls import example_call
 from conformance.api.rest.description import Described, described_by_openapi, differences
 from conformance.api.rest.interface import RestInterface
@@ -22,49 +23,44 @@ _BEHAVIOUR = "describe/openapi-behaviour"
 
 
 def _document(rest: HttpClient) -> tuple[Any, Exchange, str]:
-    """The description, the exchange that brought it, and what is wrong with it."""
+    """Return the description, the exchange that brought it, and what is wrong with it."""
     exchange = rest.send("GET", _PATH, headers=[("Accept", "application/json")])
     answer = exchange.response
     if answer.status != 200:
         return None, exchange, exchange.came
     if "json" not in answer.media_type:
-        return None, exchange, f"it is sent as {answer.media_type or 'no media type'}"
+        return None, exchange, "another media type than JSON"
     value, fault = _read(answer.body)
     return value, exchange, fault
 
 
 @lru_cache(maxsize=2)
 def _read(body: bytes) -> tuple[Any, str]:
-    """What a description holds and what is wrong with it; three checks look at the same one."""
+    """Return a description and what is wrong with it; three checks look at the same one."""
     text = read_json(body)
     return text.value, text.problem or openapi_fault(text.value)
 
 
 @pytest.mark.requirement("describe/openapi")
 def test_openapi_is_served(rest: HttpClient, judge: Judge) -> None:
-    """It is there, it is JSON, and it is a valid description by the schema of its version."""
+    """Get the description: it is there, it is JSON, and it is valid by the schema of its version."""
     _, exchange, fault = _document(rest)
-    judge.check("describe/openapi", not fault, exchange, "200 with a valid OpenAPI 3 description", found=fault)
+    expect(judge, "describe/openapi", exchange).that(not fault, "status 200 with a valid OpenAPI 3 description", fault)
 
 
 @pytest.mark.requirement("describe/openapi-operations")
 def test_openapi_has_the_operations(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """It names the paths, methods and parameters of the contract; more is allowed, optional ones may be missing."""
+    """Compare the description's paths, methods and parameters with the contract's; it may have more of them."""
     document, exchange, fault = _document(rest)
     found = [] if document is None else described_by_openapi(document, rest.base_url)
     missing = [fault] if document is None else differences(operations_of(api.run.contract), found)
-    judge.check(
-        "describe/openapi-operations",
-        not missing,
-        exchange,
-        "the paths, methods and parameters of the contract",
-        found="; ".join(missing[:3]),
-    )
+    expected = "a description with the paths, methods and parameters of the contract"
+    expect(judge, "describe/openapi-operations", exchange).that(not missing, expected, "; ".join(missing[:3]))
 
 
 @pytest.mark.requirement(_BEHAVIOUR)
 def test_what_is_described_is_there(api: RestInterface, rest: HttpClient) -> None:
-    """A request made from each operation of the description, and of the contract, is not answered 404 or 405."""
+    """Send a request for each operation of the description and of the contract: it does not get 404 or 405."""
     for operation in operations_of(api.run.contract):
         if not operation.optional:
             judge_there(api, _BEHAVIOUR, example_call(api, operation))

@@ -2,6 +2,7 @@
 
 import pytest
 
+from conformance.api.expectation import expect
 from conformance.api.rest.calls import example_call
 from conformance.api.rest.description import Described, described_by_wadl, differences
 from conformance.api.rest.interface import RestInterface
@@ -22,7 +23,7 @@ _MEDIA_TYPES = {"application/vnd.sun.wadl+xml", "application/wadl+xml", "applica
 
 
 def _without(api: RestInterface) -> bool:
-    """Say that nothing is asked of a robot whose contract has no WADL."""
+    """Return whether the contract has no WADL, and mark the requirements as not applicable then."""
     if api.run.contract.wadl_path is not None:
         return False
     for id_ in _IDS:
@@ -31,13 +32,13 @@ def _without(api: RestInterface) -> bool:
 
 
 def _read(rest: HttpClient) -> tuple[list[Described], Exchange, str]:
-    """The operations, the exchange that brought them, and what is wrong."""
+    """Return the operations, the exchange that brought them, and what is wrong."""
     exchange = rest.send("GET", _PATH)
     answer = exchange.response
     if answer.status != 200:
         return [], exchange, exchange.came
     if answer.media_type not in _MEDIA_TYPES:
-        return [], exchange, f"it is sent as {answer.media_type or 'no media type'}"
+        return [], exchange, "another media type than that of WADL or XML"
     try:
         return described_by_wadl(answer.body, rest.base_url), exchange, ""
     except UnreadableError as error:
@@ -46,32 +47,27 @@ def _read(rest: HttpClient) -> tuple[list[Described], Exchange, str]:
 
 @pytest.mark.requirement("describe/wadl")
 def test_wadl_is_served(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """It is there, and is a WADL application."""
+    """Get the WADL: it is there, and is a WADL application."""
     if _without(api):
         return
     _, exchange, fault = _read(rest)
-    judge.check("describe/wadl", not fault, exchange, "200 with a well-formed WADL", found=fault)
+    expect(judge, "describe/wadl", exchange).that(not fault, "status 200 with a well-formed WADL", fault)
 
 
 @pytest.mark.requirement("describe/wadl-resources")
 def test_wadl_has_the_resources(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """It names the resources, methods and parameters of the contract; more is allowed."""
+    """Compare the WADL's resources, methods and parameters with the contract's; it may have more of them."""
     if _without(api):
         return
     found, exchange, fault = _read(rest)
     missing = [fault] if fault else differences(operations_of(api.run.contract), found)
-    judge.check(
-        "describe/wadl-resources",
-        not missing,
-        exchange,
-        "the resources, methods and parameters of the contract",
-        found="; ".join(missing[:3]),
-    )
+    expected = "a WADL with the resources, methods and parameters of the contract"
+    expect(judge, "describe/wadl-resources", exchange).that(not missing, expected, "; ".join(missing[:3]))
 
 
 @pytest.mark.requirement(_BEHAVIOUR)
 def test_what_is_described_is_there(api: RestInterface, rest: HttpClient) -> None:
-    """A request made from each operation of it is not answered 404 or 405."""
+    """Send a request for each operation of the WADL: it does not get 404 or 405."""
     if _without(api):
         return
     known = {Described(item, item.template).address: item for item in operations_of(api.run.contract)}

@@ -1,4 +1,4 @@
-"""What a robot says of its SOAP services: served with all it refers to, and the same as the contract."""
+"""The WSDL of each SOAP service: served with all that it refers to, and the same as the contract."""
 
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from conformance.api.expectation import expect
 from conformance.api.soap import comparison
 from conformance.api.soap.address import is_http, split
 from conformance.api.soap.callable_services import SoapServices, repetitions
@@ -23,16 +24,16 @@ from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("describe")
 _COMPARED: dict[str, tuple[Callable[[Description, Description], Iterator[str]], str]] = {
-    "wsdl-names": (comparison.names, "the names of the contract"),
-    "wsdl-operations": (comparison.operations, "the operations of the contract"),
-    "wsdl-types": (comparison.types, "the types of the contract"),
-    "wsdl-action": (comparison.actions, "an action of a form that the contract allows"),
+    "wsdl-names": (comparison.names, "a WSDL with the names of the contract"),
+    "wsdl-operations": (comparison.operations, "a WSDL with the operations of the contract"),
+    "wsdl-types": (comparison.types, "a WSDL with the types of the contract"),
+    "wsdl-action": (comparison.actions, "a wsam:Action in a form that the contract allows"),
 }
 
 
 @dataclass(frozen=True)
 class _Served:
-    """The description that a robot serves: the request for it, and what is wrong with it."""
+    """The description that a robot serves, the request for it, and what is wrong with it."""
 
     exchange: Exchange
     description: Description | None
@@ -40,7 +41,7 @@ class _Served:
 
 
 def _services(soap: SoapServices, *ids: str) -> list[SoapService]:
-    """The services with a contract: descriptions are only read, so that of the one that acts is asked for as well."""
+    """Return the services with a contract, also the one that moves the robot: getting its WSDL moves nothing."""
     found = []
     for service in (soap.publishers, soap.subscribers):
         if service is None or service.contract_wsdl_path is None:
@@ -58,42 +59,37 @@ def _services(soap: SoapServices, *ids: str) -> list[SoapService]:
 
 
 def _served(service: SoapService) -> _Served:
-    """Ask for the description, where the statement says it is, else at ?wsdl of the endpoint."""
+    """Get the description from where the statement says it is, else from ?wsdl of the endpoint."""
     source = service.published.url or f"{service.endpoint}?wsdl"
     exchange = get(source, service.client.connection)
     answer = exchange.response
     if answer.status != 200:
         return _Served(exchange, None, exchange.came)
     if "xml" not in answer.media_type:
-        return _Served(exchange, None, f"{exchange.came}, which is not XML")
+        return _Served(exchange, None, "a document that is not XML")
     try:
         description = describe(answer.body, source, service.fetch)
     except DescriptionError as error:
         return _Served(exchange, None, str(error))
     missing = [(place, why) for place, why in description.missing if urlsplit(place).netloc == urlsplit(source).netloc]
-    # What lies with somebody else (a public schema) matters only where something that is used comes from it.
-    problem = next((f"it refers to {place}: {why}" for place, why in missing), "") or next(faults(description), "")
+    # A document of another host (a public schema) matters only where something that is used comes from it.
+    problem = next((f"a reference to {place}: {why}" for place, why in missing), "") or next(faults(description), "")
     return _Served(exchange, description, problem)
 
 
 @pytest.mark.requirement("describe/wsdl")
 def test_served(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """GET ?wsdl answers with the description, and everything that it refers to can be had."""
+    """Get the description, and everything that it refers to."""
     for service in _services(soap, "describe/wsdl"):
         for _ in range(repetitions(effort, 6)):
             served = _served(service)
-            judge.check(
-                "describe/wsdl",
-                not served.problem,
-                served.exchange,
-                "a WSDL with all it refers to",
-                found=served.problem,
-            )
+            expected = "a WSDL with all that it refers to"
+            expect(judge, "describe/wsdl", served.exchange).that(not served.problem, expected, served.problem)
 
 
 @pytest.mark.requirement(*(f"describe/{name_}" for name_ in _COMPARED))
 def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Names, operations, types and actions are those of the contract."""
+    """Compare names, operations, types and actions with the contract's."""
     ids = [f"describe/{name_}" for name_ in _COMPARED]
     for service in _services(soap, *ids):
         for _ in range(repetitions(effort, 3)):
@@ -104,36 +100,31 @@ def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> N
                     [broken] if broken or served.description is None else compare(service.contract, served.description)
                 )
                 problem = next(iter(found), "")
-                judge.check(f"describe/{name_}", not problem, served.exchange, expected, found=problem)
+                expect(judge, f"describe/{name_}", served.exchange).that(not problem, expected, problem)
 
 
 @pytest.mark.requirement("describe/wsdl-address")
 def test_address(soap: SoapServices, judge: Judge) -> None:
-    """The service answers at the address that the description names."""
+    """Send a request to each address that the description names."""
     for service in _services(soap, "describe/wsdl-address"):
         served = _served(service)
         ports = served.description.all("w:service/w:port[s:address]") if served.description is not None else []
         located = [(name(port), port.find(clark(WSDL_SOAP, "address"))) for port in ports]
         if not located:
-            judge.check(
-                "describe/wsdl-address", False, served.exchange, "a soap:address", found=served.problem or "none"
-            )
+            got = served.problem or "a WSDL without soap:address"
+            expect(judge, "describe/wsdl-address", served.exchange).that(False, "a WSDL with a soap:address", got)
         for port, element in located:
             location = (element.get("location") if element is not None else None) or ""
             exchange, problem = _answers(service, location)
-            judge.check(
-                "describe/wsdl-address",
-                not problem,
-                exchange or served.exchange,
-                "a service at its soap:address",
-                found=f"port {port}, {location!r}: {problem}",
+            expect(judge, "describe/wsdl-address", exchange or served.exchange).that(
+                not problem, f"a service at the soap:address {location!r} of port {port}", problem
             )
 
 
 def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
-    """Ask at an address with an empty Body, which does nothing; what is wrong there."""
+    """Send a message with an empty Body, which does nothing, to an address; return the exchange and what is wrong."""
     if not is_http(location):
-        return None, "no http URL"
+        return None, "an address that is no http URL"
     base, path = split(location)
     try:
         with closing(HttpClient(base, service.client.connection)) as client:
@@ -148,23 +139,24 @@ def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
     except NoAnswerError as none:
         return none.unanswered, str(none)
     status = exchange.response.status
-    return exchange, f"POST is answered {status}" if status in {404, 405, 501} else ""
+    return exchange, f"status {status} for POST" if status in {404, 405, 501} else ""
 
 
 @pytest.mark.requirement(*(f"describe/wsdl-{rule}" for rule in RULES))
 def test_profile(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """The description keeps the rules of the Basic Profile."""
+    """Check the description by the rules of the Basic Profile."""
     for service in _services(soap, *(f"describe/wsdl-{rule}" for rule in RULES)):
         for _ in range(repetitions(effort, 3)):
             served = _served(service)
             for rule, check in RULES.items():
                 found = iter([served.problem]) if served.description is None else _guarded(check, served.description)
                 problem = next(found, "")
-                judge.check(f"describe/wsdl-{rule}", not problem, served.exchange, f"a WSDL by {rule}", found=problem)
+                expected = f"a WSDL that keeps {rule} of the Basic Profile"
+                expect(judge, f"describe/wsdl-{rule}", served.exchange).that(not problem, expected, problem)
 
 
 def _guarded(check: Callable[[Description], Iterator[str]], description: Description) -> Iterator[str]:
-    """A rule's findings; a description too broken for the rule breaks it."""
+    """Yield what breaks a rule; a description too broken for the rule breaks it as well."""
     try:
         yield from check(description)
     except DescriptionError as error:

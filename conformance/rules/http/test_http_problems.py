@@ -1,15 +1,15 @@
-"""Problems: an error says in words what was wrong, and where (RFC 9457 3.1.4)."""
+"""Problem documents: an error says in words what was wrong, and where (RFC 9457 3.1.4)."""
 
 from functools import partial
 
 import pytest
 
-from conformance.api.rest.applicable import applicable_operations, reads
+from conformance.api.rest.applicable import reads, usable_operations
 from conformance.api.rest.calls import JSON, example_call
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.mutations import mutations
+from conformance.api.rest.json_mutations import mutations
 from conformance.api.rest.refusals import judge_refusal
-from conformance.documents.json_schema import kind_of
+from conformance.documents.json_schema import is_numeric
 from conformance.documents.openapi import operations_of
 from conformance.verdict.evidence import Judge
 
@@ -28,12 +28,11 @@ _TEXT = "roaas-no-number"
 @pytest.mark.phase("reading")
 @pytest.mark.requirement(*_IDS, "rest-formats/problem-xml", "strict-input/query-parameter")
 def test_problem_of_a_query(api: RestInterface, judge: Judge) -> None:
-    """A query parameter that is no number is named, and so is what stood there instead."""
-    numbers = {"number", "integer"}
+    """Send text for a number in a query: the problem names the parameter and the text."""
     tried = 0
     for call in reads(api):
         for item in call.operation.parameter("query"):
-            if kind_of(item.schema) not in numbers:
+            if not is_numeric(item.schema):
                 continue
             tried += 1
             wrong = call.having(item.name, _TEXT)
@@ -55,26 +54,26 @@ def test_problem_of_a_query(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.phase("input")
 @pytest.mark.requirement(*_IDS, "rest-formats/problem-xml", "strict-input/json-missing", "strict-input/json-type")
 def test_problem_of_a_body(api: RestInterface) -> None:
-    """A field that is missing or of another type is named in the problem."""
+    """Send bodies with a field that is missing or of another type: the problem names it."""
     api.device.halt(api)
-    for operation in applicable_operations(api, (), lambda item: JSON in item.bodies, "takes JSON"):
+    for operation in usable_operations(api, lambda item: JSON in item.bodies):
         call = example_call(api, operation)
         made = [
             item
             for item in mutations(call.value, operation.bodies[JSON].schema)
-            if item.requirement in {"json-missing", "json-type"} and (item.shown or "missing" in item.name)
+            if item.kind in {"missing", "type"} and (item.shown or "missing" in item.what)
         ]
         for item in api.run.effort.subsample(made[:: max(1, len(made) // 6)], 2):
             judge_refusal(
                 api,
-                partial(call.carrying(item.body).send, api),
-                f"strict-input/{item.requirement}",
-                item.name,
+                partial(call.carrying(item.made).send, api),
+                f"strict-input/json-{item.kind}",
+                item.what,
                 field=item.field,
                 shown=item.shown,
                 malformed=item.malformed,
             )
         for item in made[:1]:
-            # The observers judge in which format it is refused.
-            call.carrying(item.body).send(api, ("Accept", "application/xml"))
+            # The observers judge the format of the refusal.
+            call.carrying(item.made).send(api, ("Accept", "application/xml"))
     api.device.halt(api)

@@ -1,4 +1,4 @@
-"""Plain reads, and many of them: what the observers judge has to hold each time, not forty-nine times in fifty."""
+"""Plain reads, and many of them: the observers judge each, so that one failure in fifty is noticed."""
 
 import math
 
@@ -9,7 +9,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.verdict.effort import Effort
 
 pytestmark = [pytest.mark.phase("silence"), pytest.mark.needs("rest")]
-# Of each resource at standard effort; and in all at any effort with a robot that is fast enough: one fault in fifty.
+# Reads of each resource at standard effort; and reads in all, at any effort, with a robot that is not slow.
 _EACH = 60
 _IN_ALL = 56
 
@@ -26,7 +26,7 @@ _IN_ALL = 56
     "http/json-unique-names",
 )
 def test_each_resource_is_read_over_and_over(api: RestInterface, effort: Effort) -> None:
-    """Each GET operation in turn, as JSON; the observers judge every answer.
+    """Send each GET operation in turn; the observers judge every response.
 
     The turns take a prime number of requests more than there are operations, so that a robot which fails with every
     n-th answer does not always fail with the same one.

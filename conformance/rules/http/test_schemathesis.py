@@ -1,6 +1,6 @@
-"""Schemathesis over the contract's OpenAPI: examples, coverage, fuzzing and a walk along its links.
+"""Schemathesis over the contract's OpenAPI: examples, coverage, fuzzing and walks along its links.
 
-Its requests are judged by what they are on the wire: valid ones by the statuses of the contract, invalid ones by 4xx.
+The suite judges its requests by what they are on the wire: valid ones by the contract's statuses, invalid ones by 4xx.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis.errors import Unsatisfiable
 
+from conformance.api.expectation import expect
 from conformance.api.rest.applicable import allowed
+from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
 from conformance.api.rest.refusals import judge_refusal
@@ -21,7 +23,7 @@ from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
 if TYPE_CHECKING:
-    from conformance.api.rest.generated import GeneratedRequest, Target
+    from conformance.api.rest.generated import Target
 
 pytestmark = pytest.mark.needs("rest")
 _IDS = ("http/declared-status", "http/declared-body", "http/no-server-error")
@@ -54,7 +56,7 @@ _POSITIVE_REFUSALS = frozenset({405, 406, 408, 411, 413, 414, 415, 431})
 def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
     if api.run.effort.name == "quick":
         return []  # importing Schemathesis and reading the contract takes a tenth of the time that a quick run has
-    from conformance.api.rest.generated import targets  # noqa: PLC0415 - half a second that an unclaimed class need not pay
+    from conformance.api.rest.generated import targets  # noqa: PLC0415 - takes half a second
 
     labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allowed(api, item)}
     return [target for target in targets(api.run.contract) if target.label in labels]
@@ -63,7 +65,7 @@ def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
 @pytest.mark.phase("describe")
 @pytest.mark.requirement(*_IDS, "strict-input/query-parameter", "strict-input/query-missing")
 def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
-    """What moves nothing."""
+    """Send generated requests for operations that move nothing."""
     guard = MotionGuard(api)
     for target in _targets(api, moving=False):
         _run(api, judge, explore, guard, target)
@@ -72,7 +74,7 @@ def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer)
 @pytest.mark.phase("input")
 @pytest.mark.requirement(*_IDS, *_STRICT)
 def test_moving_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
-    """What may move the robot: invalid requests, and a few valid ones made fit for it."""
+    """Send generated requests for operations that may move the robot: invalid ones, and a few valid ones."""
     guard = MotionGuard(api)
     api.device.halt(api)
     for target in _targets(api, moving=True):
@@ -95,11 +97,11 @@ def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard
         try:
             explore(target.fuzzing(negative=negative), fuzz, cases=_FUZZED)
         except Unsatisfiable:
-            continue  # its schemas take everything, or nothing: there is no such case
+            continue  # its schemas allow everything, or nothing: there is no such case
 
 
 def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item: GeneratedRequest) -> None:
-    """Send one request where it is harmless, and judge its answer by what it is on the wire."""
+    """Send one request where it is harmless, and judge the response by what the request is on the wire."""
     fit = guard.admit(item)
     if fit is None:
         return
@@ -112,12 +114,9 @@ def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item:
     answer = exchange.response
     guard.count(fit, accepted=answer.ok)
     if said.verdict == VALID and said.operation is not None:
-        judge.check(
-            "http/declared-status",
+        expect(judge, "http/declared-status", exchange).that(
             answer.status not in _POSITIVE_REFUSALS,
-            exchange,
-            f"a valid request of {said.operation.id} not refused for its form",
-            found=f"status {answer.status}",
+            f"a status by which {said.operation.id} does not refuse the form of a valid request",
             cause=f"{said.operation.id} {answer.status}",
         )
 
@@ -125,9 +124,9 @@ def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item:
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/declared-status")
 def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
-    """A few short walks from operation to operation, as the contract's links lead."""
+    """Walk from operation to operation along the contract's links, a few times."""
     if api.run.effort.name == "quick":
-        return
+        return  # the observers judge http/declared-status on every other request
     from conformance.api.rest.generated import as_request, as_thesis, state_machine  # noqa: PLC0415 - as above
 
     machine: Any = state_machine(api.run.contract.openapi)
@@ -148,7 +147,7 @@ def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge
             return as_thesis(exchange)
 
         def validate_response(self, *_: Any, **__: Any) -> None:
-            """The observers have judged it."""
+            """Do nothing: the observers have judged the response."""
 
     api.device.halt(api)
     explore.machine(Walk, cases=4, steps=5)

@@ -1,7 +1,8 @@
-"""Which format is sent for which Accept (RFC 9110 12.4.2, 12.5.1)."""
+"""Which format a robot sends for which Accept (RFC 9110 12.4.2, 12.5.1)."""
 
 import pytest
 
+from conformance.api.expectation import expect
 from conformance.api.rest.accept import quality
 from conformance.api.rest.applicable import answered
 from conformance.api.rest.calls import Call
@@ -46,31 +47,25 @@ _MATRIX = (
 
 @pytest.mark.requirement(_DEFAULT)
 def test_default_format(api: RestInterface, judge: Judge) -> None:
-    """Whoever asks for nothing, or for anything, gets JSON."""
-    for call in api.run.effort.subsample(answered(api), 3):
+    """Send no Accept, and */*: JSON comes."""
+    for call in api.run.effort.subsample(answered(api, _DEFAULT), 3):
         if "application/json" not in call.operation.formats:
             continue
         for accept in ("", "*/*", "*/*;q=0.5"):
             exchange = call.send(api, ("Accept", accept))
-            media_type = exchange.response.media_type
-            judge.check(
-                _DEFAULT,
-                media_type == "application/json",
-                exchange,
-                f"application/json for Accept: {accept}" if accept else "application/json without Accept",
-                found=media_type,
-            )
+            when = f"Accept is {accept}" if accept else "there is no Accept"
+            expect(judge, _DEFAULT, exchange).media_type("application/json", when=when)
 
 
 @pytest.mark.requirement(_Q, _SPECIFIC)
 def test_preferred_format(api: RestInterface, judge: Judge) -> None:
-    """What the client would rather have is what it gets."""
+    """Send Accept with preferences: the client gets the format that it prefers."""
     calls = [call for call in api.run.effort.subsample(answered(api), 3) if len(call.operation.formats) > 1]
     if not calls:
         for id_ in (_Q, _SPECIFIC):
-            judge.unclaimed(id_, "the contract has no answers in more than one format")
+            judge.unclaimed(id_, "the contract has no responses in more than one format")
     cases = [(call, id_, text) for call in calls for id_, text in _MATRIX]
-    # With little effort each line of the matrix is tried with one resource, another one for each line.
+    # At little effort each line of the matrix is tried with one resource, another one for each line.
     once = [(calls[index % len(calls)], *_MATRIX[index]) for index in range(len(_MATRIX))] if calls else []
     for call, id_, text in once + api.run.effort.draw(cases, len(cases), f"{api.run.seed}/accept"):
         _judge_preferred(api, judge, call, id_, text)
@@ -84,13 +79,11 @@ def _judge_preferred(api: RestInterface, judge: Judge, call: Call, id_: str, tex
     exchange = call.send(api, ("Accept", accept))
     answer = exchange.response
     sent = answer.media_type if answer.ok else ""
-    # A robot may have further formats of its own, and send one that is liked as well.
+    # A robot may have further formats of its own, and send one that is as acceptable.
     fine = quality(sent, accept) >= best if sent else best == 0
-    liked = [name for name in formats if quality(name, accept) == best]
-    judge.check(
-        id_,
+    best_formats = [name for name in formats if quality(name, accept) == best]
+    expect(judge, id_, exchange).that(
         fine and (sent != "" or (answer.status == 406)),
-        exchange,
-        f"{' or '.join(liked) if best else '406'} for Accept: {accept}",
+        f"{' or '.join(best_formats) if best else 'status 406'} when Accept is {accept}",
         cause=f"{text} {sent}",
     )

@@ -1,7 +1,8 @@
-"""JSON, XML and text of one moment: each readable by itself, and all with the same values (contract, formats)."""
+"""JSON, XML and text of one moment: each can be read, and all have the same values (contract, formats)."""
 
 import pytest
 
+from conformance.api.expectation import expect
 from conformance.api.rest.applicable import answered, reads
 from conformance.api.rest.calls import root_name
 from conformance.api.rest.formats import judge_same_values
@@ -19,23 +20,23 @@ _IDS = {_XML: "rest-formats/xml", _TEXT: "rest-formats/text"}
 
 
 def _say_lacking(api: RestInterface, media_type: str, *ids: str) -> None:
-    """Say that requirements do not apply where no operation of the contract has the format."""
+    """Mark requirements as not applicable where no operation of the contract has the format."""
     if not any(media_type in operation.formats for operation in operations_of(api.run.contract)):
         for id_ in ids:
-            api.run.judge.unclaimed(id_, f"the contract has no answers as {media_type}")
+            api.run.judge.unclaimed(id_, f"the contract has no responses as {media_type}")
 
 
 @pytest.mark.requirement(
     "rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/charset", "rest-formats/vary"
 )
 def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -> None:
-    """Each resource is sent as XML and as text when that is asked for; the observers judge what is in them."""
+    """Ask for each resource as XML and as text; the observers judge what is in the responses."""
     _say_lacking(api, _XML, "rest-formats/xml", "rest-formats/xml-root")
     _say_lacking(api, _TEXT, "rest-formats/text")
     if not any({_XML, _TEXT} & set(operation.formats) for operation in operations_of(api.run.contract)):
-        judge.unclaimed("rest-formats/charset", "the contract has neither answers as XML nor as plain text")
+        judge.unclaimed("rest-formats/charset", "the contract has responses neither as XML nor as plain text")
     if not any(len(operation.formats) > 1 for operation in operations_of(api.run.contract)):
-        judge.unclaimed("rest-formats/vary", "the contract has no answers in more than one format")
+        judge.unclaimed("rest-formats/vary", "the contract has no responses in more than one format")
     calls = answered(api)
     for turn in range(effort.cases(12) if effort.name != "quick" else 1):
         for call in calls[turn % len(calls) :] + calls[: turn % len(calls)]:
@@ -44,22 +45,19 @@ def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -
                     continue
                 exchange = call.send(api, ("Accept", media_type))
                 answer = exchange.response
-                sent = judge.check(
-                    id_,
+                sent = expect(judge, id_, exchange).that(
                     answer.ok and answer.media_type == media_type,
-                    exchange,
-                    f"{media_type} for Accept: {media_type}",
+                    f"status 200 with {media_type} when Accept is {media_type}",
                     cause=f"{call.operation.id} {exchange.came}",
                 )
                 if sent and is_xml(media_type):
                     fault = _root_fault(call.operation, answer.body)
-                    judge.check(
-                        "rest-formats/xml-root", not fault, exchange, "a root named after the type", found=fault
-                    )
+                    expected = "a root element with the name of the type"
+                    expect(judge, "rest-formats/xml-root", exchange).that(not fault, expected, fault)
 
 
 def _root_fault(operation: Operation, body: bytes) -> str:
-    """What is wrong with the name of a root; a list has no type, so its root may have any name."""
+    """Return what is wrong with the name of a root; a list has no type, so its root may have any name."""
     schema = operation.shape or {}
     wanted = root_name(schema)
     if not wanted or kind_of(schema) == "array":
@@ -68,12 +66,12 @@ def _root_fault(operation: Operation, body: bytes) -> str:
         found = local_name(parse_xml(body))
     except UnreadableError as error:
         return str(error)
-    return "" if found == wanted else f"the root element is {found!r} and not {wanted!r}"
+    return "" if found == wanted else f"the root element {found!r} where the type is {wanted!r}"
 
 
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None:
-    """Every value of each resource is the same in all its formats."""
+    """Compare every value of each resource in all its formats."""
     compared = 0
     for call in api.run.effort.subsample(reads(api), 5):
         others = [name for name in _IDS if name in call.operation.formats]

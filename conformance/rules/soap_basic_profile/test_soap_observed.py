@@ -1,4 +1,4 @@
-"""What holds of every SOAP answer, whatever was asked: an observer watches them all over the whole run."""
+"""Rules for every SOAP response, whatever the request: an observer judges them over the whole run."""
 
 import pytest
 
@@ -15,10 +15,7 @@ _STRANGE = Node(clark("urn:example:strange", "no_such_operation"))
 
 @pytest.mark.requirement(*PASSIVE)
 def test_every_answer_is_watched(soap: SoapServices, effort: Effort) -> None:
-    """Every SOAP answer of the run is judged by the rules for messages and faults.
-
-    To begin with, a fault is provoked and each operation without arguments is asked.
-    """
+    """Provoke a fault, and call each operation without arguments; the observer judges every response of the run."""
     for service in callable_services(soap, *PASSIVE):
         for _ in range(effort.cases(10)):
             call(service, _STRANGE)

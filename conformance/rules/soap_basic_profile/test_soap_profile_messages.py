@@ -1,23 +1,22 @@
-"""Messages by the Basic Profile: dispatch, encodings, and what becomes of those that are not what the WSDL says."""
+"""Messages by the Basic Profile: dispatch, encodings, and messages that break the WSDL."""
 
 import codecs
 
 import pytest
 
-from conformance.api.soap.callable_services import SoapServices, callable_services
-from conformance.api.soap.calls import call, judge_answer, send
+from conformance.api.soap.callable_services import SoapServices, accepted_messages, callable_services
+from conformance.api.soap.calls import call, expect_answer, send
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.mutations import invalid_ones, mutations
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import candidates, example, require_valid_document, typed
 from conformance.api.soap.xml_style import XmlStyle, serialize
-from conformance.documents.wsdl import Operation
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = pytest.mark.phase("delivery")
+pytestmark = pytest.mark.phase("acting")
 _STRANGE = "urn:example:strange"
 _REPEATED = (
     "soap-basic-profile/R2712",
@@ -27,79 +26,57 @@ _REPEATED = (
 )
 
 
-def _examples(service: SoapService) -> list[tuple[Operation, Node]]:
-    """Each operation with a message that the robot takes."""
-    found = [(operation, example(service, operation)) for operation in service.contract.operations]
-    return [(operation, message) for operation, message in found if message is not None]
-
-
 @pytest.mark.requirement(*_REPEATED)
 def test_answers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """A valid message, without xsi:type, is answered 200 with the element that the description refers to."""
+    """Send valid messages without xsi:type: the response is 200 with the element that the description declares."""
     for service in callable_services(soap, *_REPEATED):
-        good = _examples(service)
-        if not good:
-            for id_ in _REPEATED:
-                judge.skip(id_, f"the robot took none of the messages tried at its {service.name} service")
+        good = accepted_messages(soap, service)
+        for id_ in _REPEATED if not good else ():
+            judge.skip(id_, f"the {service.name} service accepted none of the messages tried")
         _untyped(judge, service)
         for operation, message in good:
             for _ in range(effort.cases(15)):
                 answer = call(service, message)
-                judge_answer(
-                    judge,
-                    "soap-basic-profile/R1017",
-                    answer.accepted,
-                    answer,
-                    "2xx for a valid message without xsi:type",
-                )
-                if answer.accepted:
-                    judge_answer(
-                        judge,
-                        "soap-basic-profile/R2712",
-                        answer.payload == operation.response,
-                        answer,
-                        f"{operation.response} in the Body",
-                    )
+                if expect_answer(judge, "soap-basic-profile/R1017", answer).accepted("a valid message has no xsi:type"):
+                    same = answer.payload == operation.response
+                    expected = f"the element {operation.response} in the Body"
+                    expect_answer(judge, "soap-basic-profile/R2712", answer).that(same, expected)
 
 
 def _untyped(judge: Judge, service: SoapService) -> None:
-    """Where an operation takes no message, try one with xsi:type: if it takes that, it asks for what is not needed."""
+    """Judge operations that take no message by one with xsi:type: an operation that takes only that fails."""
     for operation in service.contract.operations:
         declared = service.contract.shape(operation.request) if operation.request else None
         if declared is None or example(service, operation) is not None:
             continue
         plain = next(candidates(service, operation, declared))
         answer = send(service, typed(envelope([plain]), declared, plain))
-        judge.check(
-            "soap-basic-profile/R1017",
-            not answer.accepted,
-            answer.exchange,
-            "the message taken without xsi:type as well",
-            found=f"{operation.name} is taken with xsi:type alone",
-        )
+        expected = f"status 2xx for {operation.name} without xsi:type, as with it"
+        found = "a refusal without xsi:type"
+        expect_answer(judge, "soap-basic-profile/R1017", answer).that(not answer.accepted, expected, found)
 
 
 @pytest.mark.requirement("soap-basic-profile/R1127", "xml-security/soapaction-spoofing")
 def test_dispatch(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """The operation is chosen by the Body's element, whatever SOAPAction says."""
+    """Send messages with the SOAPAction of other operations: the Body's element chooses the operation."""
     ids = ("soap-basic-profile/R1127", "xml-security/soapaction-spoofing")
     for service in callable_services(soap, *ids):
-        good = _examples(service)
-        for operation, message in good:
+        for operation, message in accepted_messages(soap, service, *ids):
             others = [other for other in service.contract.operations if other.name != operation.name]
             spoofed = [f'"{other.input_action}"' for other in others if other.input_action]
             spoofed += [f'"{other.name}"' for other in others] + ['"urn:example:strange"']
             for action in spoofed[: effort.cases(len(spoofed))]:
                 answer = call(service, message, soap_action=action)
-                # To refuse an action that nothing declares is not to dispatch by it; to run the other operation is.
+                # A robot may refuse an action that nothing declares; it must not run the other operation.
                 right = answer.refused or (answer.accepted and answer.payload == operation.response)
                 for id_ in ids:
-                    judge_answer(judge, id_, right, answer, f"{operation.response} or a refusal")
+                    expected = f"the element {operation.response} or a refusal when SOAPAction is {action}"
+                    expect_answer(judge, id_, answer).that(right, expected)
 
 
 @pytest.mark.requirement("soap-basic-profile/unknown-operation")
 def test_unknown_operation(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """A Body element that no operation has is never answered with success."""
+    """Send Body elements that no operation has."""
     id_ = "soap-basic-profile/unknown-operation"
     for service in callable_services(soap, id_):
         space = service.contract.target_namespace
@@ -110,14 +87,16 @@ def test_unknown_operation(soap: SoapServices, judge: Judge, effort: Effort) -> 
         for tag in tags[: effort.cases(len(tags))]:
             for action in ('""', f'"{known[0].input_action or known[0].name}"') if known else ('""',):
                 answer = call(service, Node(tag), soap_action=action)
-                judge_answer(judge, id_, answer.refused, answer, f"a fault or 4xx for {tag}")
+                expected = f"a fault or status 4xx when the Body has the unknown element {tag}"
+                expect_answer(judge, id_, answer).that(answer.refused, expected)
 
 
 @pytest.mark.requirement("soap-basic-profile/R4001", "soap-basic-profile/utf-16")
 def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """A byte order mark is taken, and so is UTF-16."""
-    for service in callable_services(soap, "soap-basic-profile/R4001", "soap-basic-profile/utf-16"):
-        for operation, message in _examples(service)[: effort.cases(6)]:
+    """Send a byte order mark, and UTF-16."""
+    ids = ("soap-basic-profile/R4001", "soap-basic-profile/utf-16")
+    for service in callable_services(soap, *ids):
+        for operation, message in accepted_messages(soap, service, *ids)[: effort.cases(6)]:
             plain = serialize(envelope([message]), XmlStyle())
             declared = '<?xml version="1.0" encoding="UTF-16"?>' + plain
             utf8 = serialize(envelope([message]), XmlStyle(declaration='<?xml version="1.0" encoding="UTF-8"?>'))
@@ -130,14 +109,16 @@ def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                 valid = require_valid_document(service, body)
                 answer = send(service, valid, content_type=f"text/xml; charset={charset}")
                 right = answer.accepted and answer.payload == operation.response
-                judge_answer(judge, f"soap-basic-profile/{id_}", right, answer, f"2xx for a message in {what}")
+                expect_answer(judge, f"soap-basic-profile/{id_}", answer).that(
+                    right, f"status 2xx for a message in {what}"
+                )
 
 
 @pytest.mark.requirement("soap-basic-profile/R2724")
 def test_invalid_messages(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """A message that is not what the description says is answered with a Client fault."""
+    """Send messages that break the description's schema."""
     for service in callable_services(soap, "soap-basic-profile/R2724"):
-        for operation, message in _examples(service):
+        for operation, message in accepted_messages(soap, service, "soap-basic-profile/R2724"):
             declared = service.contract.shape(operation.request) if operation.request else None
             if declared is None:
                 continue
@@ -145,12 +126,8 @@ def test_invalid_messages(soap: SoapServices, judge: Judge, effort: Effort) -> N
             # Spread over all kinds and elements, rather than the first of them.
             step = max(1, len(wrong) // effort.cases(40))
             for mutant in invalid_ones(wrong[::step], service.contract.types):
-                answer = call(service, *mutant.payload)
-                judge_answer(
-                    judge,
-                    "soap-basic-profile/R2724",
-                    answer.code == "Client",
-                    answer,
-                    f"a Client fault where {mutant.what}",
-                    cause=f"{mutant.kind} {answer.status} {answer.code}",
+                answer = call(service, *mutant.made)
+                cause = f"{mutant.kind} {answer.status} {answer.code}"
+                expect_answer(judge, "soap-basic-profile/R2724", answer).fault(
+                    "Client", f"there is {mutant.what}", cause=cause
                 )

@@ -1,4 +1,4 @@
-"""Contract-invalid SOAP input is refused: a valid message broken in one way, which lxml and xmlschema both see."""
+"""Invalid SOAP messages are refused: each is a valid message broken in one way, confirmed by lxml and xmlschema."""
 
 import random
 from itertools import islice
@@ -6,116 +6,103 @@ from itertools import islice
 import pytest
 from hypothesis import strategies as st
 
-from conformance.api.soap.callable_services import SoapServices, callable_services
-from conformance.api.soap.calls import SoapResponse, call, judge_answer
+from conformance.api.mutations import Mutation
+from conformance.api.soap.callable_services import SoapServices, accepted_messages, callable_services
+from conformance.api.soap.calls import SoapResponse, call, expect_answer
 from conformance.api.soap.messages import ordinary, variants
-from conformance.api.soap.mutations import Mutation, invalid_ones, mutations
+from conformance.api.soap.mutations import Payload, invalid_ones, mutations
 from conformance.api.soap.service import SoapService
-from conformance.api.soap.valid_messages import example
-from conformance.documents.wsdl import Operation
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge, RefutedError
 from conformance.verdict.explorer import Explorer
 
-pytestmark = pytest.mark.phase("delivery")
+pytestmark = pytest.mark.phase("acting")
 _KINDS = ("missing", "unknown", "duplicate", "order", "namespace", "lexical", "range", "non-finite", "nil", "body")
 _FAULT = "strict-input/soap-fault"
 _IDS = (*(f"strict-input/soap-{kind}" for kind in _KINDS), _FAULT)
 
 
-def _targets(service: SoapService) -> list[tuple[Operation, Element, Node]]:
-    """The operations of which the robot took a message, each with its declaration and that message."""
-    found = []
-    for operation in service.contract.operations:
-        declared = service.contract.shape(operation.request) if operation.request else None
-        message = example(service, operation)
-        if declared is not None and message is not None:
-            found.append((operation, declared, message))
-    return found
+def _targets(soap: SoapServices, service: SoapService) -> list[tuple[Element, Node]]:
+    """Return the declaration of each message that the robot accepts, with the message."""
+    accepted = accepted_messages(soap, service, *_IDS)
+    found = [(service.contract.shape(operation.request or ""), message) for operation, message in accepted]
+    return [(declared, message) for declared, message in found if declared is not None]
 
 
-def _judged(judge: Judge, mutant: Mutation, answer: SoapResponse) -> bool:
-    """Judge that a mutant was refused, and how."""
+def _judged(judge: Judge, mutant: Mutation[Payload], answer: SoapResponse) -> bool:
+    """Judge whether a mutant was refused, and how; return whether that was right."""
     why = f" ({mutant.reason})" if mutant.reason else ""
-    refused = judge_answer(
-        judge,
-        f"strict-input/soap-{mutant.kind}",
+    refused = expect_answer(judge, f"strict-input/soap-{mutant.kind}", answer).that(
         answer.refused,
-        answer,
-        f"a refusal where {mutant.what}{why}",
+        f"a fault or status 4xx for {mutant.what}{why}",
         cause=f"{mutant.kind} {answer.status} {answer.accepted}",
     )
     if answer.accepted:
         return refused
-    return judge_answer(
-        judge,
-        _FAULT,
+    return expect_answer(judge, _FAULT, answer).that(
         answer.fault is not None and answer.status == 500,
-        answer,
-        f"a fault with status 500 where {mutant.what}",
+        f"a fault with status 500 for {mutant.what}",
         cause=f"{answer.status} {answer.fault is None}",
     )
 
 
 @pytest.mark.requirement(*_IDS)
 def test_single_mutations(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Every single mutation of a message that the robot takes is refused with a fault."""
+    """Send every single mutation of a message that the robot takes."""
     chance = random.Random(soap.run.seed)  # noqa: S311 - choice of cases, not of secrets
-    asked: dict[str, int] = dict.fromkeys(_KINDS, 0)
+    sent: dict[str, int] = dict.fromkeys(_KINDS, 0)
     services = callable_services(soap, *_IDS)
     for service in services:
-        found = [
-            (declared, mutant) for _, declared, message in _targets(service) for mutant in mutations(declared, message)
-        ]
+        found = [mutant for declared, message in _targets(soap, service) for mutant in mutations(declared, message)]
         chance.shuffle(found)
         # Of each kind alike, so that the many ways to miswrite a number do not crowd out the rest.
         for kind in _KINDS:
-            ours = [mutant for _, mutant in found if mutant.kind == kind]
+            ours = [mutant for mutant in found if mutant.kind == kind]
             for mutant in invalid_ones(ours[: effort.cases(60)], service.contract.types):
-                asked[kind] += 1
-                _judged(judge, mutant, call(service, *mutant.payload))
-    for kind, count in asked.items():
+                sent[kind] += 1
+                _judged(judge, mutant, call(service, *mutant.made))
+    for kind, count in sent.items():
         if not count:
             judge.skip(f"strict-input/soap-{kind}", _nothing(services, kind))
 
 
 def _nothing(services: list[SoapService], kind: str) -> str:
     names = " and ".join(service.name for service in services)
-    return f"the operations of the {names} service that took a message leave nothing to break by {kind!r}"
+    return f"no operation of the {names} service that took a message has anything to break by {kind!r}"
 
 
 @pytest.mark.requirement(*_IDS)
 def test_mutations_of_any_message(soap: SoapServices, judge: Judge, explore: Explorer) -> None:
-    """Mutations are refused whatever the other values of the message are."""
+    """Send mutations of messages with any other values."""
     for service in callable_services(soap, *_IDS):
         targets = [
-            (declared, _fullest(declared, message)) for _, declared, message in _targets(service) if message.children
+            (declared, _fullest(declared, message)) for declared, message in _targets(soap, service) if message.children
         ]
         if not targets:
             continue
 
-        def refused(case: tuple[Element, Mutation], service: SoapService = service) -> None:
+        def refused(case: tuple[Element, Mutation[Payload]], service: SoapService = service) -> None:
             for invalid in invalid_ones([case[1]], service.contract.types):
-                if not _judged(judge, invalid, call(service, *invalid.payload)):
+                if not _judged(judge, invalid, call(service, *invalid.made)):
                     raise RefutedError(invalid.what)
 
         explore(st.one_of([_broken(*target) for target in targets]), refused, cases=80)
 
 
-def _broken(declared: Element, base: Node) -> st.SearchStrategy[tuple[Element, Mutation]]:
-    """Any single mutation of any valid message of an operation."""
+def _broken(declared: Element, base: Node) -> st.SearchStrategy[tuple[Element, Mutation[Payload]]]:
+    """Return a strategy for any single mutation of any valid message of an operation."""
     # Values change nothing in what there is to mutate, so that only the mutation that was chosen has to be made.
     count = sum(1 for _ in mutations(declared, base))
 
-    def broken(drawn: Node, chosen: int) -> tuple[Element, Mutation]:
+    def broken(drawn: Node, chosen: int) -> tuple[Element, Mutation[Payload]]:
         return declared, next(islice(mutations(declared, drawn), chosen, None))
 
     return st.builds(broken, variants(declared, base), st.integers(0, count - 1))
 
 
 def _fullest(declared: Element, message: Node) -> Node:
-    """A message with all optional elements, so that those are broken as well."""
+    """Return a message with all optional elements, so that those are broken as well."""
     full = ordinary(declared, optional=True)
     return full if len(full.paths()) > len(message.paths()) else message

@@ -1,13 +1,15 @@
-"""JSON bodies that break the contract in one way each, confirmed to be invalid as they are sent, are refused."""
+"""Invalid JSON bodies are refused: each breaks the contract in one way, confirmed on the octets."""
 
 from functools import partial
 
 import pytest
 
+from conformance.api.expectation import expect
+from conformance.api.mutations import Mutation
 from conformance.api.rest.applicable import applicable_operations
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.mutations import MUTATED, Mutation, mutations
+from conformance.api.rest.json_mutations import KINDS, mutations
 from conformance.api.rest.refusals import judge_refusal
 from conformance.api.rest.statuses import is_taken
 from conformance.documents.openapi import Operation
@@ -15,73 +17,65 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
-_IDS = tuple(f"strict-input/{name}" for name in MUTATED)
+_IDS = tuple(f"strict-input/json-{kind}" for kind in KINDS)
 _STATUSES = ("strict-input/status-malformed", "strict-input/status-invalid")
-# What a robot may be killed by: judged before it is sent.
+# Requirements whose cases may kill a robot: each is sent over a connection of its own.
 _HOSTILE = ("strict-input/json-depth", "strict-input/json-huge-number")
-# Of one requirement and operation at standard effort; beyond that they repeat themselves.
+# Cases of one requirement and operation at standard effort; more of them repeat each other.
 _EACH = 50
 
 
 @pytest.mark.requirement(*_IDS, *_STATUSES, "http/problem-detail", "http/problem-value", "http/no-server-error")
 def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort) -> None:
-    """Each named mutation of a valid body is refused with 4xx, and the next valid one is taken as before."""
+    """Send each named mutation of a valid body, and a valid one after them."""
     possible: set[str] = set()
     for operation in applicable_operations(api, (*_IDS, *_STATUSES), lambda item: JSON in item.bodies, "takes JSON"):
         api.device.halt(api)
         call = example_call(api, operation)
-        by_name = _by_requirement(call, operation)
-        possible |= {name for name, made in by_name.items() if made}
+        by_kind = _by_kind(call, operation)
+        possible |= {kind for kind, made in by_kind.items() if made}
         first = call.send(api)
         if not is_taken(first):
             for id_ in (*_IDS, *_STATUSES):
-                judge.note(id_, f"a valid {operation.id} is answered {first.came}, so nothing was made of it")
+                judge.note(id_, f"not tried on {operation.id}: a valid request for it got {first.came}")
             continue
-        for name, made in by_name.items():
-            drawn = effort.draw(made, _count(effort, name), f"{api.run.seed}/{operation.id} {name}")
+        for kind, made in by_kind.items():
+            drawn = effort.draw(made, _count(effort, kind), f"{api.run.seed}/{operation.id} {kind}")
             for item in effort.subsample(drawn, 1):
                 _try(api, judge, call, item)
         api.device.halt(api)
-        again = call.send(api)
-        judge.check(
-            "http/no-server-error",
-            is_taken(again),
-            again,
-            f"a valid {operation.id} taken after all that was refused",
-            found=again.came,
-        )
+        when = f"a valid {operation.id} follows invalid ones"
+        expect(judge, "http/no-server-error", call.send(api)).taken(when)
     api.device.halt(api)
-    for name in MUTATED if possible else ():
-        if name not in possible:
-            judge.unclaimed(f"strict-input/{name}", "no body of the contract can be wrong in this way")
+    for kind in KINDS if possible else ():
+        if kind not in possible:
+            judge.unclaimed(f"strict-input/json-{kind}", "no body of the contract can be wrong in this way")
 
 
-def _count(effort: Effort, name: str) -> int:
-    """How many at standard effort; a deep body costs a robot a hundred times what another one does."""
-    if name == "json-depth":
+def _count(effort: Effort, kind: str) -> int:
+    """Return how many cases to send at standard effort; a deep body costs a robot a hundred times as much."""
+    if kind == "depth":
         return 6 if effort.name != "quick" else 1
     return _EACH
 
 
-def _by_requirement(call: Call, operation: Operation) -> dict[str, list[Mutation]]:
-    by_name: dict[str, list[Mutation]] = {name: [] for name in MUTATED}
-    for item in mutations(call.value, operation.bodies[JSON].schema):
-        by_name[item.requirement].append(item)
-    return by_name
+def _by_kind(call: Call, operation: Operation) -> dict[str, list[Mutation[bytes]]]:
+    made = mutations(call.value, operation.bodies[JSON].schema)
+    return {kind: [item for item in made if item.kind == kind] for kind in KINDS}
 
 
-def _try(api: RestInterface, judge: Judge, call: Call, item: Mutation) -> None:
-    requirement = f"strict-input/{item.requirement}"
+def _try(api: RestInterface, judge: Judge, call: Call, item: Mutation[bytes]) -> None:
+    requirement = f"strict-input/json-{item.kind}"
     judge.at_risk = (requirement,)
     refused = judge_refusal(
         api,
-        partial(call.carrying(item.body).send, api, fresh=requirement in _HOSTILE),
+        partial(call.carrying(item.made).send, api, fresh=requirement in _HOSTILE),
         requirement,
-        f"{item.name}",
+        item.what,
         field=item.field,
         shown=item.shown,
         malformed=item.malformed,
-        closing=item.requirement == "json-depth",
+        closing=item.kind == "depth",
     )
     if not refused:
         api.device.halt(api)

@@ -1,4 +1,4 @@
-"""Parameters that break the contract are refused, and so is leaving out those that are required."""
+"""Invalid parameters are refused, and so are requests without a required one."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -28,7 +28,7 @@ def _has(where: str, operation: Operation) -> bool:
 @pytest.mark.phase("reading")
 @pytest.mark.requirement(_QUERY, "http/problem-detail", "http/problem-value")
 def test_query_parameters(api: RestInterface) -> None:
-    """Text, nothing, NaN, Infinity and 1e400 are refused where a number belongs."""
+    """Send text, nothing, NaN, Infinity and 1e400 in place of a number in a query."""
     for call in _valid_calls(api, _QUERY, partial(_has, "query"), "takes numbers in its query"):
         for item in _chosen(api, call.operation, "query"):
             _try(api, call, item, _QUERY)
@@ -37,7 +37,7 @@ def test_query_parameters(api: RestInterface) -> None:
 @pytest.mark.phase("reading")
 @pytest.mark.requirement(_MISSING, "http/problem-detail")
 def test_missing_query_parameters(api: RestInterface) -> None:
-    """Each required parameter is missed when it is left out."""
+    """Leave out each required parameter of a query."""
 
     def required(operation: Operation) -> bool:
         return any(item.required for item in operation.parameter("query"))
@@ -52,10 +52,10 @@ def test_missing_query_parameters(api: RestInterface) -> None:
         judge_refusal(api, partial(bare.send, api), _MISSING, "no parameter at all", json=False)
 
 
-@pytest.mark.phase("delivery")
+@pytest.mark.phase("acting")
 @pytest.mark.requirement(_PATH, "http/problem-detail", "http/problem-value")
 def test_path_parameters(api: RestInterface) -> None:
-    """Text, nothing, NaN, Infinity, 1e400 and values not enumerated are refused in a path."""
+    """Send text, NaN, Infinity, 1e400 and values that are not allowed in a path."""
     for call in _valid_calls(api, _PATH, partial(_has, "path"), "takes numbers in its path"):
         for item in _chosen(api, call.operation, "path"):
             # Two slashes in a row are another path, which servers may shorten.
@@ -68,19 +68,19 @@ def test_path_parameters(api: RestInterface) -> None:
 def _valid_calls(
     api: RestInterface, requirement: str, wanted: Callable[[Operation], bool], what: str
 ) -> Iterator[Call]:
-    """Valid requests that are taken, so that a refusal of another one has to do with what was changed."""
+    """Yield valid requests that the robot accepts, so that it refuses another one for what was changed."""
     for operation in applicable_operations(api, [requirement], wanted, what):
         call = readable(api, operation) if operation.method == "GET" else example_call(api, operation)
         exchange = call.send(api)
         if is_taken(exchange):
             yield call
         else:
-            reason = f"a valid {operation.id} is answered {exchange.came}, so nothing was made of it"
+            reason = f"not tried on {operation.id}: a valid request for it got {exchange.came}"
             api.run.judge.skip(requirement, reason)
 
 
 def _chosen(api: RestInterface, operation: Operation, where: str) -> list[Wrong]:
-    """Wrong texts of the parameters: with little effort, one of each kind and some more."""
+    """Return wrong texts of the parameters: at little effort, one of each kind and some more."""
     wrong = [item for parameter in operation.parameter(where) for item in wrong_texts(parameter)]
     first: dict[str, Wrong] = {}
     for item in wrong:

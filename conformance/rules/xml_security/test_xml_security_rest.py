@@ -1,12 +1,10 @@
-"""The same attacks in XML bodies over REST, on every resource that takes XML by the contract's OpenAPI."""
-
-from __future__ import annotations
+"""XML attacks in request bodies over REST, on every resource that takes XML by the contract's OpenAPI."""
 
 import statistics
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import pytest
+from lxml import etree
 
 from conformance.api.interfaces import Interfaces
 from conformance.api.rest.interface import RestInterface
@@ -23,25 +21,22 @@ from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-if TYPE_CHECKING:
-    from lxml import etree
-
-# None of them is a delivery: they may go on while it is seen whether more comes of those that were sent.
+# Attacks over REST have no late effects: they may run while the suite waits for those of other requests.
 pytestmark = pytest.mark.phase("aside")
 _REST = "xml-security/rest"
 _XML = "application/xml"
 _BODIES = ("put", "post", "patch")
 _DEADLINE_S = 10.0
-# More than there are for any requirement.
+# More attacks than there are for any requirement.
 _EACH = 99
-# With less than half the effort (in quick runs, and on slow robots) there is one for each requirement.
+# At less than half the standard effort (quick runs, slow robots) each requirement gets one attack.
 _HALF = 0.5
-# What a robot may take, or what is no matter of XML bodies over REST.
+# Attacks that have no meaning for XML bodies over REST.
 _NOT_HERE = frozenset({"no-callback"})
 
 
 def _targets(contract: Contract) -> Iterator[tuple[str, str]]:
-    """Method and path of each operation that takes XML, as far as its path needs no values."""
+    """Yield method and path of each operation that takes XML and needs no values in its path."""
     for path, operations in contract.openapi.get("paths", {}).items():
         if "{" in path or not isinstance(operations, dict):
             continue
@@ -52,7 +47,7 @@ def _targets(contract: Contract) -> Iterator[tuple[str, str]]:
 
 
 def _template(rest: HttpClient, path: str) -> Template:
-    """What the resource itself sends as XML, with a place in its first value; else a document of no meaning."""
+    """Return the resource's own XML with a slot for its first value; else a document of no meaning."""
     exchange = rest.send("GET", path, headers=(("Accept", _XML),))
     answer = exchange.response
     plain = Template(f"<message>{VALUE_SLOT}</message>", "message", "1")
@@ -70,7 +65,7 @@ def _template(rest: HttpClient, path: str) -> Template:
 
 
 def _node(element: etree._Element, value: list[str]) -> Node:
-    """An element as a node, VALUE_SLOT for the first text in it, which goes into ``value``."""
+    """Return an element as a node with VALUE_SLOT for its first text, which is put into ``value``."""
     children = tuple(_node(child, value) for child in elements(element))
     text = text_of(element).strip() if not children else ""
     if text and not value:
@@ -82,7 +77,7 @@ def _node(element: etree._Element, value: list[str]) -> Node:
 @pytest.mark.motion
 @pytest.mark.requirement(_REST, "xml-security/responsive", "xml-security/no-callback")
 def test_attacks(interfaces: Interfaces, judge: Judge, effort: Effort) -> None:
-    """Each attack in the body of each operation that takes XML; a robot that takes none refuses them all."""
+    """Send each attack in the body of each operation that takes XML."""
     api, soap = interfaces.rest, interfaces.soap
     targets = list(_targets(soap.run.contract))
     if api is None or not targets:

@@ -1,4 +1,4 @@
-"""Attacks on the SOAP services by XML: refused, nothing leaked, nobody called, and the robot still well."""
+"""XML attacks on the SOAP services: refused, nothing leaked, no address called, and the robot still responsive."""
 
 import statistics
 from collections.abc import Iterator
@@ -41,14 +41,14 @@ _NAMES = (
 _SPOOFING = "xml-security/addressing-spoofing"
 _IDS = tuple(f"xml-security/{name}" for name in _NAMES)
 _DEADLINE_S = 10.0
-# More than there are for any requirement.
+# More attacks than there are for any requirement.
 _EACH = 99
-# With less than half the effort (in quick runs, and on slow robots) there is one for each requirement.
+# At less than half the standard effort (quick runs, slow robots) each requirement gets one attack.
 _HALF = 0.5
 
 
 def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
-    """A message that the robot takes: as it is, with VALUE_SLOT for one of its values, and that value."""
+    """Return a message that the robot takes: as it is, with VALUE_SLOT for one of its values, and that value."""
     found: tuple[Node, Node, str] | None = None
     for operation in service.contract.operations:
         message = example(service, operation)
@@ -83,9 +83,9 @@ def _runner(judge: Judge, service: SoapService, message: Node) -> AttackRunner:
 
 @pytest.mark.requirement(_SPOOFING, *_IDS)
 def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Each attack in a message that the robot would take without it, in the Body and in Header blocks."""
+    """Send each attack in a message that the robot takes without it, in the Body and in Header blocks."""
     if not soap.there:
-        # Then the class is judged over REST alone.
+        # The class is then judged over REST alone.
         for id_ in (_SPOOFING, "xml-security/soapaction-spoofing"):
             judge.unclaimed(id_, "the robot has no SOAP service")
         return
@@ -98,7 +98,7 @@ def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                 for id_ in _IDS:
                     judge.skip(id_, f"the {service.name} service took none of the messages tried")
                 continue
-            # Addresses first: whoever calls them has time until the other attacks are over.
+            # Addresses first: a robot that calls them has time until the other attacks are over.
             spoofed = list(_spoofed(service, harmless[0], callbacks))
             others = _attacks(service, harmless, callbacks, 1 if effort.factor < _HALF else _EACH)
             for chosen in (spoofed[: effort.cases(len(spoofed))], others):
@@ -111,7 +111,7 @@ def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 def _attacks(
     service: SoapService, harmless: tuple[Node, Node, str], callbacks: CallbackServer, each: int
 ) -> Iterator[Attack]:
-    """By the XML of a harmless message: its parts and what is to be ignored beside them."""
+    """Yield the attacks on the XML of a harmless message, in a value and in a Header block to be ignored."""
     _, marked, value = harmless
     aside = Node(clark("urn:example:strange", "Note"), IGNORED_SLOT)
     document = envelope([marked], (aside,)).written().decode()

@@ -1,1 +1,1 @@
-"""The figures of the latency reports: one module for each kind, drawn with matplotlib, handed out as inline SVG."""
+"""The figures of the latency reports: one module for each kind, drawn with matplotlib, as inline SVG."""

@@ -1,17 +1,17 @@
-"""What all figures share: size, colours, axes, and the way from a matplotlib figure to SVG inside a page.
+"""What all figures share: size, colours, axes, and the conversion of a matplotlib figure to SVG inside a page.
 
-Figures are small panels of one subject each, so that their text stays readable when a phone shows them at its
-width; a page sets them side by side where it has room. Colours are Okabe and Ito's, which survive the common
-kinds of colour blindness; nothing is told by colour alone. Drawing the same data gives the same octets.
+A figure consists of small panels, so that its text stays readable on a phone; a page sets them side by side where it
+has room. The colours are Okabe and Ito's, which people with the common kinds of colour blindness can tell apart. No
+meaning depends on colour alone. The same data gives the same SVG, byte for byte.
 """
 
 import io
 import math
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec
 
 import matplotlib as mpl
 from lxml import etree
@@ -20,17 +20,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+P = ParamSpec("P")
 INK, SOFT, LINE = "#16202a", "#55616d", "#d9dfe5"
 COLOUR = {"rest": "#0072B2", "soap": "#D55E00", "rosbridge": "#009E73"}
 MARK = {"rest": "o", "soap": "^", "rosbridge": "s"}
-"""A sign for each interface beside its colour: the colours are one grey on a black and white printer."""
+"""A marker for each interface beside its colour, because a black and white printer shows one grey."""
 SPAN_COLOUR = {"build": "#E69F00", "wire": "#56B4E9", "server": "#009E73", "parse": "#CC79A7"}
 SPAN_HATCH = {"build": "", "wire": "//", "server": "", "parse": "\\\\"}
 PAPER_COLOUR = "#7a4d8f"
 _WHOLE_MS = 10
-"""Milliseconds from which a tick is a whole number."""
+"""Milliseconds from which a tick label is a whole number."""
 _DECADES_WITH_STEPS = 2
-"""Decades up to which ticks stand at 1, 2 and 5; on a longer axis their labels would touch."""
+"""Up to this many decades there are ticks at 1, 2 and 5; on a longer axis their labels would touch."""
 
 _WIDTH, _HEIGHT, _DPI = 4.8, 3.4, 100
 _STYLE: Any = {
@@ -71,8 +72,8 @@ class Picture:
     """One figure of a page: panels with a caption.
 
     Attributes:
-        name: unique on its page; becomes the id.
-        caption: what it shows and how to read it, a sentence or two.
+        name: unique on its page; it becomes the id.
+        caption: what it shows and how to read it.
         panels: the drawings as SVG.
     """
 
@@ -82,7 +83,7 @@ class Picture:
 
 
 class Panel:
-    """One drawing that is being made: its axes, and how to hand it out."""
+    """One drawing: a matplotlib figure with one pair of axes."""
 
     def __init__(self, title: str, alt: str, height: float = _HEIGHT) -> None:
         self._figure = Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained")
@@ -91,27 +92,35 @@ class Panel:
         self.axes.set_title(title)
 
     def legend(self, columns: int = 2) -> None:
-        """Put the legend below the axes, where it hides nothing."""
+        """Put the legend below the axes, where it covers nothing."""
         handles, labels = self.axes.get_legend_handles_labels()
         if handles:
             self._figure.legend(handles, labels, loc="outside lower left", ncols=columns)
 
     def svg(self, name: str) -> Markup:
-        """The drawing as an SVG element whose ids all begin with `name`."""
+        """Return the drawing as an SVG element in which every id begins with `name`."""
         buffer = io.BytesIO()
         self._figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
         return Markup(_inline(buffer.getvalue(), name, self._alt))  # noqa: S704 - drawn here, its text escaped by lxml
 
 
-@contextmanager
-def drawing() -> Iterator[None]:
-    """The style that every panel is made in."""
-    with mpl.rc_context(_STYLE):
-        yield
+def picture(name: str, caption: str) -> Callable[[Callable[P, Iterator[Panel]]], Callable[P, Picture | None]]:
+    """Turn a function that yields panels into one that returns their picture, or None if it yields none."""
+
+    def decorate(panels: Callable[P, Iterator[Panel]]) -> Callable[P, Picture | None]:
+        @wraps(panels)
+        def draw(*args: P.args, **kwargs: P.kwargs) -> Picture | None:
+            with mpl.rc_context(_STYLE):
+                drawn = [panel.svg(f"{name}-{number}") for number, panel in enumerate(panels(*args, **kwargs))]
+            return Picture(name, caption, tuple(drawn)) if drawn else None
+
+        return draw
+
+    return decorate
 
 
 def _inline(document: bytes, name: str, alt: str) -> str:
-    """Make an SVG document an element of a page: no ids that could clash, no size of its own, an alternative text."""
+    """Make an SVG document an element of a page: with unique ids, an alternative text, and no size of its own."""
     root = etree.fromstring(document, etree.XMLParser(resolve_entities=False, no_network=True))
     svg = "{http://www.w3.org/2000/svg}"
     for element in [*root.iter(f"{svg}metadata"), *root.iter(f"{svg}style")]:
@@ -139,29 +148,17 @@ def _inline(document: bytes, name: str, alt: str) -> str:
 
 
 def milliseconds(value: float) -> str:
-    """A tick's label: 0.05, 1, 20, 1,000."""
+    """Return a tick's label: 0.05, 1, 20, 1,000."""
     return f"{value:,.0f}" if value >= _WHOLE_MS else f"{value:g}"
 
 
-def log_time_axis(axes: Axes, which: str, label: str) -> None:
-    """Make an axis logarithmic, with milliseconds as plain numbers."""
-    axis = axes.xaxis if which == "x" else axes.yaxis
-    (axes.set_xscale if which == "x" else axes.set_yscale)("log")
-    low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
-    decades = _decades(low, high)
+def log_time_axis(axes: Axes, label: str) -> None:
+    """Make the y axis logarithmic, with milliseconds as plain numbers."""
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    decades = math.log10(high / low) if low > 0 else 3.0
     steps = (1.0, 2.0, 5.0) if decades <= _DECADES_WITH_STEPS else (1.0,)
-    axis.set_major_locator(mpl.ticker.LogLocator(subs=steps, numticks=12))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: milliseconds(value)))
-    axis.set_minor_formatter(NullFormatter())
-    (axes.set_xlabel if which == "x" else axes.set_ylabel)(label)
-
-
-def _decades(low: float, high: float) -> float:
-    return math.log10(high / low) if low > 0 else 3.0
-
-
-def gather(name: str, caption: str, panels: Sequence[Panel]) -> Picture | None:
-    """Make a picture of its panels; None where there is nothing to draw."""
-    if not panels:
-        return None
-    return Picture(name, caption, tuple(panel.svg(f"{name}-{number}") for number, panel in enumerate(panels)))
+    axes.yaxis.set_major_locator(mpl.ticker.LogLocator(subs=steps, numticks=12))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: milliseconds(value)))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_ylabel(label)

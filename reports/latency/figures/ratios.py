@@ -1,16 +1,16 @@
-"""Ratios with their intervals, one under the other: SOAP to REST beside the paper's, or a new run to an old one."""
+"""Ratios with their intervals: of SOAP to REST, of a new run to an old one, or of one robot to another."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from reports.latency.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Picture, drawing, gather
+from reports.latency.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Picture, picture
 
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """One row; `interval` is the ratio's 95 % interval, or None where the run supports none."""
+    """One row; `interval` is the ratio's 95 % interval, or None if the run is too short for one."""
 
     label: str
     ratio: float
@@ -21,50 +21,55 @@ class Ratio:
 def ratios(
     name: str, title: str, rows: Sequence[Ratio], caption: str, *, mark: tuple[float, str] | None = None
 ) -> Picture | None:
-    """A panel with a dot and a bar for each row, from top to bottom, on a logarithmic axis with 1 in it.
+    """Return a panel with a dot and a bar for each row, on a logarithmic axis that includes 1; None without rows.
 
-    `mark` is a figure to compare with, and what it is called.
+    `mark` is a value to compare with, and its name.
     """
-    if not rows:
-        return None
-    told = "; ".join(f"{row.label}: {row.ratio:.3g}" for row in rows)
-    with drawing():
-        panel = Panel(title, f"{title}. {told}", height=1.45 + 0.34 * len(rows))
-        axes = panel.axes
-        axes.axvline(1.0, color=INK, linewidth=0.9)
-        if mark is not None:
-            axes.axvline(mark[0], color=PAPER_COLOUR, linestyle=(0, (4, 3)), linewidth=1.4, label=mark[1])
-        for place, row in enumerate(rows):
-            if row.interval is not None:
-                axes.plot(
-                    row.interval, [place, place], color=row.colour, linewidth=5, alpha=0.35, solid_capstyle="butt"
-                )
-            axes.plot([row.ratio], [place], "o", color=row.colour, markersize=5)
-            axes.annotate(
-                f"{row.ratio:.2f}",
-                (1.0, place),
-                (6, 0),
-                xycoords=("axes fraction", "data"),
-                textcoords="offset points",
-                va="center",
-                color=SOFT,
-            )
-        axes.set_yticks(range(len(rows)), [row.label for row in rows])
-        axes.set_ylim(len(rows) - 0.4, -0.6)
-        axes.set_xscale("log")
-        low, high = axes.get_xlim()
-        low, high = min(low, 0.8), max(high, 1.25)
-        axes.set_xlim(low, high)
-        axes.xaxis.set_minor_locator(NullLocator())
-        axes.xaxis.set_major_locator(FixedLocator(_ticks(low, high)))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.grid(visible=False, axis="y")
-        panel.legend()
-        return gather(name, caption, [panel])
+
+    @picture(name, caption)
+    def panels() -> Iterator[Panel]:
+        if rows:
+            yield _panel(title, rows, mark)
+
+    return panels()
+
+
+def _panel(title: str, rows: Sequence[Ratio], mark: tuple[float, str] | None) -> Panel:
+    text = "; ".join(f"{row.label}: {row.ratio:.3g}" for row in rows)
+    panel = Panel(title, f"{title}. {text}", height=1.45 + 0.34 * len(rows))
+    axes = panel.axes
+    axes.axvline(1.0, color=INK, linewidth=0.9)
+    if mark is not None:
+        axes.axvline(mark[0], color=PAPER_COLOUR, linestyle=(0, (4, 3)), linewidth=1.4, label=mark[1])
+    for place, row in enumerate(rows):
+        if row.interval is not None:
+            axes.plot(row.interval, [place, place], color=row.colour, linewidth=5, alpha=0.35, solid_capstyle="butt")
+        axes.plot([row.ratio], [place], "o", color=row.colour, markersize=5)
+        axes.annotate(
+            f"{row.ratio:.2f}",
+            (1.0, place),
+            (6, 0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            va="center",
+            color=SOFT,
+        )
+    axes.set_yticks(range(len(rows)), [row.label for row in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_xscale("log")
+    low, high = axes.get_xlim()
+    low, high = min(low, 0.8), max(high, 1.25)
+    axes.set_xlim(low, high)
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_locator(FixedLocator(_ticks(low, high)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.grid(visible=False, axis="y")
+    panel.legend()
+    return panel
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """The finest of three scales of ticks that keeps them apart; 1 is in each."""
+    """Return the ticks of the finest scale whose labels do not overlap; each scale includes 1."""
     scales = (
         (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5),
         (0.25, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0),

@@ -1,44 +1,40 @@
-"""Where the time goes: the spans of a request, stacked, for the wire client and for zeep."""
+"""Where the time goes: the spans of a request, stacked, for each client."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
-from reports.latency.distributions import Series
-from reports.latency.figures.canvas import INK, SPAN_COLOUR, SPAN_HATCH, Panel, Picture, drawing, gather, milliseconds
-from reports.latency.figures.spectrum import Key
+from reports.latency.distributions import AllSeries, Series
+from reports.latency.figures.canvas import INK, SPAN_COLOUR, SPAN_HATCH, Panel, milliseconds, picture
 
 SPANS = ("build", "wire", "server", "parse")
 
 
-def spans(series: Mapping[Key, Series]) -> Picture | None:
-    """One panel for each client: mean spans of each operation and interface, laid end to end."""
-    panels = []
-    with drawing():
-        for client in dict.fromkeys(key[1] for key in series):
-            bars = {s.name: means(s) for key, s in series.items() if key[1] == client and s.data["count"]}
-            bars = {name: parts for name, parts in bars.items() if parts}
-            if bars:
-                panels.append(_panel(client, bars))
-        return gather(
-            "spans",
-            "What a request spends its time on, on average. Build: making the request. Wire: the client's sending, "
-            "the network and the robot's reading. Server: the robot's own work, as it states it in Server-Timing "
-            "(without that, it is part of wire). Parse: reading the answer.",
-            panels,
-        )
+@picture(
+    "spans",
+    "Mean time that a request spends in each part. Build: the client makes the request. Wire: the client sends, the "
+    "network transmits, the robot reads. Server: the robot's own work, as its Server-Timing header states it; "
+    "without that header it is part of wire. Parse: the client reads the response.",
+)
+def spans(series: AllSeries) -> Iterator[Panel]:
+    """Yield a panel for each client: the mean spans of each operation and interface, end to end."""
+    for client in dict.fromkeys(key[1] for key in series):
+        bars = {s.name: means(s) for key, s in series.items() if key[1] == client and s.data["count"]}
+        bars = {name: parts for name, parts in bars.items() if parts}
+        if bars:
+            yield _panel(client, bars)
 
 
 def means(series: Series) -> dict[str, float]:
-    """Mean milliseconds of each span that was observed; means, unlike quantiles, add up."""
+    """Return the mean milliseconds of each observed span; means can be added, quantiles cannot."""
     observed = {name: series.data["spans_ms"][name] for name in SPANS}
     return {name: part["mean"] for name, part in observed.items() if part is not None and part["mean"] is not None}
 
 
 def _panel(client: str, bars: Mapping[str, Mapping[str, float]]) -> Panel:
-    told = "; ".join(
+    text = "; ".join(
         f"{name}: " + ", ".join(f"{span} {time:.3g} ms" for span, time in parts.items()) for name, parts in bars.items()
     )
     panel = Panel(
-        f"{client} client", f"Mean time spent with the {client} client. {told}", height=1.5 + 0.42 * len(bars)
+        f"{client} client", f"Mean time spent with the {client} client. {text}", height=1.5 + 0.42 * len(bars)
     )
     longest = max(sum(parts.values()) for parts in bars.values())
     for span in SPANS:

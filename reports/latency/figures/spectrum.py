@@ -1,65 +1,59 @@
 """The percentile spectrum: latency over the share of requests that were faster, on HdrHistogram's axis.
 
-The axis is 1 / (1 - quantile), logarithmic: each nine takes the same room, so that the tail, where a robot's
-stalls are, is not squeezed into the last pixel.
+The axis is 1 / (1 - quantile), logarithmic: 90 %, 99 % and 99.9 % are equally far apart, so that the tail is readable.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from reports.latency.distributions import Distribution, Floats, Series
-from reports.latency.figures.canvas import COLOUR, MARK, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.distributions import AllSeries, Distribution, Floats
+from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, picture
 
 _POINTS = 220
 _NINES = (0.0, 0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999)
 
-Key = tuple[str, str, str]
 
-
-def spectrum(series: Mapping[Key, Series]) -> Picture | None:
-    """One panel for each client and operation: service time as a line, response time dashed."""
-    panels = []
-    with drawing():
-        for client, operation in dict.fromkeys((key[1], key[0]) for key in series):
-            drawn = [s for key, s in series.items() if key[:2] == (operation, client) and s.service is not None]
-            if not drawn:
-                continue
-            names = " and ".join(s.data["interface"].upper() for s in drawn)
-            panel = Panel(
-                f"{operation}, {client} client",
-                f"Percentile spectrum of {names} for {operation} with the {client} client; "
-                "the table of quantiles holds its figures.",
-            )
-            for one in drawn:
-                interface = one.data["interface"]
-                if one.service is not None:
-                    curve(panel.axes, one.service, (COLOUR[interface], MARK[interface]), f"{interface.upper()} service")
-                if one.response is not None and _differ(one.service, one.response):
-                    curve(
-                        panel.axes,
-                        one.response,
-                        (COLOUR[interface], MARK[interface]),
-                        f"{interface.upper()} response",
-                        "--",
-                    )
-            quantile_axis(panel.axes, max(s.service.total for s in drawn if s.service is not None))
-            log_time_axis(panel.axes, "y", "milliseconds")
-            panel.legend()
-            panels.append(panel)
-        return gather(
-            "spectrum",
-            "How long the slowest requests took. Read: at 99 %, one request in a hundred took longer than the curve "
-            "says. Solid: service time, from the moment a request was sent. Dashed: response time, from the moment "
-            "it was due, which also counts the wait behind a stalled robot. Thin: too few requests for a sure value.",
-            panels,
+@picture(
+    "spectrum",
+    "Time at each percentile. At 99 %, one request in a hundred took longer than the curve shows. Solid: service "
+    "time, counted from when a request was sent. Dashed: response time, counted from when it was due, so that "
+    "waiting for a stalled robot is included. Thin lines: too few requests for a reliable value.",
+)
+def spectrum(series: AllSeries) -> Iterator[Panel]:
+    """Yield a panel for each client and operation: service time as a solid line, response time dashed."""
+    for client, operation in dict.fromkeys((key[1], key[0]) for key in series):
+        drawn = [s for key, s in series.items() if key[:2] == (operation, client) and s.service is not None]
+        if not drawn:
+            continue
+        names = " and ".join(s.data["interface"].upper() for s in drawn)
+        panel = Panel(
+            f"{operation}, {client} client",
+            f"Percentile spectrum of {names} for {operation} with the {client} client; "
+            "the table of quantiles holds its figures.",
         )
+        for one in drawn:
+            interface = one.data["interface"]
+            if one.service is not None:
+                curve(panel.axes, one.service, (COLOUR[interface], MARK[interface]), f"{interface.upper()} service")
+            if one.response is not None and _differ(one.service, one.response):
+                curve(
+                    panel.axes,
+                    one.response,
+                    (COLOUR[interface], MARK[interface]),
+                    f"{interface.upper()} response",
+                    "--",
+                )
+        quantile_axis(panel.axes, max(s.service.total for s in drawn if s.service is not None))
+        log_time_axis(panel.axes, "milliseconds")
+        panel.legend()
+        yield panel
 
 
 def curve(axes: Axes, values: Distribution, look: tuple[str, str], label: str, dash: str = "-") -> None:
-    """Draw one distribution in a colour and with a mark; thin where the values are too few for an interval."""
+    """Draw one distribution; the line is thin where there are too few values for an interval."""
     colour, mark = look
     reach = float(np.log10(max(values.total, 10)))
     at = 1 - 10.0 ** -np.linspace(0.0, reach, _POINTS)
@@ -73,7 +67,7 @@ def curve(axes: Axes, values: Distribution, look: tuple[str, str], label: str, d
 
 
 def quantile_axis(axes: Axes, total: int) -> None:
-    """Make the x axis HdrHistogram's, as far as `total` values reach."""
+    """Give the x axis HdrHistogram's scale, as far as `total` values reach."""
     end = float(max(total, 10))
     axes.set_xscale("log")
     axes.set_xlim(1.0, end)
@@ -90,7 +84,7 @@ def _nines(at: Floats) -> Floats:
 
 
 def _differ(service: Distribution | None, response: Distribution) -> bool:
-    """Whether a second curve would show anything; in the closed model both times are one."""
+    """Return whether the two curves differ; in the closed model they are the same."""
     return service is None or not (
         np.array_equal(service.low_ms, response.low_ms) and np.array_equal(service.counts, response.counts)
     )

@@ -1,13 +1,13 @@
 """Latency over the run, with the stalls of the robot marked."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
 from matplotlib.ticker import MaxNLocator
 
-from reports.latency.figures.canvas import COLOUR, INK, MARK, Panel, Picture, drawing, gather, log_time_axis
+from reports.latency.figures.canvas import COLOUR, INK, MARK, Panel, log_time_axis, picture
 
 _MOST_POINTS = 240
 _STALL_FACTOR = 20
@@ -17,10 +17,10 @@ _STALL_COLOUR = "#F0E442"
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """A time, counted from the run's start, in which a request waited far longer than usual.
+    """A period, counted from the start of the run, in which a request waited far longer than usual.
 
     Attributes:
-        longest_ms: the longest response time in it; None where not one request came back.
+        longest_ms: the longest response time in it; None if no request was answered.
         series: operation, client, interface.
     """
 
@@ -31,10 +31,9 @@ class Stall:
 
 
 def stalls(result: Mapping[str, Any]) -> list[Stall]:
-    """Intervals whose longest response took 20 times the series' usual one and over 20 ms, runs of them as one.
+    """Return intervals whose longest response took 20 times the usual time and over 20 ms, adjacent ones as one stall.
 
-    The usual one is the median over intervals of the interval's own median. An interval in which every
-    request failed counts as well.
+    The usual time is the median of the intervals' medians. An interval in which every request failed counts as well.
     """
     found: list[Stall] = []
     for series in _timed(result):
@@ -57,47 +56,44 @@ def stalls(result: Mapping[str, Any]) -> list[Stall]:
     return found
 
 
-def timeline(result: Mapping[str, Any]) -> Picture | None:
-    """One panel for each client and operation: median and longest response time over the run."""
-    panels = []
+@picture(
+    "timeline",
+    "Response time over the run. Line: median of each interval. Markers: its longest request. Crosses: failed "
+    "requests. Yellow: stalls, in which a request took 20 times as long as usual and over 20 ms.",
+)
+def timeline(result: Mapping[str, Any]) -> Iterator[Panel]:
+    """Yield a panel for each client and operation: median and longest response time over the run."""
     marks = stalls(result)
     timed = list(_timed(result))
-    with drawing():
-        for operation, client in dict.fromkeys((s["operation"], s["client"]) for s in timed):
-            drawn = [s for s in timed if (s["operation"], s["client"]) == (operation, client)]
-            own = [stall for stall in marks if stall.series[:2] == (operation, client)]
-            panel = Panel(
-                f"{operation}, {client} client",
-                f"Response times of {operation} with the {client} client over the run; "
-                f"{len(own)} {'stall' if len(own) == 1 else 'stalls'} marked.",
-            )
-            for stall in own:
-                panel.axes.axvspan(stall.start_s, stall.end_s, color=_STALL_COLOUR, alpha=0.5, linewidth=0)
-            for series in drawn:
-                _draw(panel, series)
-            log_time_axis(panel.axes, "y", "response time, ms")
-            panel.axes.xaxis.set_major_locator(MaxNLocator(7, integer=True))
-            panel.axes.set_xlabel("seconds since the start")
-            longest = max(own, key=lambda stall: stall.longest_ms or 0.0, default=None)
-            if longest is not None and longest.longest_ms is not None:
-                late = longest.end_s > 0.8 * panel.axes.get_xlim()[1]  # there is no room to the right
-                panel.axes.annotate(
-                    f"{longest.longest_ms:,.0f} ms",
-                    (longest.start_s if late else longest.end_s, longest.longest_ms),
-                    (-4 if late else 4, 0),
-                    textcoords="offset points",
-                    ha="right" if late else "left",
-                    va="center",
-                    color=INK,
-                )
-            panel.legend()
-            panels.append(panel)
-        return gather(
-            "timeline",
-            "Response time over the run: the line is each interval's median, the dots its longest request, crosses "
-            "are failed requests. Yellow marks stalls: a request took 20 times as long as usual, and over 20 ms.",
-            panels,
+    for operation, client in dict.fromkeys((s["operation"], s["client"]) for s in timed):
+        drawn = [s for s in timed if (s["operation"], s["client"]) == (operation, client)]
+        own = [stall for stall in marks if stall.series[:2] == (operation, client)]
+        panel = Panel(
+            f"{operation}, {client} client",
+            f"Response times of {operation} with the {client} client over the run; "
+            f"{len(own)} {'stall' if len(own) == 1 else 'stalls'} marked.",
         )
+        for stall in own:
+            panel.axes.axvspan(stall.start_s, stall.end_s, color=_STALL_COLOUR, alpha=0.5, linewidth=0)
+        for series in drawn:
+            _draw(panel, series)
+        log_time_axis(panel.axes, "response time, ms")
+        panel.axes.xaxis.set_major_locator(MaxNLocator(7, integer=True))
+        panel.axes.set_xlabel("seconds since the start")
+        longest = max(own, key=lambda stall: stall.longest_ms or 0.0, default=None)
+        if longest is not None and longest.longest_ms is not None:
+            late = longest.end_s > 0.8 * panel.axes.get_xlim()[1]  # there is no room to the right
+            panel.axes.annotate(
+                f"{longest.longest_ms:,.0f} ms",
+                (longest.start_s if late else longest.end_s, longest.longest_ms),
+                (-4 if late else 4, 0),
+                textcoords="offset points",
+                ha="right" if late else "left",
+                va="center",
+                color=INK,
+            )
+        panel.legend()
+        yield panel
 
 
 def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
@@ -105,7 +101,7 @@ def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
     points = _thinned([point for point in series["points"] if point["p50_ms"] is not None])
     colour = COLOUR[interface]
     times = [point["t_s"] for point in points]
-    # Unlike dashes keep the two apart where colours are one grey.
+    # Different dashes distinguish the two where both colours are printed as the same grey.
     dash = "-" if interface == "rest" else (0, (5, 1.5))
     panel.axes.plot(
         times,
@@ -140,7 +136,7 @@ def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
 
 
 def _thinned(points: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """At most a few hundred points: of each group the one with the longest request, so that no stall is lost."""
+    """Return at most a few hundred points: of each group the one with the longest request, so that stalls remain."""
     step = -(-len(points) // _MOST_POINTS) or 1
     groups = (points[start : start + step] for start in range(0, len(points), step))
     return [max(group, key=lambda point: point["max_ms"] or 0.0) for group in groups]

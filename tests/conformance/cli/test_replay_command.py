@@ -11,9 +11,9 @@ from click.testing import CliRunner
 
 from conformance.contract.pack import Contract
 from conformance.engine.permission import moves
-from conformance.engine.sequence import read_request, written
+from conformance.engine.resending import read_request, written
 from conformance.transport.exchange import Request
-from conformance.verdict.evidence import Sent
+from conformance.verdict.finding import Sent
 from roaas import main
 
 
@@ -197,7 +197,7 @@ def test_what_moves_is_told_by_what_is_sent():
 )
 def test_a_sequence_that_no_run_wrote_is_refused(part):
     (item,) = written([Sent(0.0, Request("GET", "http://r2/"))])
-    with pytest.raises(ValueError, match=r"no part|cut short|Error -3"):
+    with pytest.raises(ValueError, match=r"cannot be a part|cut short|Error -3"):
         read_request({**item, **part})
 
 

@@ -110,7 +110,7 @@ def test_an_interrupted_fleet_ends_its_runs_and_keeps_what_it_has(tmp_path, list
         (["--fleet", "FLEET", "robot.toml"], "STATEMENT"),
         (["--fleet", "EMPTY"], "names no robot"),
         (["--fleet", "FLEET", "--nonce", " "], "--nonce"),
-        (["--fleet", "FLEET", "--sign", "FLEET"], "no private key"),
+        (["--fleet", "FLEET", "--sign", "FLEET"], "not a private key"),
         (["--fleet", "missing.toml"], "missing.toml"),
     ],
 )

@@ -1,3 +1,4 @@
+import select
 import socket
 import statistics
 import threading
@@ -8,6 +9,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import NoAnswer, NoAnswerError
+from conformance.transport.parallel import Outgoing, send_together
 
 
 class _Server(ThreadingHTTPServer):
@@ -98,3 +101,120 @@ def test_a_server_that_awaits_an_acknowledgement_in_mid_answer_gets_it_at_once()
     if hasattr(socket, "TCP_QUICKACK"):
         # A delayed acknowledgement takes 0.04 s, and on a busy machine some take as long without.
         assert statistics.quantiles(times)[0] < 0.02
+
+
+class _Stale(BaseHTTPRequestHandler):
+    """Reads a second request on a connection and closes it in place of a response; or reads none, and closes."""
+
+    protocol_version = "HTTP/1.1"
+
+    def setup(self) -> None:
+        super().setup()
+        self.answered = 0
+
+    def _answer(self) -> None:
+        self.rfile.read(int(self.headers.get("Content-Length", 0)))
+        self.server.seen.append(self.command)
+        if self.path == "/broken" or self.answered:
+            self.close_connection = True
+            return
+        self.answered += 1
+        self.send_response(204)
+        self.end_headers()
+
+    do_GET = do_HEAD = do_OPTIONS = do_PUT = do_DELETE = do_POST = _answer  # noqa: N815 - http.server's names
+
+    def log_message(self, *_: object) -> None:
+        return
+
+
+@pytest.fixture
+def stale():
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _Stale)
+    server.daemon_threads, server.seen = True, []
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+    client = HttpClient(f"http://127.0.0.1:{server.server_port}", Connection(timeout_s=2))
+    yield server, client
+    client.close()
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD", "OPTIONS", "PUT", "DELETE"])
+def test_an_idempotent_request_on_a_connection_that_the_server_closed_is_sent_again_and_counted(stale, method):
+    server, client = stale
+    client.send("GET", "/")
+    assert client.send(method, "/").response.status == 204
+    assert server.seen == ["GET", method, method]
+    assert (client.connection.resent, client.connection.sent) == (1, 3)
+
+
+def test_that_never_becomes_a_failure_however_often_it_happens(stale):
+    _, client = stale
+    for _ in range(30):
+        assert client.send("GET", "/").response.status == 204
+    assert client.connection.resent >= 14
+
+
+def test_a_request_that_is_not_idempotent_and_was_read_is_not_sent_again(stale):
+    server, client = stale
+    client.send("GET", "/")
+    with pytest.raises(NoAnswerError, match=r"closed the connection without a response$"):
+        client.send("POST", "/", body=b"order")
+    assert server.seen == ["GET", "POST"]
+    assert client.connection.resent == 0
+
+
+def test_a_connection_that_is_closed_again_is_told_with_the_response_before(stale):
+    server, client = stale
+    client.send("GET", "/")
+    with pytest.raises(NoAnswerError) as none:
+        client.send("GET", "/broken")
+    assert none.value.kind is NoAnswer.CLOSED
+    assert str(none.value) == (
+        "the server closed the connection without a response, 2 of 2 times; "
+        "the request before it on the first connection was answered 204"
+    )
+    assert server.seen == ["GET", "GET", "GET"]
+
+
+def test_the_first_request_of_a_connection_is_sent_once(stale):
+    server, client = stale
+    with pytest.raises(NoAnswerError, match=r"closed the connection without a response$"):
+        client.send("GET", "/broken")
+    assert server.seen == ["GET"]
+
+
+def test_a_request_that_nobody_can_have_read_is_sent_again_whatever_its_method():
+    """The server closes with the request unread, so that the network resets the connection."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve() -> None:
+            answer = b"HTTP/1.1 204 No Content\r\n\r\n"
+            first, _ = listening.accept()
+            with first:
+                first.recv(65536)
+                first.sendall(answer)
+                while not select.select([first], [], [], 5)[0]:
+                    pass
+            second, _ = listening.accept()
+            with second:
+                second.recv(65536)
+                second.sendall(answer)
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        client = HttpClient(f"http://127.0.0.1:{listening.getsockname()[1]}", Connection(timeout_s=2))
+        client.send("GET", "/")
+        assert client.send("POST", "/", body=b"order").response.status == 204
+        assert client.connection.resent == 1
+        client.close()
+        thread.join()
+
+
+def test_what_several_clients_send_again_is_counted(stale):
+    server, client = stale
+    rounds = [[Outgoing(client, "GET", "/")] * 2] * 2
+    answered = send_together(rounds)
+    assert [attempt.response.status for attempts in answered for attempt in attempts] == [204] * 4
+    assert (client.connection.resent, len(server.seen)) == (2, 6)

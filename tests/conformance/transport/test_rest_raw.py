@@ -27,6 +27,12 @@ def test_an_answer_to_head_has_no_body_whatever_its_length_says():
     assert parse(b"HTTP/1.0 200 OK\r\nContent-Length: 5\r\n\r\nhello", "HEAD", closed=True)[1] == b"hello"
 
 
+def test_an_interim_response_comes_before_the_final_one():
+    octets = b"HTTP/1.1 103 Early Hints\r\nLink: </x>\r\n\r\nHTTP/1.1 204 No Content\r\nX-A: b\r\n\r\nrest"
+    response, rest = parse(octets, "PUT", closed=False)
+    assert (response.status, response.headers, rest) == (204, (("X-A", "b"),), b"rest")
+
+
 def test_a_body_may_end_with_the_connection():
     assert parse(b"HTTP/1.0 200 OK\r\n\r\nall of it", "GET", closed=True)[0].body == b"all of it"
 
@@ -46,6 +52,13 @@ def test_a_body_may_end_with_the_connection():
         b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n5\r\nab\r\n0\r\n\r\n",
         b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nxyz\r\n",
         b"HTTP/1.1 200 OK\nContent-Length: 0\n\n",
+        b"HTTP/1.1 200 OK\r\nA: b\nContent-Length: 0\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nA: b\r\n c\r\nContent-Length: 0\r\n\r\n",
+        b"HTTP/2.0 200 OK\r\nContent-Length: 0\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nTransfer-Encoding: identity\r\n\r\nab",
+        b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n2\r\nab0\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n2\r\nab\r\n0\r\n\n",
+        b"HTTP/1.1 103 Early\nA: b\n\r\n\r\nHTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n",
     ],
 )
 def test_what_is_not_well_framed(octets):

@@ -4,7 +4,7 @@ import pytest
 
 from conformance.contract.classes import Level, Origin
 from conformance.contract.ledger import Requirement
-from conformance.verdict.evidence import MAX_FINDINGS, Evidence, Judge
+from conformance.verdict.evidence import Evidence, Judge
 from conformance.verdict.verdicts import class_verdicts, overall, verdict_of, views
 
 _CLAIMS = ("http",)
@@ -120,12 +120,3 @@ def test_failures_of_one_cause_are_one_finding():
         judge.check("http/x", False, None, "status 404", found=f"status {status}")
     findings = judge.evidence["http/x"].findings
     assert [finding.seen for finding in findings.values()] == [20]
-
-
-def test_causes_beyond_the_shown_ones_still_count():
-    judge = Judge({"http/x"})
-    for letter in "abcdefghij":
-        judge.check("http/x", False, None, f"thing {letter}", found="not so")
-    findings = judge.evidence["http/x"].findings
-    assert len(findings) == MAX_FINDINGS
-    assert sum(finding.seen for finding in findings.values()) == 10

@@ -1,19 +1,17 @@
 """Addresses from WSDLs: what is read, and what is refused in which words."""
 
 import re
-from pathlib import Path
 
 import pytest
 
+from conformance.packs.table1.files import CONTRACT_DIR
 from loadtests.clients import wsdl
 from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError
 
-CONTRACT = Path(__file__).parents[3] / "conformance" / "contract"
-
 
 def test_the_address_is_read_from_the_wsdl():
-    content = (CONTRACT / "publishers.wsdl").read_bytes()
+    content = (CONTRACT_DIR / "publishers.wsdl").read_bytes()
     found = wsdl.address_in(content, "publishers.wsdl", "ExecuteDeliveryRequest")
     assert found == "http://127.0.0.1:5555/turtlesim_publisher_ws"
     elsewhere = wsdl.address_in(
@@ -25,20 +23,20 @@ def test_the_address_is_read_from_the_wsdl():
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"<html><body>Welcome</body></html>", "is no WSDL 1.1: its root element is 'html'"),
-        (b"no xml", "is no XML"),
-        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", "holds a document type declaration"),
-        ((CONTRACT / "subscribers.wsdl").read_bytes(), "has no operation 'ExecuteDeliveryRequest'"),
+        (b"<html><body>Welcome</body></html>", "is not a WSDL 1.1: its root element is 'html'"),
+        (b"no xml", "is not XML"),
+        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", "has a document type declaration"),
+        ((CONTRACT_DIR / "subscribers.wsdl").read_bytes(), "has no operation 'ExecuteDeliveryRequest'"),
         (
-            (CONTRACT / "publishers.wsdl").read_bytes().replace(b"soap:address", b"soap:nothing"),
-            "holds no soap:address",
+            (CONTRACT_DIR / "publishers.wsdl").read_bytes().replace(b"soap:address", b"soap:nothing"),
+            "has no soap:address",
         ),
         (
-            (CONTRACT / "publishers.wsdl").read_bytes().replace(b"http://127.0.0.1:5555", b"REPLACE_ME"),
+            (CONTRACT_DIR / "publishers.wsdl").read_bytes().replace(b"http://127.0.0.1:5555", b"REPLACE_ME"),
             "cannot be used",
         ),
         (
-            (CONTRACT / "publishers.wsdl").read_bytes().replace(b"http://soap.turtlebot.mybot.org/", b"urn:else"),
+            (CONTRACT_DIR / "publishers.wsdl").read_bytes().replace(b"http://soap.turtlebot.mybot.org/", b"urn:else"),
             "target namespace is 'urn:else'",
         ),
     ],

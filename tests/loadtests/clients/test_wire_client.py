@@ -98,7 +98,7 @@ def test_a_host_that_takes_no_connection():
             Connection(endpoint, 0.3).call(get(endpoint))
         assert caught.value.kind == "network"
         with pytest.raises(CallError, match="no connection within the deadline") as caught:
-            LibraryRest(Robot(endpoint.url, None, None, timeout_s=0.3)).call("pose", {})
+            LibraryRest(Robot(endpoint.url, None, None, timeout_s=0.3), Sent()).call("pose", {})
         assert caught.value.kind == "network"
         for one in waiting:
             one.close()
@@ -184,13 +184,13 @@ def test_urls_that_are_none(url):
 
 def test_a_library_that_sends_again_by_itself_is_found_out(toy):
     robot = toy()
-    session = new_session(Robot(robot.url, None, None))
-    Sent.requests = Sent.calls = 0
+    sent = Sent()
+    session = new_session(Robot(robot.url, None, None), sent)
     with pytest.raises(requests.ConnectionError):
         session.get(f"{robot.url}/hang-up", timeout=5)
-    assert Sent.requests == 1, "requests as it comes sends once"
+    assert sent.requests == 1, "requests as it comes sends once"
     session.get_adapter(robot.url).max_retries = Retry(total=2, backoff_factor=0)
     with pytest.raises(requests.ConnectionError):
         session.get(f"{robot.url}/hang-up", timeout=5)
-    assert Sent.requests == 4, "and what retries below the call is counted all the same"
+    assert sent.requests == 4, "and what retries below the call is counted all the same"
     assert session.get(f"{robot.url}/count", timeout=5).text == "5"

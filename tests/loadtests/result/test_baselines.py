@@ -83,7 +83,7 @@ def test_what_is_not_valid_is_not_stored_and_other_loads_are_not_compared(load):
 
 @pytest.mark.parametrize(
     ("option", "message"),
-    [(["--baseline", "gone"], "there is no baseline"), (["--save", "../up"], "a name is made of letters")],
+    [(["--baseline", "gone"], "there is no baseline"), (["--save", "../up"], "a name consists of letters")],
 )
 def test_baselines_that_cannot_be(load, option, message):
     refused = load(*option)

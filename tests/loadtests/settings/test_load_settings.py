@@ -1,7 +1,6 @@
 """Options, statement, thresholds and WSDL: what is refused, and in which words."""
 
 import re
-from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -15,7 +14,6 @@ from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.settings import Settings
 from loadtests.settings.settle import MOTION_RATE, SettingsError, settle
 
-CONTRACT = Path(__file__).parents[2] / "conformance" / "contract"
 REST = {"rest": "http://robot:7003"}
 
 

@@ -58,6 +58,4 @@ def test_intervals_hold_for_another_run():
 
 
 def block(values_ms):
-    histogram = Histogram()
-    histogram.record((np.asarray(values_ms) * 1e6).astype(np.int64))
-    return histogram
+    return Histogram.of(int(value * 1e6) for value in values_ms)

@@ -1,28 +1,32 @@
-"""The sentence that is quoted: effect, interval, noise and p99, and never more than was judged."""
+"""The sentence that is quoted: effect, interval, A/A control and p99, and never more than was judged."""
+
+from dataclasses import replace
 
 import pytest
 
-from loadtests.statistics.headline import headline
+from loadtests.schedule.plan import Load, Plan
+from loadtests.statistics.against import Against, Change
+from loadtests.statistics.comparisons import SoapOverRest
+from loadtests.statistics.figures import Series
+from loadtests.statistics.headline import Found, headline
 
-PLAN = {"model": "open", "rate": 200.0, "users": None, "limits": {"max_rate": 500.0}}
+PLAN = Plan(("delivery",), ("rest", "soap"), ("wire",), Load(200.0, None, 20.0, 2.0, "constant", 1), 10.0, 1, 32)
+FOUND = Found(PLAN, most_rate=500.0)
 WHERE = ": delivery, wire client, 200 requests/s."
 
 
 def entry(judgement, quantile="p50", bound=None):
-    known = {"ratio": 1.47, "ci95": [1.4, 1.52], "noise_ci95": [0.97, 1.04], "soap_minus_rest_ms": 0.047}
+    known = {"ratio": 1.47, "ci95": [1.4, 1.52], "noise_ci95": [0.97, 1.04], "difference_ms": 0.047}
     named = {"operation": "delivery", "client": "wire", "quantile": quantile}
-    return known | named | {"judgement": judgement, "bound": bound, "judgement_reason": "too short"}
+    said = {"judgement": judgement, "bound": bound, "judgement_reason": "too short"}
+    return SoapOverRest(ci95_difference_ms=None, rounds=None, reason=None, **known, **named, **said)
 
 
-def series(p99=0.4, at_least=()):
-    return {"operation": "pose", "interface": "rest", "client": "wire", "modes": None, "at_least": at_least} | {
-        "service_ms": {"p50": 0.0741, "p99": p99},
-        "ci95_ms": {"p50": [0.073, 0.075], "p99": None},
-    }
-
-
-def document(**parts):
-    return {"plan": PLAN, "comparisons": [], "series": [], "thresholds": [], "noise_floor": []} | parts
+def series(p99=0.4, at_least=(), modes=None):
+    known = {"operation": "pose", "interface": "rest", "client": "wire", "modes": modes, "at_least": list(at_least)}
+    known["service_ms"] = {"p50": 0.0741, "p99": p99}
+    known["ci95_ms"] = {"p50": [0.073, 0.075], "p99": None}
+    return Series(**dict.fromkeys(Series.__struct_fields__) | known)
 
 
 @pytest.mark.parametrize(
@@ -31,35 +35,36 @@ def document(**parts):
         (
             entry("differs"),
             entry("differs", "p99"),
-            "SOAP takes 1.47 times as long as REST at the median (95 % interval 1.40 to 1.52, noise 0.97 to 1.04; "
-            "0.047 ms more), and 1.47 times at the 99th percentile (1.40 to 1.52)" + WHERE,
+            "SOAP takes 1.47 times as long as REST at the median (95 % interval 1.40 to 1.52, A/A control 0.97 to "
+            "1.04; 0.047 ms more), and 1.47 times at the 99th percentile (1.40 to 1.52)" + WHERE,
         ),
         (
             entry("bounded", bound=1.35),
             entry("none", "p99"),
-            "SOAP takes at least 1.35 times as long as REST at the median (95 % interval 1.40 to 1.52, less this run's "
-            "noise, 0.97 to 1.04); nothing can be said of the 99th percentile" + WHERE,
+            "SOAP takes at least 1.35 times as long as REST at the median (95 % interval 1.40 to 1.52, corrected by "
+            "this run's A/A control 0.97 to 1.04); 99th percentile: inconclusive" + WHERE,
         ),
         (
             entry("noise", bound=1.52),
             entry("noise", "p99", bound=1.9),
-            "No difference between SOAP and REST can be told from noise at the median (95 % interval 1.40 to 1.52, "
-            "noise 0.97 to 1.04; a factor beyond 1.52 is excluded); at the 99th percentile no difference can be told "
-            "from noise (a factor beyond 1.90 is excluded)" + WHERE,
+            "No significant difference between SOAP and REST at the median (95 % interval 1.40 to 1.52, A/A control "
+            "0.97 to 1.04; a factor beyond 1.52 is excluded); 99th percentile: not significant (a factor beyond 1.90 "
+            "is excluded)" + WHERE,
         ),
     ],
 )
 def test_a_duel_says_what_was_judged(median, tail, sentence):
-    found = headline(document(comparisons=[median, tail]), [], [])
+    found = headline(replace(FOUND, comparisons=[median, tail]))
     assert found["sentence"] == sentence
     assert sentence.startswith(found["words"])
 
 
 def test_another_robot_is_judged_by_the_figure_that_decides():
-    change = {"operation": "pose", "interface": "rest", "client": "wire", "difference_ms": -0.02, "ci95": [0.7, 0.9]}
-    changes = [change | {"quantile": q, "ratio": r, "verdict": "not slower"} for q, r in (("p50", 0.8), ("p99", 0.85))]
-    compared = {"verdict": "not slower", "tolerance": 0.05, "changes": changes}
-    found = headline(document(against=compared), [], [])
+    known = {"operation": "pose", "interface": "rest", "client": "wire", "difference_ms": -0.02, "ci95": [0.7, 0.9]}
+    known |= {"ci95_difference_ms": None, "rounds": None, "reason": None, "verdict": "not slower"}
+    changes = [Change(quantile=q, ratio=r, **known) for q, r in (("p50", 0.8), ("p99", 0.85))]
+    compared = Against(robot={}, tolerance=0.05, verdict="not slower", changes=changes, series=[])
+    found = headline(replace(FOUND, against=compared))
     assert found["words"] == "Not slower than the other robot"
     assert found["sentence"] == (
         "This robot takes 0.80 times as long as the other one at the median (95 % interval 0.70 to 0.90; 0.020 ms "
@@ -70,19 +75,21 @@ def test_another_robot_is_judged_by_the_figure_that_decides():
 
 def test_one_interface_alone_says_how_long_it_takes():
     half = "Half of the pose requests over REST take at most 0.074 ms (95 % interval 0.073 to 0.075 ms)"
-    found = headline(document(series=[series()]), [], [])
+    found = headline(replace(FOUND, series=[series()]))
     assert found["sentence"] == f"{half}, and 99 of 100 take at most 0.400 ms: wire client, 200 requests/s."
-    failed = headline(document(series=[series(at_least=("p99", "max"))]), [], [])
+    failed = headline(replace(FOUND, series=[series(at_least=("p99", "max"))]))
     assert "99 of 100 take at least 0.400 ms" in failed["sentence"]
-    assert "too few for a 99th percentile" in headline(document(series=[series(p99=None)]), [], [])["sentence"]
+    assert "too few for a 99th percentile" in headline(replace(FOUND, series=[series(p99=None)]))["sentence"]
 
 
 def test_what_spoils_a_run_is_all_that_its_headline_says():
-    compared = document(comparisons=[entry("differs"), entry("differs", "p99")])
-    assert headline(compared, ["it was late"], [])["sentence"] == (
+    compared = replace(FOUND, comparisons=[entry("differs"), entry("differs", "p99")])
+    assert headline(replace(compared, worthless=["it was late"]))["sentence"] == (
         "Not valid: these figures say nothing about the robot, because it was late."
     )
-    assert headline(compared, [], ["9 failed"])["sentence"] == "This run carries no statement, because 9 failed."
+    assert headline(replace(compared, undecided=["9 failed"]))["sentence"] == (
+        "This run is inconclusive, because 9 failed."
+    )
 
 
 @pytest.mark.parametrize(
@@ -95,18 +102,16 @@ def test_what_spoils_a_run_is_all_that_its_headline_says():
     ],
 )
 def test_thresholds_decide_the_words(outcomes, words):
-    judged = document(series=[series()], thresholds=[{"outcome": outcome} for outcome in outcomes])
-    assert headline(judged, [], [])["words"] == words
+    assert headline(replace(FOUND, series=[series()], outcomes=outcomes))["words"] == words
 
 
 def test_two_modes_are_said_beside_the_median():
-    split = series() | {"modes": {"split_ms": 0.5}}
-    assert headline(document(series=[split]), [], [])["sentence"].endswith(
-        " Two modes, for which no one figure stands: pose over REST."
+    assert headline(replace(FOUND, series=[series(modes={"split_ms": 0.5})]))["sentence"].endswith(
+        " Two modes, so that no single figure describes the series: pose over REST."
     )
 
 
 def test_a_cap_on_a_closed_model_is_part_of_its_figures():
-    plan = PLAN | {"model": "closed", "rate": None, "users": 4}
-    found = headline(document(series=[series()], plan=plan), [], [])
+    plan = replace(PLAN, load=replace(PLAN.load, rate=None, users=4))
+    found = headline(replace(FOUND, series=[series()], plan=plan))
     assert "4 users under a cap of 500 requests/s, which is part of the figures" in found["sentence"]

@@ -9,12 +9,6 @@ from loadtests.statistics.recorder import Recorder
 durations = st.lists(st.integers(0, 2 * HIGHEST_US * 1000), max_size=60)
 
 
-def filled(values):
-    histogram = Histogram()
-    histogram.record(np.array(values, dtype=np.int64))
-    return histogram
-
-
 @settings(deadline=None)
 @given(st.lists(st.integers(0, HIGHEST_US), min_size=1))
 def test_bins_are_those_of_hdrhistogram(values):
@@ -33,15 +27,15 @@ def test_bins_are_those_of_hdrhistogram(values):
 def test_merged_is_the_union(parts):
     merged = Histogram()
     for part in parts:
-        merged.merge(Histogram.unpack(filled(part).pack()))
-    union = filled([value for part in parts for value in part])
+        merged.merge(Histogram.unpack(Histogram.of(part).pack()))
+    union = Histogram.of([value for part in parts for value in part])
     assert merged.pack() == union.pack()
 
 
 @settings(deadline=None)
 @given(durations.filter(bool))
 def test_other_readers_find_the_same_in_the_encoded_histogram(values):
-    decoded = HdrHistogram.decode(filled(values).encode())
+    decoded = HdrHistogram.decode(Histogram.of(values).encode())
     reference = HdrHistogram(1, HIGHEST_US, 3)
     for value in values:
         reference.record_value(min(value // 1000, HIGHEST_US))
@@ -53,7 +47,7 @@ def test_other_readers_find_the_same_in_the_encoded_histogram(values):
 @settings(deadline=None)
 @given(st.lists(st.integers(0, 10_000_000_000), min_size=1, max_size=200), st.floats(0.0, 1.0))
 def test_quantiles_lie_within_a_bin_of_the_exact_ones(values, quantile):
-    histogram = filled(values)
+    histogram = Histogram.of(values)
     exact = np.quantile(values, quantile, method="inverted_cdf") / 1e6
     found = histogram.quantile_ms(quantile)
     assert histogram.lowest_ns / 1e6 <= found <= histogram.highest_ns / 1e6
@@ -61,7 +55,7 @@ def test_quantiles_lie_within_a_bin_of_the_exact_ones(values, quantile):
 
 
 def test_mean_and_extremes_are_exact():
-    histogram = filled([1_234_567, 7_654_321])
+    histogram = Histogram.of([1_234_567, 7_654_321])
     assert histogram.mean_ms() == (1_234_567 + 7_654_321) / 2e6
     assert (histogram.lowest_ns, histogram.highest_ns) == (1_234_567, 7_654_321)
     assert Histogram().mean_ms() is None

@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from loadtests.statistics.knee import RESOLUTION, knee_search, search_again
+from loadtests.statistics.steps import Step
 
 
 def robot(knee, tried=None):
@@ -14,10 +15,9 @@ def robot(knee, tried=None):
         if tried is not None:
             tried.append(rate)
         meets = rate < knee
-        return {"offered_rate": rate, "meets": meets, "errors": 0 if rate < 2 * knee else 3, "dropped": 0} | {
-            "cpu_share": 0.2,
-            "reason": None if meets else "too slow",
-        }
+        known = dict.fromkeys(Step.__struct_fields__) | {"offered_rate": rate, "meets": meets, "dropped": 0}
+        known |= {"errors": 0 if rate < 2 * knee else 3, "reason": None if meets else "too slow"}
+        return Step(**known | {"cpu_share": 0.2})
 
     return attempt
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
+from vendors import Door, change, make_conformant
 
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
 from reports.attestation.policy import Known, Policy
@@ -15,8 +17,6 @@ from reports.attestation.signing import Notary
 from reports.attestation.verifying import Verification, verify
 from reports.rendering import render
 
-SUITE = "sha256:" + "5" * 64
-SET = "sha256:" + "7" * 64
 NOW = dt.datetime(2026, 11, 21, 12, tzinfo=dt.UTC)
 
 
@@ -46,12 +46,7 @@ class Desk:
 
     def sign(self, **changes: Any) -> None:
         """Have the vendor sign the result, with changes at paths such as `statement.robot.version`."""
-        for path, value in changes.items():
-            *parents, last = path.split("__")
-            place = self.result
-            for parent in parents:
-                place = place[parent]
-            place[last] = value
+        change(self.result, changes)
         self.folder.mkdir(exist_ok=True)
         (self.folder / "result.json").write_text(json.dumps(self.result), encoding="utf-8")
         render(self.folder, self.notary)
@@ -79,7 +74,8 @@ class Desk:
         return replace(self, policy=replace_points(self.policy, points))
 
     def check(self) -> Verification:
-        known = Known(SUITE, {"1.1": SET}, {"full": ("http", "safety"), "paper": ("http",)})
+        known = msgspec.convert(Door.known(), Known)
+        known = replace(known, profiles={**known.profiles, "paper": ("http",)})
         octets, key = self.envelope.read_bytes(), public_key(self.keys / PUBLIC_NAME)
         return verify(octets, key, self.policy, known, now=NOW, directory=self.folder)
 
@@ -92,20 +88,8 @@ def replace_points(policy: Policy, points: dict[str, Any]) -> Policy:
 def desk(tmp_path: Path, result: dict[str, Any]) -> Desk:
     """A desk with a good certificate on it."""
     generate(tmp_path / "keys")
-    passed = [item for item in result["requirements"] if item["verdict"] == "pass"]
-    result |= {
-        "verdict": "conformant",
-        "suite": {"version": "1.1.0", "contract": "1.1", "digest": SUITE},
-        "requirement_set": {"name": "1.1", "digest": SET},
-        "digests": {"statement": "sha256:" + "1" * 64, "contract": {"openapi.yaml": "sha256:" + "2" * 64}},
-        "baseline": None,
-        "nonce": None,
-        "classes": {"http": "pass", "safety": "pass", "describe": "not-claimed"},
-        "class_reasons": {},
-        "requirements": passed,
-        "effort": "standard",
-    }
-    result["statement"]["motion_allowed"] = True
+    make_conformant(result)
+    result["digests"] = {"statement": "sha256:" + "1" * 64, "contract": {"openapi.yaml": "sha256:" + "2" * 64}}
     desk = Desk(tmp_path / "sent", tmp_path / "keys", result)
     desk.sign()
     return desk

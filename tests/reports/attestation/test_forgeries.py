@@ -66,11 +66,11 @@ def key_beside_the_signature(desk):
 
 
 ENVELOPES = [
-    ("swapped subject", lambda desk: desk.edit_payload("result.json", "other.json"), "not by your key over this"),
-    ("edited class", lambda desk: desk.edit_payload('"safety":"pass"', '"safety":"fail"'), "not by your key over this"),
-    ("hidden baseline", lambda desk: desk.edit_payload('"accepted":[]', '"accepted" :[]'), "not by your key over this"),
+    ("swapped subject", lambda desk: desk.edit_payload("result.json", "other.json"), "not made by your key"),
+    ("edited class", lambda desk: desk.edit_payload('"safety":"pass"', '"safety":"fail"'), "not made by your key"),
+    ("hidden baseline", lambda desk: desk.edit_payload('"accepted":[]', '"accepted" :[]'), "not made by your key"),
     ("own key", own_key, "foreign key"),
-    ("own key under my name", own_key_under_my_name, "not by your key over this"),
+    ("own key under my name", own_key_under_my_name, "not made by your key"),
     ("key inside the envelope", lambda desk: desk.edit(publicKey="…"), "unknown field `publicKey`"),
     ("key beside the signature", key_beside_the_signature, "unknown field `publicKey`"),
     ("other payload type", lambda desk: desk.edit(payloadType="application/json"), "payload type"),
@@ -79,12 +79,12 @@ ENVELOPES = [
     ("no key id", stripped_key_id, "names no key"),
     ("other statement type", resigned_as(_type="https://in-toto.io/Statement/v0.1"), "Statement/v0.1"),
     ("other predicate type", resigned_as(predicateType="https://in-toto.io/attestation/vulns/v0.1"), "vulns/v0.1"),
-    ("other predicate", resigned_as(predicate={"verifier": {}}), "no certificate of a run"),
-    ("loose base64", loose_base64, "as no encoder writes it"),
-    ("no base64", lambda desk: desk.edit(payload="{}"), "no base64"),
-    ("truncated file", cut(500), "no envelope"),
-    ("empty file", cut(0), "no envelope"),
-    ("nested file", lambda desk: desk.envelope.write_text("[" * 100_000), "no envelope"),
+    ("other predicate", resigned_as(predicate={"verifier": {}}), "not a certificate of a run"),
+    ("loose base64", loose_base64, "not canonical base64"),
+    ("no base64", lambda desk: desk.edit(payload="{}"), "not base64"),
+    ("truncated file", cut(500), "not an envelope"),
+    ("empty file", cut(0), "not an envelope"),
+    ("nested file", lambda desk: desk.envelope.write_text("[" * 100_000), "not an envelope"),
     ("huge file", lambda desk: desk.envelope.write_text(" " * (5 << 20)), "octets"),
 ]
 

@@ -6,30 +6,13 @@ import json
 import pytest
 from click.testing import CliRunner
 from lxml import html
+from vendors import requirement
 
 from reports.certificate.difference import Kind, difference
 from reports.certificate.difference_page import SHOWN, difference_html, difference_markdown, difference_text
 from reports.cli.difference import diff
 
 ACCEPTED = {"expected_failure": {"reason": "ticket 7", "expires": "2027-01-01"}}
-
-
-def requirement(verdict, level="MUST", **more):
-    finding = {"message": "m", "expected": "e", "seen": 1, "request": None, "response": None}
-    return {
-        "id": "http/x",
-        "class": "http",
-        "level": level,
-        "source": "RFC 9110",
-        "text": "It does.",
-        "cases": 1,
-        "verdict": verdict,
-        "reason": "why",
-        "untestable": None,
-        "checks": [],
-        "failures": [finding] if verdict == "fail" else [],
-        **more,
-    }
 
 
 @pytest.fixture
@@ -102,7 +85,7 @@ def test_how_the_runs_differ_is_told(pair):
     old, new = pair([], [])
     new["suite"]["version"] = "9.9"
     new["statement"]["robot"]["version"] = "3.0"
-    new["statement"]["motion_allowed"] = True
+    old["statement"]["motion_allowed"] = False
     found = difference(old, new)
     told = [("firmware", "2.4.1", "3.0"), ("suite", "0.1.0", "9.9"), ("motion allowed", "no", "yes")]
     assert list(found.circumstances) == told
@@ -111,7 +94,7 @@ def test_how_the_runs_differ_is_told(pair):
 
 
 def test_every_form_names_what_changed(pair):
-    items = [requirement("pass", id=f"http/x{number}") for number in range(SHOWN + 3)]
+    items = [requirement("pass", id_=f"http/x{number}") for number in range(SHOWN + 3)]
     found = difference(*pair(items, [{**item, "verdict": "fail"} for item in items]))
     page = html.document_fromstring(difference_html(found, ("old.json", "new.json")))
     assert page.xpath("//h2")[0].text_content().strip() == f"{SHOWN + 3} New failures"

@@ -51,7 +51,7 @@ def test_an_expected_failure_is_skipped_with_its_reason(robot, tmp_path):
     assert requirement["expected_failure"] == {"reason": "ticket 7", "expires": "2999-12-31"}
     # The failure is accepted, and the robot does not conform all the same; that the rest was not judged stays.
     assert requirement["whole run"] == (4, "not-conformant", "2999-12-31")
-    assert case.find("skipped").get("message") == "Expected by the baseline until 2999-12-31: ticket 7"
+    assert case.find("skipped").get("message") == "Accepted by the baseline until 2999-12-31: ticket 7"
     assert case.find("failure") is None
     for page in ("certificate.html", "certificate.md"):
         shown = (tmp_path / page).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The page of a fleet: green where a robot may be trusted with a class, and nowhere else."""
+"""The page of a fleet: a cell is green where a robot passed a class without an accepted failure, and nowhere else."""
 
 from lxml import html
 

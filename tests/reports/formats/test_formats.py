@@ -1,6 +1,7 @@
 """SARIF, CTRF, GitLab's code quality, annotations, the badge and the summary: valid, honest, bounded."""
 
 import copy
+import html
 import json
 import re
 from importlib.resources import files
@@ -10,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 from jsonschema import Draft4Validator, Draft202012Validator
 
+from conformance.contract.locating import GENERIC_RULES
 from conformance.contract.pack import Contract
 from conformance.contract.places import places
 from conformance.packs.table1.files import CONTRACT_DIR
@@ -65,7 +67,7 @@ def unjudged(result):
 
 def unjudged_requirement(result):
     unjudged(result)
-    result["requirements"][0].update(verdict="error", reason="no answer within 10 s")
+    result["requirements"][0].update(verdict="error", reason="no response within 10 s")
 
 
 def nothing_claimed(result):
@@ -120,11 +122,14 @@ def test_each_result_is_at_a_line_that_speaks_of_it(result, tmp_path, monkeypatc
     assert next(e for e in gitlab(result) if e["check_name"] == "http/date")["location"]["path"] == "my robot.toml"
     assert "file=my robot.toml,line=6,title=http/date" in written("annotations", result)
     asked = one["relatedLocations"][0]["physicalLocation"]
-    assert asked["artifactLocation"]["uri"] == "contract/requirements.toml"
-    ledger = (CONTRACT_DIR / "requirements.toml").read_text(encoding="utf-8").splitlines()
-    for id_, line in result["places"]["ledger"]["lines"].items():
-        assert ledger[line - 1] == f"[{id_.replace('/', '.')}]"
-    assert set(result["places"]["ledger"]["lines"]) == set(LEDGER)
+    assert asked["artifactLocation"]["uri"] == "rules/requirements.toml"
+    named = set()
+    for directory, ledger in ((CONTRACT_DIR, "ledger"), (GENERIC_RULES, "generic_ledger")):
+        lines = (directory / "requirements.toml").read_text(encoding="utf-8").splitlines()
+        for id_, line in result["places"][ledger]["lines"].items():
+            assert lines[line - 1] == f"[{id_.replace('/', '.')}]"
+            named.add(id_)
+    assert named == set(LEDGER)
     # Without a statement it is the ledger's line; a class that the statement does not name is at its claims.
     without = copy.deepcopy(result)
     without["places"]["statement"] = None
@@ -139,6 +144,7 @@ def test_pages_are_on_https_and_there_for_each_clause():
     pages = {item.source: page_of(item.source) for item in LEDGER.values()}
     assert {page.partition(":")[0] for page in pages.values() if page} == {"https"}
     ours = ("contract.md", "paper", "openapi", "publishers", "subscribers", "WS-Attacks", "REP")
+    ours += ("the OpenAPI description", "the WSDL")
     assert [source for source, page in pages.items() if not page and not source.startswith(ours)] == []
 
 
@@ -149,6 +155,24 @@ def test_fingerprints_stay_the_same_and_are_of_one_requirement_each(result):
         for failure in requirement["failures"]:
             failure["message"] += " and 17 ms later"
     assert {entry["check_name"]: entry["fingerprint"] for entry in gitlab(result)} == before
+
+
+@pytest.mark.parametrize("format_", ["junit", "sarif", "ctrf", "gitlab", "annotations", "markdown"])
+@pytest.mark.parametrize("age", ["result", "older"])
+def test_every_format_says_what_was_done_expected_and_seen(request, format_, age):
+    result = request.getfixturevalue(age)
+    requirement = next(item for item in result["requirements"] if item["id"] == "http/declared-body")
+    (failure,) = requirement["failures"]
+    shown = html.unescape(written(format_, result)).replace("\\", "").replace("<!-- -->", "")
+    assert "Sent `GET" in shown
+    assert failure["expected"] in shown
+    assert failure["message"].rstrip(".").replace("%", "%25") in shown
+
+
+def test_the_finding_to_look_at_first_is_annotated_first(result):
+    first = next(item for item in result["causes"] if item["number"] == 1)
+    assert f"title={first['requirement']} (failed)" in written("annotations", result).splitlines()[0]
+    assert gitlab(result)[0]["check_name"] == first["requirement"]
 
 
 def worst(result):

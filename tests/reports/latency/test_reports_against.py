@@ -1,4 +1,4 @@
-"""The report of a run in which two robots took turns."""
+"""The report of a run in which two robots were measured alternately."""
 
 import pytest
 

@@ -170,7 +170,7 @@ def test_what_else_changed_is_told(latency):
     other["series"].pop()
     other["knee"][0]["highest_rate"] = 2000
     told = " ".join(compared(latency, other).remarks)
-    for wanted in ("cpu was Example CPU", "More requests failed", "Only in the old result", "now holds up to 2,000"):
+    for wanted in ("cpu was Example CPU", "More requests failed", "Only in the old result", "and now up to 2,000"):
         assert wanted in told
 
 

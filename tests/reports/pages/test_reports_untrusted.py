@@ -38,7 +38,7 @@ def test_beginning_tells_what_is_missing():
     cut = beginning("ä" * 100, 10)
     assert (cut.text, cut.omitted, cut.total, cut.unit) == ("ä" * 10, 90, 100, "characters")
     by_producer = beginning("ä" * 100, 10, octets=1_000_000)
-    assert (by_producer.omitted, by_producer.total, by_producer.unit) == (999_980, 1_000_000, "octets")
+    assert (by_producer.omitted, by_producer.total, by_producer.unit) == (999_980, 1_000_000, "bytes")
     assert not beginning("äöü", 10, octets=6).cut
 
 

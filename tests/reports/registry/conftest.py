@@ -4,28 +4,18 @@ import copy
 import datetime as dt
 import json
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
+from vendors import Door, change, make_conformant
 
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate
 from reports.attestation.signing import Notary
 from reports.cli.registry import registry
 from reports.rendering import render
-
-SUITE, SET = "sha256:" + "5" * 64, "sha256:" + "7" * 64
-
-
-class Door:
-    """The front door, with what the suite knows."""
-
-    @staticmethod
-    def known() -> dict[str, Any]:
-        return {"suite": SUITE, "requirement_sets": {"1.1": SET}, "profiles": {"full": ("http", "safety")}}
 
 
 @dataclass(frozen=True)
@@ -49,12 +39,7 @@ class Host:
         result = copy.deepcopy(self.result)
         finished = dt.datetime.now(dt.UTC) - dt.timedelta(days=days_ago)
         result["started"] = result["finished"] = finished.strftime("%Y-%m-%dT%H:%M:%SZ")
-        for path, value in changes.items():
-            *parents, last = path.split("__")
-            place = result
-            for parent in parents:
-                place = place[parent]
-            place[last] = value
+        change(result, changes)
         return self.sign_as_it_is(sent, result, vendor)
 
     def sign_as_it_is(self, sent: str, result: dict[str, Any], vendor: str = "vendor") -> Path:
@@ -80,31 +65,6 @@ def host(tmp_path: Path, result: dict[str, Any]) -> Host:
         generate(tmp_path / name)
     (tmp_path / "keys").mkdir()
     os.link(tmp_path / "vendor" / PUBLIC_NAME, tmp_path / "keys" / "acme.pem")
-    result |= {
-        "verdict": "conformant",
-        "suite": {"version": "1.1.0", "contract": "1.1", "digest": SUITE},
-        "requirement_set": {"name": "1.1", "digest": SET},
-        "baseline": None,
-        "nonce": None,
-        "classes": {"http": "pass", "safety": "pass", "describe": "not-claimed"},
-        "class_reasons": {},
-        "requirements": [requirement("http/a"), requirement("http/b"), requirement("safety/c", "SHOULD")],
-        "effort": "standard",
-    }
+    make_conformant(result)
     result["statement"]["robot"] = {"name": "Courier 7", "vendor": "Example Robotics", "version": "2.4"}
-    result["statement"]["motion_allowed"] = True
     return Host(tmp_path, result)
-
-
-def requirement(id_: str, level: str = "MUST", verdict: str = "pass", **more: Any) -> dict[str, Any]:
-    finding = {"message": "m", "expected": "e", "seen": 1, "request": None, "response": None}
-    return {
-        "id": id_, "class": id_.partition("/")[0], "level": level, "source": "s", "text": "It does.", "cases": 1,
-        "verdict": verdict, "reason": "", "untestable": None, "checks": [],
-        "failures": [finding] if verdict == "fail" else [], **more,
-    }  # fmt: skip
-
-
-@pytest.fixture
-def make_requirement() -> Callable[..., dict[str, Any]]:
-    return requirement

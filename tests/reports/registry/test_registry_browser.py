@@ -2,6 +2,8 @@
 
 import re
 
+from vendors import requirement
+
 from reports.certificate.difference import difference
 from reports.certificate.difference_page import difference_html
 from reports.fleet.page import fleet_html
@@ -30,9 +32,9 @@ MEASURE = """(page, view) => {
 }"""
 
 
-def test_the_pages_fit_a_desk_and_a_phone_and_can_be_filtered(host, fleet, browse, make_requirement):
+def test_the_pages_fit_a_desk_and_a_phone_and_can_be_filtered(host, fleet, browse):
     classes = dict.fromkeys(fleet["class_titles"], "pass")
-    broken = [make_requirement(f"http/a-rather-long-name-{number}") for number in range(3)]
+    broken = [requirement(id_=f"http/a-rather-long-name-{number}") for number in range(3)]
     host.sign("old", days_ago=3, classes=classes, requirements=broken, statement__robot__version="2.3")
     changed = [{**item, "verdict": "warn"} for item in broken]
     host.sign("new", classes=classes, requirements=changed)

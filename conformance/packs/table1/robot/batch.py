@@ -214,7 +214,7 @@ class Batch:
             found, cause = f"once more, and later: {again[0]}", "later"
         elif refused:
             exchange = self._refused[self._key(refused[0])]
-            found, cause = f"answered {exchange.response.status}, and there all the same: {refused[0]}", "not accepted"
+            found, cause = f"the message of a request that was not accepted: {refused[0]}", "not accepted"
         elif others and self._strange >= _OFTEN:
             exchange, found, cause = None, f"from nobody: {others[0]}", "from nobody"
         return self._judge.check(

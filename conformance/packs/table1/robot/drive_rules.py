@@ -48,13 +48,23 @@ def judge_drive(judge: Judge, trace: Trace, limits: Limits, *, way: bool = False
 
 def outcomes(requirement: str, trace: Trace, limits: Limits) -> Iterator[Outcome]:
     """Yield what a drive shows of one requirement."""
-    return (one for id_, one in every_outcome(trace, limits, way=requirement in _WAY) if id_ == requirement)
+    readings, way = requirement in {*_AGREEMENT, _LIMITS_HOLD}, requirement in _WAY
+    shown = every_outcome(trace, limits, way=way, readings=readings)
+    return (one for id_, one in shown if id_ == requirement)
 
 
-def every_outcome(trace: Trace, limits: Limits, *, way: bool) -> Iterator[tuple[str, Outcome]]:
-    """Yield all that a drive shows, each with the id of its requirement."""
+def every_outcome(trace: Trace, limits: Limits, *, way: bool, readings: bool = True) -> Iterator[tuple[str, Outcome]]:
+    """Yield all that a drive shows, each with the id of its requirement.
+
+    Args:
+        trace: of the drive.
+        limits: of the robot.
+        way: whether the pose has to follow the velocity.
+        readings: whether what each reading shows counts: there are hundreds.
+    """
     yield from ((_answered(one), answer_of(one)) for one in trace.commands if not one.renewal)
-    yield from _readings(trace, limits)
+    if readings:
+        yield from _readings(trace, limits)
     for reach in trace.reaches:
         for id_ in reach.shows:
             yield id_, _OUTLASTED if reach.outlasted else arrival(trace, reach, limits)

@@ -35,7 +35,7 @@ def plan_questions(api: RestInterface) -> list[Question]:
 def _ends_elsewhere(place: Pose, others: list[Pose]) -> Callable[[Response], str]:
     """Whether a path ends nearer to where another client asked for."""
 
-    def stranger(answer: Response) -> str:
+    def mismatch(answer: Response) -> str:
         message, problem = read_as(answer, GET_PLAN)
         if problem:
             return problem if answer.ok else ""
@@ -43,4 +43,4 @@ def _ends_elsewhere(place: Pose, others: list[Pose]) -> Callable[[Response], str
         nearer = [other for other in others if end.distance(other) < end.distance(place)]
         return f"a path to ({end.x:.3f}, {end.y:.3f}) for ({place.x:.3f}, {place.y:.3f})" if nearer else ""
 
-    return stranger
+    return mismatch

@@ -1,7 +1,7 @@
 import pytest
 
 from conformance.api.rest.calls import minimal
-from conformance.api.rest.mutations import MUTATED, is_invalid, mutations, near_misses
+from conformance.api.rest.json_mutations import KINDS, is_invalid, mutations, near_misses
 from conformance.api.rest.parameters import wrong_texts
 from conformance.api.rest.xml_mutations import xml_mutations
 from conformance.contract.pack import Contract
@@ -11,16 +11,16 @@ from conformance.documents.writing import json_text, xml_bytes
 
 TAKING = [item for item in operations_of(Contract.load()) if item.bodies]
 # Not every body has bounds.
-KINDS = {*MUTATED} - {"json-bounds"}
+EVERYWHERE = {*KINDS} - {"bounds"}
 
 
 @pytest.mark.parametrize("operation", TAKING, ids=lambda item: item.id)
 def test_every_mutation_is_invalid_and_every_kind_is_there(operation):
     body = operation.bodies["application/json"]
     made = mutations(body.examples[0], body.schema)
-    assert {item.requirement for item in made} >= KINDS
-    assert all(is_invalid(item.body, body.schema) for item in made)
-    assert len({item.body for item in made}) > 0.9 * len(made)
+    assert {item.kind for item in made} >= EVERYWHERE
+    assert all(is_invalid(item.made, body.schema) for item in made)
+    assert len({item.made for item in made}) > 0.9 * len(made)
 
 
 @pytest.mark.parametrize("operation", TAKING, ids=lambda item: item.id)
@@ -32,7 +32,7 @@ def test_the_examples_themselves_are_valid(operation):
 
 def test_bounds_of_optional_fields_are_broken_too():
     body = next(item for item in TAKING if item.id == "putGoal").bodies["application/json"]
-    names = [item.name for item in mutations(body.examples[0], body.schema) if item.requirement == "json-bounds"]
+    names = [item.what for item in mutations(body.examples[0], body.schema) if item.kind == "bounds"]
     assert "a text too long at goal_id.id" in names
     assert any("nanosec" in name for name in names)
 
@@ -40,7 +40,7 @@ def test_bounds_of_optional_fields_are_broken_too():
 def test_xml_mutations_are_invalid_and_the_plain_form_is_not_among_them():
     body = TAKING[0].bodies["application/json"]
     value = body.examples[0]
-    made = dict(xml_mutations(value, body.schema, "Twist"))
+    made = {item.what: item.made for item in xml_mutations(value, body.schema, "Twist")}
     assert len(made) > 50
     assert xml_bytes(value, "Twist") not in made.values()
     assert b"<x>NaN</x>" in made["'NaN' at linear.x"]
@@ -67,13 +67,13 @@ def test_wrong_texts_of_numbers_and_codes():
 def test_near_misses_hold_what_the_valid_body_asks_for():
     body = next(item for item in TAKING if item.id == "putVelocity").bodies["application/json"]
     made = near_misses(body.examples[0], body.schema, ("linear", "x"))
-    names = {item.name for item in made}
+    names = {item.what for item in made}
     assert names >= {
-        "cut short",
+        "a body cut short",
         "an array as root",
         "NaN at linear.x",
         "x missing at linear",
         "linear twice at the body",
     }
     assert not names & {"no octets", "null as root", "null at angular.z"}
-    assert all(is_invalid(item.body, body.schema) for item in made)
+    assert all(is_invalid(item.made, body.schema) for item in made)

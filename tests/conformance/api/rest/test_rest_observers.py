@@ -44,7 +44,7 @@ def test_good_answers_raise_no_alarm():
     assert seen("FOO", "/robot/pose/", 501) == set()
     assert seen("GET", "/robot//pose/", 301, [DATE, ("Location", "/robot/pose/")]) == set()
     assert seen("GET", "", 400, [("Content-Type", "text/plain")], b"?", raw=b"GARBAGE") == set()
-    assert seen("PUT", "/robot/velocity/", None, problem="connection closed without an answer") == set()
+    assert seen("PUT", "/robot/velocity/", None, problem="the server closed the connection without a response") == set()
 
 
 def test_a_server_s_answer_to_a_range_or_a_condition_is_its_own():
@@ -179,7 +179,7 @@ def test_formats_are_read_as_what_they_say_they_are():
 
 
 def test_garbage_is_bad_framing():
-    found = seen("GET", "/robot/pose/", None, problem="the answer is no HTTP: illegal status line")
+    found = seen("GET", "/robot/pose/", None, problem="the response is not HTTP: illegal status line")
     assert found == {"http/framing"}
 
 

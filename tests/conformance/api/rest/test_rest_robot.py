@@ -9,7 +9,8 @@ from conformance.api.rest.applicable import answered, applicable_operations, rea
 from conformance.api.rest.calls import example_call
 from conformance.api.rest.effects import reader_of, settles_at
 from conformance.api.rest.formats import disagreements
-from conformance.api.rest.generated import GeneratedRequest, targets
+from conformance.api.rest.generated import targets
+from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
 from conformance.api.rest.snapshot import changed, changes_by_itself, flatten, steady, take_snapshots
@@ -60,7 +61,7 @@ def test_reads_and_what_is_answered(api, library):
 def test_what_was_put_is_got(api, library):
     call = example_call(api, _operation(api, "putBook"))
     assert reader_of(api, call).path == call.path
-    assert settles_at(api, call).startswith("title is 'Emma'")
+    assert settles_at(api, call).startswith("'Emma' as title instead of ")
     call.send(api)
     assert settles_at(api, call) == ""
     library.books.clear()
@@ -75,7 +76,7 @@ def test_formats_disagree_only_where_they_do(api, library):
     (found,) = disagreements(api, call, ["application/xml", "text/plain"])[0]
     assert (found.place, found.description) == (
         "price",
-        "price is 0.0 in application/xml and 0.30000000000000004 in JSON",
+        "0.0 as price in application/xml and 0.30000000000000004 in JSON",
     )
 
 

@@ -1,8 +1,11 @@
+import json
+
 import pytest
 
 from conformance.api.device import Device
 from conformance.api.rest.calls import example_call
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.parameters import wrong_texts
 from conformance.api.rest.validity import validity
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
@@ -67,5 +70,37 @@ def test_a_mistake_of_a_generator_is_the_suite_s():
     (operation,) = (item for item in operations_of(CONTRACT) if item.id == "putVelocity")
     assert example_call(api, operation).body
     api.device = _Careless(api.run)
-    with pytest.raises(HarnessError, match="was made as a valid request, and is none"):
+    with pytest.raises(HarnessError, match="was made as a valid request, and is invalid"):
         example_call(api, operation)
+
+
+@pytest.mark.parametrize(
+    ("schema", "texts"),
+    [
+        (
+            {"anyOf": [{"type": "integer"}, {"type": "string", "pattern": "^[a-z]+$"}]},
+            {"7": "valid", "abc": "valid", "A": "invalid", "1.5": "unclear"},
+        ),
+        ({"type": ["integer", "string"]}, {"7": "valid", "abc": "valid", "": "unclear"}),
+        (
+            {"oneOf": [{"type": "null"}, {"type": "integer", "minimum": 1}]},
+            {"7": "valid", "0": "invalid", "a": "invalid"},
+        ),
+        ({"enum": [1, 2]}, {"2": "valid", "3": "invalid", "a": "invalid"}),
+        ({"type": "boolean"}, {"true": "unclear"}),
+    ],
+)
+def test_a_parameter_of_several_types_is_valid_as_any_of_them(tmp_path, schema, texts):
+    parameter = {"name": "id", "in": "path", "required": True, "schema": schema}
+    responses = {"200": {"description": "there"}}
+    document = {"paths": {"/things/{id}": {"get": {"parameters": [parameter], "responses": responses}}}}
+    (tmp_path / "openapi.json").write_text(json.dumps(document))
+    contract = Contract.load(tmp_path)
+    found = {text: validity(contract, "GET", f"/things/{text}", "", b"").verdict for text in texts}
+    assert found == texts
+    (operation,) = operations_of(contract)
+    api = RestInterface(Run(contract=contract), HttpClient("http://r2", Connection()))
+    assert example_call(api, operation).path.startswith("/things/")
+    # A text that one of the types allows is not among those that a robot must refuse.
+    wrong = {item.text for item in wrong_texts(operation.parameter("path")[0])}
+    assert not wrong & {text for text, verdict in texts.items() if verdict == "valid"}

@@ -111,9 +111,9 @@ def test_prefixes_and_type_names_are_free():
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        (b'name="depot_x" type="xs:double"', b'name="depot_x" type="xs:float"', "depot_x is of type float, not double"),
+        (b'name="depot_x" type="xs:double"', b'name="depot_x" type="xs:float"', "depot_x of type float, not double"),
         (b'name="source_y"', b'name="sourceY"', "sourceY"),
-        (b'type="xs:int"/>', b'type="xs:int" minOccurs="0"/>', "message_code occurs 0 to 1 times, not 1 to 1 times"),
+        (b'type="xs:int"/>', b'type="xs:int" minOccurs="0"/>', "that occurs 0 to 1 times, not 1 to 1 times"),
         (b'version="1.0">', b'version="1.0" elementFormDefault="qualified">', "{http://soap.turtlebot.mybot.org/}arg0"),
     ],
 )

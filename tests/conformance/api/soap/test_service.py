@@ -35,7 +35,7 @@ def addressed(location: str) -> bytes:
     [
         (b"", "405 Method Not Allowed", "405"),
         (b"<html><br></html>", "200 OK", "no well-formed XML"),
-        (b"<html/>", "200 OK", "not wsdl:definitions"),
+        (b"<html/>", "200 OK", "instead of wsdl:definitions"),
         (b"\xff\xfe\x00", "200 OK", "no well-formed XML"),
         (b'<!DOCTYPE a [<!ENTITY b "&b;">]><a>&b;</a>', "200 OK", "no"),
     ],
@@ -54,7 +54,7 @@ def test_a_robot_that_hangs_costs_its_deadline(listening):
     started = time.monotonic()
     service = opened(f"{base}/robot_ws?wsdl", timeout_s=0.3)
     assert time.monotonic() - started < 2
-    assert "no answer within" in service.own_problem
+    assert "no response within" in service.own_problem
     assert service.endpoint == f"{base}/robot_ws"
 
 

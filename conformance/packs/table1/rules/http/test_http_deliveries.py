@@ -15,7 +15,7 @@ _COORDINATES = ("1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
 _NO_CODE = "none"
 
 
-@pytest.mark.phase("delivery")
+@pytest.mark.phase("acting")
 @pytest.mark.motion
 @pytest.mark.requirement("http/concurrent-answers")
 def test_answers_to_deliveries_do_not_cross(api: RestInterface, judge: Judge) -> None:

@@ -12,7 +12,7 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
-pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest"), pytest.mark.motion]
+pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest"), pytest.mark.motion]
 _PAPER: Final = Delivery(4, 68.269, 38.718, 60.633, 37.51, 76.02, 41.35)
 _VALID: Final = ("4", "68.269", "38.718", "60.633", "37.51", "76.02", "41.35")
 _TEXTS: Final = ("abc", "", "x1", "one")

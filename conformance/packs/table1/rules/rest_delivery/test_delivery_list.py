@@ -11,7 +11,7 @@ from conformance.transport.client import HttpClient
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest")]
 # What the list holds at least.
 _LEAST = 50
 

@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.robot import POSE, Robot
 from conformance.verdict.evidence import Judge
 
 # Late in a run: the longer it has lasted, the better its stamps tell.
-pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest")]
 _STEP_S = 0.1
 
 

@@ -122,8 +122,10 @@ def goal_fills_in(trace: GoalLife) -> Iterator[Outcome]:
         if trace.renamed:
             yield Case(False, second.exchange, "201 or 202 for a goal without an id")
     elif not second.ended:
-        filled = second.shown is not None and second.shown["goal_id"]["id"] not in {"", ID}
-        yield Case(filled, second.read, "a header and a goal_id of the robot's own")
+        id_ = None if second.shown is None else second.shown["goal_id"]["id"]
+        found = "no active goal" if id_ is None else f"goal_id.id {id_!r}"
+        expected = "the active goal with a header and a goal_id of the robot's own"
+        yield Case(id_ not in {None, "", ID}, second.read, expected, found)
 
 
 @rule("rest-resources/velocity-goal", on=(goal_life,))

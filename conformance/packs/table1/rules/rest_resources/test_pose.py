@@ -42,7 +42,7 @@ def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
             stamps.add(odometry.stamp)
             exchange = odometry.exchange
         if readings >= effort.cases(100):
-            if not stamps and judge.evidence["rest-resources/pose-type"].findings:
+            if not stamps and "rest-resources/pose-type" in judge.refuted():
                 break
             time.sleep(0.02)
     if not stamps:
@@ -63,9 +63,9 @@ def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
 @pytest.mark.requirement("rest-resources/pose-sample", _BESIDE)
 def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
     """Odometry and velocity in turns, many of one sample: the observer judges each by those around it."""
-    unread, before, wanted = 0, judge.evidence[_BESIDE].cases, effort.cases(_TURNS)
+    unread, before, wanted = 0, judge.cases(_BESIDE), effort.cases(_TURNS)
     for turn in range(_READ * wanted):
-        judged = judge.evidence[_BESIDE].cases - before
+        judged = judge.cases(_BESIDE) - before
         if judged >= wanted or (turn >= wanted and not judged):
             break
         unread = unread + 1 if robot.odometry() is None else 0

@@ -22,7 +22,7 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
-pytestmark = [pytest.mark.phase("delivery"), pytest.mark.needs("publishers"), pytest.mark.motion]
+pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("publishers"), pytest.mark.motion]
 _BOTH = ("ExecuteDeliveryRequest", "ExecuteCoffeeRequest")
 _VALID = "soap-delivery/response-valid"
 

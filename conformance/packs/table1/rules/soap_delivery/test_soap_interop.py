@@ -72,7 +72,7 @@ def _plan(service: SoapService) -> dict[str, float]:
     )
 
 
-@pytest.mark.phase("delivery")
+@pytest.mark.phase("acting")
 @pytest.mark.needs("publishers")
 @pytest.mark.motion
 @pytest.mark.requirement("soap-delivery/interop")

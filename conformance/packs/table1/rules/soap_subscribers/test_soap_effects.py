@@ -41,7 +41,7 @@ def _listed(rest: HttpClient, depot_x: float) -> int | None:
     return sum(1 for delivery in deliveries if delivery["request"]["depot_x"] == depot_x)
 
 
-@pytest.mark.phase("delivery")
+@pytest.mark.phase("acting")
 @pytest.mark.needs("publishers")
 @pytest.mark.motion
 @pytest.mark.requirement("soap-basic-profile/R1025", "soap-basic-profile/R1028")

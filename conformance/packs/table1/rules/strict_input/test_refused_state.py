@@ -10,7 +10,7 @@ import pytest
 
 from conformance.api.rest.calls import JSON
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.mutations import near_misses
+from conformance.api.rest.json_mutations import near_misses
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.calls import call
 from conformance.api.soap.service import SoapService
@@ -47,7 +47,7 @@ def _invalid_bodies(api: RestInterface, path: str, valid: dict[str, Any], number
     """Each would move the robot if it were taken: what is wrong with it, media type, body."""
     put = next(item for item in operations_of(api.run.contract) if (item.method, item.template) == ("PUT", path))
     made = near_misses(valid, put.bodies[JSON].schema, tuple(number.split(".")))
-    return [*((item.name, JSON, item.body) for item in made), ("text/plain", "text/plain", body_of(valid))]
+    return [*((item.what, JSON, item.made) for item in made), ("text/plain", "text/plain", body_of(valid))]
 
 
 def _put(robot: Robot, path: str, media_type: str, body: bytes) -> Exchange:

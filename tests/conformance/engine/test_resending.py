@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from conformance.engine import intermittent
-from conformance.engine.intermittent import look_again
+from conformance.engine import resending
+from conformance.engine.resending import look_again
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
@@ -23,14 +23,16 @@ def _run(method="GET", answer=_BAD):
 @pytest.mark.parametrize(("again", "expected"), [([_BAD] * 5, (5, 5)), ([_BAD, _GOOD, _GOOD, _GOOD, _BAD], (2, 5))])
 def test_how_often_it_comes_back(monkeypatch, again, expected):
     run, answers = _run(), iter(again)
-    monkeypatch.setattr(intermittent, "send_again", lambda request, _: Exchange(request, next(answers)))
+    monkeypatch.setattr(resending, "send_again", lambda request, _: Exchange(request, next(answers)))
     look_again(run, Connection())
     evidence = run.judge.evidence["http/head"]
     (finding,) = evidence.findings.values()
-    assert finding.again == expected
+    assert finding.again[:2] == expected
     verdict = verdict_of(run.contract.ledger["http/head"], evidence, run.claims)
     assert verdict.value == "fail"
-    assert ("intermittent: it came back 2 of 5 times" in verdict.reason) == (expected[0] < 5)
+    assert ("Intermittent: sent again, it had the same kind of response 2 of 5 times" in verdict.reason) == (
+        expected[0] < 5
+    )
 
 
 def test_an_observer_s_word_counts_more_than_the_status(monkeypatch):
@@ -41,15 +43,15 @@ def test_an_observer_s_word_counts_more_than_the_status(monkeypatch):
         run.judge.check("http/head", next(holds), Exchange(request, _GOOD), "status 200")
         return Exchange(request, _GOOD)
 
-    monkeypatch.setattr(intermittent, "send_again", send)
+    monkeypatch.setattr(resending, "send_again", send)
     look_again(run, Connection())
-    assert next(iter(run.judge.evidence["http/head"].findings.values())).again == (1, 5)
+    assert next(iter(run.judge.evidence["http/head"].findings.values())).again == (1, 5, True)
 
 
 def _sent_again(monkeypatch, run, answer=_GOOD):
     """What is put down of a finding, and whether the robot was left at rest."""
     stopped = []
-    monkeypatch.setattr(intermittent, "send_again", lambda request, _: Exchange(request, answer))
+    monkeypatch.setattr(resending, "send_again", lambda request, _: Exchange(request, answer))
     device = SimpleNamespace(leave_at_rest=stopped.append)
     look_again(run, Connection(), SimpleNamespace(device=device))
     return next(iter(run.judge.evidence["http/head"].findings.values())).again, bool(stopped)
@@ -62,7 +64,7 @@ def test_what_is_not_safe_is_not_sent_again_to_a_robot_that_may_not_be_moved(mon
 def test_an_error_of_the_server_is_asked_for_again_where_the_robot_may_be_moved(monkeypatch):
     run = _run("PUT")
     run.allow_motion = True
-    assert _sent_again(monkeypatch, run) == ((0, 5), True)
+    assert _sent_again(monkeypatch, run) == ((0, 5, False), True)
 
 
 def test_what_may_be_right_in_another_state_of_the_robot_is_not_sent_again(monkeypatch):
@@ -75,5 +77,5 @@ def test_a_fault_is_no_error_page_with_its_status(monkeypatch):
     page, fault = (Response(500, (("Content-Type", "text/xml"),), body, 1.0) for body in (b"oops", b"<fault/>"))
     run = _run("POST", page)
     run.allow_motion = True
-    assert _sent_again(monkeypatch, run, fault) == ((0, 5), True)
-    assert _sent_again(monkeypatch, run, page) == ((5, 5), True)
+    assert _sent_again(monkeypatch, run, fault) == ((0, 5, False), True)
+    assert _sent_again(monkeypatch, run, page) == ((5, 5, False), True)

@@ -1,0 +1,113 @@
+"""What the benchmarks start: programs, robots and `roaas load`; what a process uses; and the lines that they print."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from loader import Call
+
+HERE = Path(__file__).parent
+
+
+@contextmanager
+def started(*command: Any, **options: Any) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Run a program until the block ends; yields its process and the first line that it prints."""
+    with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True, **options) as process:
+        try:
+            assert process.stdout is not None  # noqa: S101 - tells mypy what PIPE means
+            yield process, process.stdout.readline().strip()
+        finally:
+            process.terminate()
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A running reference robot: its REST and SOAP addresses, and its processes."""
+
+    rest: Call
+    soap: Call
+    pids: tuple[int, ...]
+
+
+@contextmanager
+def running_robot(*options: str, **popen: Any) -> Iterator[Robot]:
+    """Run the reference robot on free ports."""
+    command = [sys.executable, "-m", "reference_robot", "--rest-port=0", "--soap-port=0", *options]
+    with started(*command, **popen) as (process, line):
+        words = dict(word.split("=", 1) for word in line.split()[1:])
+        rest, soap = urlsplit(words["rest"]), urlsplit(words["soap"])
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        yield Robot(
+            Call(rest.hostname, rest.port, "GET", "/"),
+            Call(soap.hostname, soap.port, "POST", soap.path),
+            (process.pid, *map(int, children)),
+        )
+
+
+def roaas_load(*options: Any) -> dict[str, Any]:
+    """Run `roaas load` with the wire client; returns its latency.json."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-c", "from loadtests.cli import load; load()", "--client", "wire", "--out", folder]
+        done = subprocess.run([*command, *map(str, options)], check=False, capture_output=True, text=True)
+        file = Path(folder) / "latency.json"
+        if not file.exists():
+            raise RuntimeError(done.stderr)
+        found: dict[str, Any] = json.loads(file.read_text())
+    return found
+
+
+def median_of(found: dict[str, Any]) -> dict[str, Any]:
+    """Return the comparison of SOAP and REST at the median in a latency.json."""
+    entry: dict[str, Any] = next(entry for entry in found["comparisons"] if entry["quantile"] == "p50")
+    return entry
+
+
+def matching(patterns: Iterable[str], faults: Iterable[str]) -> list[str]:
+    """Return the faults whose names match a pattern; print the names where none does."""
+    names = [name for name in faults if any(fnmatch(name, pattern) for pattern in patterns)]
+    if not names:
+        print(f"no fault is named {' or '.join(patterns)}; there are {', '.join(faults)}")
+    return names
+
+
+def report(text: str, *, met: bool) -> bool:
+    """Print one line of the result."""
+    print(f"{'ok    ' if met else 'MISSED'} {text}", flush=True)
+    return met
+
+
+def machine() -> str:
+    """Return what else runs on the machine, for the beginning or the end of a result."""
+    return f"{os.cpu_count()} processors, load average {os.getloadavg()[0]:.1f}"
+
+
+@dataclass
+class Footprint:
+    """Resident megabytes (what processes share counts in each), descriptors, threads, seconds of processor so far."""
+
+    megabytes: float
+    descriptors: int
+    threads: int
+    processor: float
+
+    @classmethod
+    def of(cls, pid: int) -> "Footprint":
+        """Return what a process uses, as Linux reports it."""
+        proc = Path(f"/proc/{pid}")
+        pages = int((proc / "statm").read_text().split()[1])
+        fields = (proc / "stat").read_text().rpartition(")")[2].split()
+        return cls(
+            pages * os.sysconf("SC_PAGE_SIZE") / 1e6,
+            len(list((proc / "fd").iterdir())),
+            len(list((proc / "task").iterdir())),
+            (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"),
+        )

@@ -1,0 +1,204 @@
+"""Recorded requests: as result.json keeps them, sent again as they were, and how often a failure comes back."""
+
+from __future__ import annotations
+
+import base64
+import re
+import time
+import zlib
+from contextlib import closing
+from http import HTTPStatus
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+from conformance.documents.readable import unreadable
+from conformance.transport import raw
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener, NoAnswerError, Request
+from conformance.verdict.finding import Again
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from conformance.api.rest.interface import RestInterface
+    from conformance.transport.client import Connection
+    from conformance.transport.exchange import Attempt, Response, Unanswered
+    from conformance.verdict.evidence import Judge
+    from conformance.verdict.finding import Finding, Sent
+    from conformance.verdict.run import Run
+
+# Octets of one request in a result, compressed; and as they are sent: twice the contract's limit and a half.
+_MOST = 64 * 1024
+_MOST_SENT = 25 * 1024 * 1024
+# What a request is made of on the wire (RFC 9110 5.6.2, 5.5; RFC 9112 3.2): no place for another request in it.
+_TOKEN = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")
+_TARGET = re.compile(r"https?://[\x21-\x7e]+")
+_VALUE = re.compile(r"[^\x00\r\n]*")
+# Fields that the client writes itself.
+_OF_THE_CLIENT = frozenset({"host", "content-length", "connection"})
+_TOKEN_FIELD = ("Authorization", "Bearer $ROAAS_TOKEN")
+# How often a finding's request is sent again, and for how long in all: the first of each requirement before others, s.
+_TIMES = 5
+_LONGEST_S = 8.0
+
+
+class Recorder(Listener):
+    """Tells the judge which requests were sent, before any observer judges them."""
+
+    def __init__(self, judge: Judge) -> None:
+        self._judge = judge
+
+    def answered(self, exchange: Exchange) -> None:
+        """Take a request that was answered."""
+        self._judge.sent(exchange.request)
+
+    def unanswered(self, request: Unanswered) -> None:
+        """Take one that was not."""
+        self._judge.sent(request.request)
+
+
+def written(sequence: Sequence[Sent]) -> list[dict[str, Any]]:
+    """Return a sequence as JSON; ``at_s`` counts from its first request."""
+    return [
+        {
+            "at_s": round(sent.at_s - sequence[0].at_s, 3),
+            "method": sent.request.method,
+            "url": sent.request.url,
+            "headers": [list(pair) for pair in sent.request.headers],
+            "body": _packed(sent.request.body),
+            "raw": None if sent.request.raw is None else _packed(sent.request.raw),
+        }
+        for sent in sequence
+    ]
+
+
+def read_request(item: dict[str, Any]) -> Request | None:
+    """Return a request of a written sequence; None where it was too large to be kept.
+
+    Raises:
+        ValueError, KeyError, TypeError: it is not one.
+    """
+    body, octets = _unpacked(item["body"]), None if item["raw"] is None else _unpacked(item["raw"])
+    if body is None or (item["raw"] is not None and octets is None):
+        return None
+    headers = tuple((str(name), str(value)) for name, value in item["headers"])
+    method, url = str(item["method"]), str(item["url"])
+    parts = [(_TARGET, url)]
+    if octets is None:
+        parts += [
+            (_TOKEN, method),
+            *((_TOKEN, name) for name, _ in headers),
+            *((_VALUE, value) for _, value in headers),
+        ]
+    for pattern, text in parts:
+        if not pattern.fullmatch(text):
+            raise ValueError(f"{text[:80]!r} cannot be a part of a request")
+    return Request(method, url, headers, body, octets)
+
+
+def send_again(request: Request, connection: Connection) -> Attempt:
+    """Send a request as it was sent, over a connection of its own, and return what became of it."""
+    where = urlsplit(request.url)
+    with closing(HttpClient(f"{where.scheme}://{where.netloc}", connection)) as client:
+        try:
+            if request.raw is not None:
+                octets = request.raw.replace(b"$ROAAS_TOKEN", (connection.token or "").encode("latin-1"))
+                return raw.read_one(client, octets, raw.talk(client, octets, answers=1), request.method)[0]
+            fields = [pair for pair in request.headers if pair[0].lower() not in _OF_THE_CLIENT]
+            own = [pair for pair in fields if pair != _TOKEN_FIELD]
+            authorized = len(own) < len(fields)
+            if not any(name.lower() == "accept" for name, _ in own):
+                own.append(("Accept", ""))
+            target = where.path + (f"?{where.query}" if where.query else "")
+            return client.send(
+                request.method, target, headers=own, body=request.body, fresh=True, authorized=authorized
+            )
+        except NoAnswerError as none:
+            return none.unanswered
+
+
+def is_same(before: Response, came: Attempt) -> bool:
+    """Return whether a response has the status and the media type of another one, and content where that has some."""
+    if not isinstance(came, Exchange):
+        return False
+    now = came.response
+    same_kind = (before.status, before.media_type) == (now.status, now.media_type)
+    return same_kind and bool(before.body) == bool(now.body)
+
+
+def look_again(run: Run, connection: Connection, rest: RestInterface | None = None) -> None:
+    """Send the request of each finding again, and put down how often the failure came back.
+
+    Where an observer judges the requirement by every response, its verdict counts; else a response of the same kind. A
+    request that is not safe is sent again only where the robot may be moved and the response was 5xx: that is wrong in
+    any state of the robot, while for others the state may make the difference.
+
+    Args:
+        run: with its findings.
+        connection: of the run.
+        rest: the robot's REST interface, by which it is left at rest.
+    """
+    findings = [
+        (number, finding, finding.exchange)
+        for id_, evidence in run.judge.evidence.items()
+        if run.contract.ledger[id_].class_ in run.claims
+        for number, finding in enumerate(evidence.findings.values())
+        if isinstance(finding.exchange, Exchange) and _may_be_sent(run, finding.exchange)
+    ]
+    moves, until = False, time.monotonic() + _LONGEST_S
+    try:
+        for _, finding, exchange in sorted(findings, key=lambda item: item[0]):
+            if time.monotonic() > until:
+                break
+            moves |= exchange.request.method not in SAFE_METHODS
+            cases = run.judge.cases(finding.requirement)
+            came_back = sum(_fails_again(run, finding, exchange, connection) for _ in range(_TIMES))
+            finding.again = Again(came_back, _TIMES, judged=run.judge.cases(finding.requirement) > cases)
+    finally:
+        if moves and rest is not None:
+            rest.device.leave_at_rest(rest)
+
+
+def _may_be_sent(run: Run, exchange: Exchange) -> bool:
+    request = exchange.request
+    if request.raw is not None:
+        return False
+    if request.method in SAFE_METHODS:
+        return not request.body
+    return run.allow_motion and exchange.response.status >= HTTPStatus.INTERNAL_SERVER_ERROR
+
+
+def _fails_again(run: Run, finding: Finding, exchange: Exchange, connection: Connection) -> bool:
+    """Send a finding's request once more, and return whether the failure came back."""
+    evidence, before = run.judge.evidence[finding.requirement], exchange.response
+    cases, failures = evidence.cases, evidence.failures
+    came = send_again(exchange.request, connection)
+    if evidence.cases > cases:
+        return evidence.failures > failures
+    if not isinstance(came, Exchange) or not is_same(before, came):
+        return False
+    # A SOAP fault is not an error page with its status.
+    return bool(unreadable(before.media_type, before.body)) == bool(
+        unreadable(came.response.media_type, came.response.body)
+    )
+
+
+def _packed(octets: bytes) -> str | None:
+    """Return octets in base64, compressed (RFC 1950); None where that is still too much."""
+    packed = zlib.compress(octets) if octets else b""
+    return base64.b64encode(packed).decode() if len(packed) <= _MOST and len(octets) <= _MOST_SENT else None
+
+
+def _unpacked(text: str | None) -> bytes | None:
+    """Return octets as they were; a result may be anybody's, and no more than a run writes is ever unpacked."""
+    if not text:
+        return None if text is None else b""
+    packed = base64.b64decode(text)
+    opened = zlib.decompressobj()
+    try:
+        octets = opened.decompress(packed, _MOST_SENT + 1) if len(packed) <= _MOST else b""
+    except zlib.error as error:
+        raise ValueError(str(error)) from error
+    if not opened.eof:
+        raise ValueError(f"a request that is cut short, or has more than {_MOST_SENT:,} octets")
+    return octets

@@ -1,0 +1,134 @@
+"""One cause, one finding: a cause that several requirements meet is one finding, and the others point to it.
+
+A closed connection, a hang, a server error and a response that no parser reads are causes that many checks meet. Two
+findings have the same cause when its kind and the method, server and path of the request are the same, and also the
+status of a server error and the operation of a SOAP message. The finding stays with one requirement, which is chosen by
+
+1. level: MUST first;
+2. ``forbids`` in the ledger, which names the kinds of causes that a requirement is about;
+3. what was done: a request that was sent comes before one that was not sent because the server hung before, and a check
+   of a few requirements before a check of many;
+4. time: the requirement that met the cause first.
+
+All other requirements that met it are not tested.
+
+A request written by hand tests a rule of its own, so it shares a cause only where an ordinary request met that as well.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from conformance.contract.classes import CauseKind, Level
+
+if TYPE_CHECKING:
+    from collections.abc import Container, Iterable, Mapping
+
+    from conformance.contract.ledger import Requirement
+    from conformance.verdict.evidence import Evidence
+    from conformance.verdict.finding import Finding
+
+_LEVELS = tuple(Level)
+_KINDS = tuple(CauseKind)
+# A check of more requirements than this watches many things, and says less of one.
+_FEW = 5
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A finding, with the requirements that are not tested because of it.
+
+    Attributes:
+        finding: the one that is told.
+        blocks: ids of the requirements that could not be tested.
+    """
+
+    finding: Finding
+    blocks: tuple[str, ...]
+
+
+def by_cause(
+    evidence: Mapping[str, Evidence],
+    ledger: Mapping[str, Requirement],
+    claims: Container[str],
+    scored: Container[str] | None = None,
+) -> tuple[dict[str, Evidence], list[Cause]]:
+    """Have each cause told once, and number the findings in the order in which a vendor should look at them.
+
+    MUST comes before SHOULD, then no response before hang, server error, unreadable response and broken rule, then the
+    cause that keeps more requirements from being tested.
+
+    Args:
+        evidence: by requirement.
+        ledger: the requirements.
+        claims: the classes that are judged; the others have no findings.
+        scored: ids of the requirements that count; None: all.
+
+    Returns:
+        The evidence with the findings that remain, and these findings in their order.
+    """
+    judged = {id_: one for id_, one in ledger.items() if one.class_ in claims}
+    places = {id_: place for place, id_ in enumerate(judged)}
+
+    def weight(finding: Finding) -> tuple[bool, int]:
+        requirement = judged[finding.requirement]
+        return scored is not None and requirement.id not in scored, _LEVELS.index(requirement.level)
+
+    def first(finding: Finding) -> tuple[tuple[bool, int], bool, bool, bool, int]:
+        forbids = finding.cause in judged[finding.requirement].forbids
+        return weight(finding), not forbids, finding.unsent, finding.among > _FEW, finding.met
+
+    findings = [finding for id_ in judged for finding in evidence[id_].findings.values()]
+    # By finding: for each of its causes, the finding by which that is told.
+    told_by: defaultdict[int, list[Finding]] = defaultdict(list)
+    for group in _groups(findings):
+        told = min(group, key=first)
+        for finding in group:
+            told_by[id(finding)].append(told)
+    kept = {id_: _kept(evidence[id_], told_by) for id_ in judged}
+    waiting = {
+        id_: [told for finding in evidence[id_].findings.values() for told in told_by[id(finding)]]
+        + ([because] if (because := evidence[id_].because) else [])
+        for id_, requirement in judged.items()
+        if not (kept[id_] or evidence[id_].errors or requirement.untestable)
+    }
+    blocked = Counter(number for reasons in waiting.values() for number in {id(one) for one in reasons})
+    remaining = [finding for id_ in judged for finding in kept[id_].values()]
+    remaining.sort(
+        key=lambda one: (weight(one), _KINDS.index(one.cause), -blocked[id(one)], places[one.requirement], one.met)
+    )
+    for number, finding in enumerate(remaining, 1):
+        finding.number = number
+    seen = dict(evidence)
+    blocks: defaultdict[int, list[str]] = defaultdict(list)
+    for id_ in judged:
+        because = min(waiting.get(id_, ()), key=lambda one: one.number, default=None)
+        if because is not None:
+            blocks[because.number].append(id_)
+        seen[id_] = replace(evidence[id_], findings=kept[id_], because=because)
+    return seen, [Cause(finding, tuple(blocks[finding.number])) for finding in remaining]
+
+
+def _groups(findings: Iterable[Finding]) -> list[list[Finding]]:
+    """Return the findings that share a cause, cause by cause, as far as an ordinary request met it."""
+    groups: defaultdict[str, list[Finding]] = defaultdict(list)
+    for finding in findings:
+        for cause in finding.causes if not finding.alone else ():
+            groups[cause].append(finding)
+    return [
+        group
+        for group in groups.values()
+        if any(finding.exchange and finding.exchange.request.raw is None for finding in group)
+    ]
+
+
+def _kept(evidence: Evidence, told_by: Mapping[int, list[Finding]]) -> dict[str, Finding]:
+    """Return the findings that stay with a requirement: at least one, where more failed than was kept."""
+    own = {
+        key: finding
+        for key, finding in evidence.findings.items()
+        if not (tellers := told_by.get(id(finding))) or any(told is finding for told in tellers)
+    }
+    return own or (evidence.findings if evidence.unshown else {})

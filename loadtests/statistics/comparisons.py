@@ -1,0 +1,177 @@
+"""Two sides compared: the comparisons, A/A controls and further interfaces of latency.json."""
+
+from typing import Any
+
+import msgspec
+
+from loadtests.schedule.plan import SeriesName
+from loadtests.statistics.between_runs import Interval
+from loadtests.statistics.figures import named, rounded, rounded_interval, rounds_of
+from loadtests.statistics.histogram import SHARES
+from loadtests.statistics.intervals import LEAST_ROUNDS, Compared, compare, pooled_interval, samples_for_point
+from loadtests.statistics.judgement import Judgement, judge
+from loadtests.statistics.measured import Measured, Side
+from loadtests.statistics.rounds import Unit
+
+BASE = "rest"
+WEB_SERVICES = (BASE, "soap")
+COMPARED = ("mean", "p50", "p90", "p99")
+
+
+class Ratio(msgspec.Struct, kw_only=True):
+    """Two sides at one quantile, as latency.json gives them: the second less the first, and over it.
+
+    Attributes:
+        reason: why there is no ratio, or no interval.
+    """
+
+    operation: str
+    client: str
+    quantile: str
+    difference_ms: float | None
+    ratio: float | None
+    ci95: list[float] | None
+    ci95_difference_ms: list[float] | None
+    rounds: dict[str, Any] | None
+    reason: str | None
+
+
+class AaControl(Ratio, kw_only=True):
+    """An interface against itself: an entry of `noise_floor`."""
+
+    interface: str
+
+
+class SoapOverRest(Ratio, kw_only=True):
+    """SOAP against REST, and what may be claimed: an entry of `comparisons`."""
+
+    difference_ms: float | None = msgspec.field(name="soap_minus_rest_ms")
+    between_runs: float | None = None
+    noise_ci95: list[float] | None = None
+    judgement: str = "none"
+    bound: float | None = None
+    judgement_reason: str | None = None
+
+
+class OverRest(Ratio, kw_only=True):
+    """A further interface, such as rosbridge, against REST: an entry of `further_interfaces`."""
+
+    interface: str
+    difference_ms: float | None = msgspec.field(name="minus_rest_ms")
+
+
+def soap_over_rest(measured: Measured, deviation: float) -> list[SoapOverRest]:
+    """Compare the service times of SOAP and REST, by operation, client and quantile, judged by the A/A control.
+
+    The library clients have no A/A control of their own: the wire client's serves for them too.
+
+    Args:
+        measured: what was recorded.
+        deviation: relative standard deviation of the ratio between runs, as far as this run cannot show it.
+    """
+    found: list[SoapOverRest] = []
+    if measured.plan.robots > 1:
+        return found  # robots took turns, not interfaces
+    names = set(measured.plan.series_names())
+    for operation in measured.plan.operations:
+        clients = [
+            client
+            for client in measured.plan.clients
+            if all((operation, interface, client) in names for interface in WEB_SERVICES)
+        ]
+        controls = {quantile: aa_interval(measured, operation, quantile) for quantile in COMPARED} if clients else {}
+        found += [
+            comparison(measured, operation, client, quantile, controls[quantile], deviation)
+            for client in clients
+            for quantile in COMPARED
+        ]
+    return found
+
+
+def comparison(
+    measured: Measured, operation: str, client: str, quantile: str, control: Interval | None, deviation: float
+) -> SoapOverRest:
+    """Compare SOAP and REST at one quantile, judged by `control`, the interval of the A/A control."""
+    rest, soap = (Side("duel", (operation, interface, client)) for interface in WEB_SERVICES)
+    entry = SoapOverRest(operation=operation, client=client, **compared(measured, rest, soap, quantile, deviation))
+    entry.between_runs, entry.noise_ci95 = rounded(deviation), rounded_interval(control)
+    interval = None if entry.ci95 is None else (entry.ci95[0], entry.ci95[1])
+    said = judge(entry.ratio, interval, control) if entry.ratio is not None else Judgement("none")
+    entry.judgement, entry.bound = said.verdict, rounded(said.bound)
+    entry.judgement_reason = said.reason or entry.reason
+    return entry
+
+
+def aa_interval(measured: Measured, operation: str, quantile: str) -> Interval | None:
+    """Return the interval of the ratio that SOAP and REST came to against themselves, both pooled."""
+    client, seed = measured.plan.clients[0], measured.plan.load.seed
+    parts = [
+        _enough(measured.paired(*_against_itself((operation, interface, client))), quantile, seed, stream=stream)
+        for stream, interface in enumerate(WEB_SERVICES)
+        if (operation, interface, client) in measured.plan.series_names()
+    ]
+    known = [part for part in parts if part is not None]
+    return pooled_interval(known) if len(known) == len(parts) else None
+
+
+def _against_itself(name: SeriesName) -> tuple[Side, Side]:
+    return Side("aa", name, "a"), Side("aa", name, "b")
+
+
+def aa_controls(measured: Measured) -> list[AaControl]:
+    """Return the `noise_floor` of latency.json: the A/A control of each interface."""
+    client = measured.plan.clients[0]
+    return [
+        AaControl(**named(name), **compared(measured, *_against_itself(name), quantile))
+        for interface in measured.plan.interfaces
+        for number in measured.plan.offered(interface, client)
+        for name in [(measured.plan.operations[number], interface, client)]
+        for quantile in COMPARED
+    ]
+
+
+def further_interfaces(measured: Measured) -> list[OverRest]:
+    """Return the `further_interfaces` of latency.json: those beside SOAP and REST, each over REST."""
+    names = measured.plan.series_names()
+    return [
+        OverRest(**named(name), **compared(measured, Side("duel", base), Side("duel", name), quantile))
+        for name in names
+        for base in [(name[0], BASE, name[2])]
+        if name[1] not in WEB_SERVICES and base in names
+        for quantile in COMPARED
+    ]
+
+
+def _samples(units: list[Unit]) -> int:
+    """Return how many samples the side with fewer has."""
+    return min((sum(unit.sides[side].total for unit in units) for side in (0, 1)), default=0)
+
+
+def _needed(quantile: str) -> int:
+    return 2 if quantile == "mean" else samples_for_point(SHARES[quantile])
+
+
+def _enough(units: list[Unit], quantile: str, seed: int, *, stream: int = 0, deviation: float = 0.0) -> Compared | None:
+    """Compare two sides where both have enough samples."""
+    enough = _samples(units) >= _needed(quantile)
+    return compare(units, quantile, seed, stream=stream, deviation=deviation) if enough else None
+
+
+def compared(measured: Measured, first: Side, second: Side, quantile: str, deviation: float = 0.0) -> dict[str, Any]:
+    """Compare two sides at one quantile; returns the fields of a `Ratio` but for its names."""
+    units = measured.paired(first, second)
+    result = _enough(units, quantile, measured.plan.load.seed, deviation=deviation)
+    reason = None
+    if result is None:
+        reason = f"{_samples(units)} samples on one side; {quantile} needs {_needed(quantile)}"
+    elif result.ci95 is None:
+        reason = f"no interval: fewer than {LEAST_ROUNDS} rounds of blocks"
+    return {
+        "quantile": quantile,
+        "difference_ms": rounded(result.difference_ms) if result else None,
+        "ratio": rounded(result.ratio) if result else None,
+        "ci95": rounded_interval(result.ci95) if result else None,
+        "ci95_difference_ms": rounded_interval(result.ci95_difference_ms) if result else None,
+        "rounds": rounds_of(result.replicates, measured.pair_s(first.phase, first.name)) if result else None,
+        "reason": reason,
+    }

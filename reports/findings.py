@@ -1,0 +1,87 @@
+"""Findings of a conformance result, in words: the same on every page and in every CI format.
+
+Since version 1.2 a failure's `message` says what the suite sent, what it expected by which rule, and what it got.
+Before 1.2 `message` held only what the suite got; then the text is composed here.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+CAUSES = {
+    "no-response": "No response",
+    "hang": "No complete response in time",
+    "server-error": "Server error",
+    "unreadable": "Unreadable response",
+    "rule": "Rule not met",
+}
+"""Kinds of causes, the most urgent first, with the heading that pages show."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One failure of a requirement.
+
+    Attributes:
+        requirement: the requirement, as result.json has it.
+        failure: the failure, as result.json has it.
+        blocks: ids of the requirements that the suite could not test because of this failure.
+    """
+
+    requirement: Mapping[str, Any]
+    failure: Mapping[str, Any]
+    blocks: tuple[str, ...] = ()
+
+    @property
+    def number(self) -> int | None:
+        """Return the finding's number in the result; None before version 1.2."""
+        number: int | None = self.failure.get("number")
+        return number
+
+    @property
+    def cause(self) -> str:
+        """Return the kind of cause, one of `CAUSES`."""
+        return str(self.failure.get("cause", "rule"))
+
+    @property
+    def subject(self) -> str:
+        """Return method and path of the request, or the requirement's id if no single request shows the failure."""
+        request = self.failure["request"]
+        sent = f"{request['method']} {request['url']}" if request else str(self.requirement["id"])
+        return str(self.failure.get("subject") or sent)
+
+    @property
+    def text(self) -> str:
+        """Return what the suite sent, what it expected by which rule, and what it got."""
+        if "observed" in self.failure:
+            return str(self.failure["message"])
+        sent = f"Sent `{self.subject}`. " if self.failure["request"] else ""
+        rule = ", ".join(filter(None, (self.requirement["id"], self.requirement["source"])))
+        expected, got = (self.failure[key].rstrip(". ") for key in ("expected", "message"))
+        seen = f" Seen {self.failure['seen']:,} times." if self.failure["seen"] > 1 else ""
+        return f"{sent}Expected {expected} ({rule}). Got {got}.{seen}"
+
+
+def findings(requirements: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -> list[Finding]:
+    """Return the findings of some requirements in the order in which a vendor should look at them."""
+    blocks = {cause["number"]: tuple(cause["blocks"]) for cause in result.get("causes", ())}
+    found = [
+        Finding(requirement, failure, blocks.get(failure.get("number"), ()))
+        for requirement in requirements
+        for failure in requirement["failures"]
+    ]
+    return sorted(found, key=lambda finding: finding.number or 0)
+
+
+def by_requirement(found: Sequence[Finding]) -> Iterator[tuple[Mapping[str, Any], list[Finding]]]:
+    """Yield each requirement with those of its findings that follow one another."""
+    for _, group in groupby(found, key=lambda finding: finding.requirement["id"]):
+        own = list(group)
+        yield own[0].requirement, own
+
+
+def by_cause(found: Sequence[Finding]) -> Iterator[tuple[str, list[Finding]]]:
+    """Yield the heading of each kind of cause with its findings, the most urgent kind first."""
+    for cause in sorted({finding.cause for finding in found}, key=list(CAUSES).index):
+        yield CAUSES[cause], [finding for finding in found if finding.cause == cause]

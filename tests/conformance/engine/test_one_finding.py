@@ -1,0 +1,179 @@
+"""A robot with one fault has one finding, however many checks meet it: seen with real servers."""
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from conformance.cli.summary import print_summary
+from conformance.contract.pack import Contract
+from conformance.engine.certification import certify
+from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.statement.statement import Endpoints, empty_statement
+from conformance.transport.client import Connection
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
+
+_SENSORS = "/robot/sensors/"
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Has a fault in /robot/sensors/, and a list of services."""
+
+    protocol_version = "HTTP/1.1"
+
+    def do_GET(self):
+        body = b"[]" if self.path.startswith("/robot/navigation/services/") else b""
+        path = self.path.split("?")[0]
+        if path == _SENSORS:
+            body = self.server.fault(self)
+            if body is None:
+                self.close_connection = True
+                return
+        if body:
+            self._send(self.server.status if path == _SENSORS else 200, "application/json", body)
+        else:
+            self._send(404, "application/problem+json", b'{"status": 404}')
+
+    def _send(self, status, media_type, body):
+        self.send_response(status)
+        self.send_header("Content-Type", media_type)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(body)
+
+    do_HEAD = do_GET  # noqa: N815 - http.server's name
+
+    def log_message(self, *_):
+        """Say nothing."""
+
+
+def _endless(handler):
+    handler.send_response(200)
+    handler.send_header("Content-Type", "text/event-stream")
+    handler.end_headers()
+    until = time.monotonic() + 3
+    while time.monotonic() < until:
+        try:
+            handler.wfile.write(b"data: 1\n\n")
+        except OSError:
+            break
+        time.sleep(0.05)
+
+
+# Fault, status, kind of cause, and the requirement that it is a finding of.
+_FAULTS = {
+    "closes": (lambda _: None, 0, "no-response", "rest-resources/sensors-type"),
+    "never ends": (_endless, 0, "hang", "rest-resources/sensors-type"),
+    "fails": (lambda _: b"{}", 500, "server-error", "http/declared-status"),
+    "is cut short": (lambda _: b'[{"name": "a"', 200, "unreadable", "http/declared-body"),
+}
+_ONLY = (
+    *("rest-resources/sensors-type", "rest-resources/sensors-unique", "rest-resources/sensors-stable"),
+    *("rest-resources/services-type", "rest-formats/json-default", "rest-formats/same-values"),
+    *("http/head", "http/declared-status", "http/declared-body"),
+)
+
+
+@contextmanager
+def _serving(fault, status, handler=_Handler):
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    server.daemon_threads, server.fault, server.status = True, fault, status
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.mark.parametrize("name", _FAULTS)
+def test_one_fault_is_one_finding(name, tmp_path, capsys):
+    fault, status, kind, owner = _FAULTS[name]
+    contract = Contract.load(only=_ONLY)
+    classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in _ONLY))
+    with _serving(fault, status) as base:
+        statement = empty_statement(contract)
+        statement = type(statement)(endpoints=Endpoints(rest=base))
+        run = Run(statement=statement, contract=contract, claims=classes, effort=Effort("quick"))
+        outcome = certify(RobotUnderTest(run, Connection(timeout_s=0.5)), tmp_path, progress=None)
+    document = json.loads(outcome.path.read_text(encoding="utf-8"))
+    of_sensors = [one for one in document["causes"] if _SENSORS in one["text"]]
+    assert [(one["kind"], one["requirement"], one["text"].count("GET /robot/sensors/")) for one in of_sensors] == [
+        (kind, owner, 1)
+    ], of_sensors
+    (cause,) = of_sensors
+    assert cause["number"] == 1
+    waiting = {item["id"]: item for item in document["requirements"] if item.get("because_of") == 1}
+    assert set(waiting) == set(cause["blocks"])
+    assert ("rest-resources/sensors-type" in waiting) == (owner != "rest-resources/sensors-type")
+    assert all(item["verdict"] == "skip" and not item["failures"] for item in waiting.values())
+    assert all(item["reason"].startswith("Not tested, because of finding 1: ") for item in waiting.values())
+    (failed,) = (item for item in document["requirements"] if item["id"] == owner)
+    (failure,) = (one for one in failed["failures"] if one["number"] == 1)
+    assert failure["message"] == cause["text"]
+    assert (failure["subject"], failure["cause"]) == ("GET /robot/sensors/", kind)
+    assert failure["observed"] in failure["message"]
+    assert document["verdict"] == "not-conformant"
+    assert (document["resent_requests"] > 0) == (name == "closes")
+    if name == "closes":
+        assert "closed the connection without a response, 2 of 2 times; the request before it" in failure["observed"]
+    print_summary(outcome)
+    shown = capsys.readouterr().out
+    assert shown.count(cause["text"]) == 1
+    assert f"\n1. FAIL {owner} (" in shown
+    assert f"not tested because of it: {cause['blocks'][0]}" in shown
+
+
+class _Dropping(_Handler):
+    """Closes each connection on its fifth request, in place of a response."""
+
+    def setup(self):
+        super().setup()
+        self.left = 4
+
+    def do_GET(self):
+        self.left -= 1
+        if self.left < 0:
+            self.close_connection = True
+        else:
+            self._send(200, "application/json", b"[]")
+
+
+def test_requests_that_are_dropped_again_and_again_on_a_busy_connection_are_one_finding(tmp_path):
+    contract = Contract.load(only=("http/many-requests", "http/head"))
+    with _serving(None, 0, _Dropping) as base:
+        statement = type(empty_statement(contract))(endpoints=Endpoints(rest=base))
+        run = Run(statement=statement, contract=contract, claims=("http",), effort=Effort("quick"))
+        document = certify(RobotUnderTest(run, Connection(timeout_s=2)), tmp_path, progress=None).document
+    verdicts = {item["id"]: item["verdict"] for item in document["requirements"]}
+    assert verdicts["http/many-requests"] == "fail"
+    (failure,) = (one for item in document["requirements"] for one in item["failures"] if "many" in item["id"])
+    assert "the server closed 3 times without a response" in failure["message"]
+
+
+_CHECKS = """
+import pytest
+
+@pytest.mark.requirement("rest-resources/sensors-type")
+def test_first(rest):
+    rest.send("GET", "/robot/sensors/")
+
+@pytest.mark.requirement("rest-formats/json-default")
+def test_second(rest):
+    rest.send("GET", "/robot/sensors/")
+"""
+
+
+def test_in_somebody_elses_project_one_cause_fails_one_test(tmp_path):
+    (tmp_path / "test_checks.py").write_text(_CHECKS, encoding="utf-8")
+    with _serving(*_FAULTS["closes"][:2]) as base:
+        command = [sys.executable, "-m", "pytest", "-rs", "-p", "roaas_pytest", "test_checks.py", "--robot-rest", base]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    assert "1 failed, 1 skipped" in done.stdout, done.stdout
+    assert "Sent `GET /robot/sensors/`. Expected a response (rest-resources/sensors-type" in done.stdout
+    assert "Not tested, because of a failure before: GET /robot/sensors/: no response" in done.stdout

@@ -1,0 +1,118 @@
+"""A finding's text says what the suite did, what it expected by which rule, what it got, and how often."""
+
+import pytest
+
+from conformance.contract.classes import CauseKind
+from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
+from conformance.verdict.evidence import MAX_FINDINGS, Judge
+from conformance.verdict.finding import Again, in_full, kind_of
+from conformance.verdict.run import Run
+
+_ID = "rest-resources/pose-type"
+_GET = Request("GET", "http://r2:8080/robot/pose/", (("Host", "r2:8080"), ("Accept", "application/json")))
+_PAGE = Response(404, (("Content-Type", "text/html"),), b"<p>no</p>", 1.0)
+
+
+def _finding(exchange, expected="200 with a complete Odometry", requirement=_ID, **given):
+    judge = Run().judge
+    judge.begin("test_pose.py::test_type")
+    judge.check(requirement, False, exchange, expected, **given)
+    return judge.met[-1]
+
+
+def test_a_text_has_all_its_parts():
+    assert _finding(Exchange(_GET, _PAGE)).text == (
+        "Sent `GET /robot/pose/` with `Accept: application/json`. Expected 200 with a complete Odometry "
+        "(rest-resources/pose-type, contract.md#poses; paper, Table 1). Got 404, text/html."
+    )
+
+
+@pytest.mark.parametrize(
+    ("found", "observed"),
+    [
+        ("one", "404, text/html: one"),
+        ("a number", "404, text/html: a number"),
+        ("status 404", "404, text/html"),
+        ("status 404, text/html", "404, text/html"),
+        ("status 404 without Retry-After", "404, text/html without Retry-After"),
+        ("404 with text/html", "404 with text/html"),
+        ("PUT /robot/pose/ is answered 404", "404, text/html"),
+    ],
+)
+def test_what_a_check_found_is_never_shown_alone(found, observed):
+    assert _finding(Exchange(_GET, _PAGE), found=found).observed == observed
+
+
+def test_how_often_a_failure_was_seen_and_came_back_is_in_the_text():
+    judge = Run().judge
+    for _ in range(2):
+        judge.check(_ID, False, Exchange(_GET, _PAGE), "200")
+    finding = judge.met[-1]
+    assert finding.text.endswith("Got 404, text/html. Seen 2 times.")
+    finding.again = Again(5, 5)
+    assert finding.text.endswith("Sent again, it failed 5 of 5 times.")
+    finding.again = Again(1, 5)
+    assert finding.text.endswith("Intermittent: sent again, it failed 1 of 5 times.")
+    finding.again = Again(5, 5, judged=False)
+    assert finding.text.endswith("Sent again, it had the same kind of response 5 of 5 times.")
+
+
+def test_what_is_special_in_a_request_is_shown():
+    put = Request(
+        "PUT", "http://r2/a", (("Host", "r2"), ("Accept", "*/*"), ("Content-Type", "text/csv")), b"1,2\n" + b"x" * 500
+    )
+    text = _finding(Exchange(put, _PAGE)).text
+    assert "Sent `PUT /a` with `Content-Type: text/csv` and the body `1,2\\nxxx" in text
+    assert "(504 bytes in all)" in text
+    by_hand = Request("GET", "http://r2/", raw=b"GET /robot/pose/ HTTP/1.1\r\nHost:\r\n\r\n")
+    finding = _finding(Exchange(by_hand, _PAGE))
+    assert finding.subject == "GET /robot/pose/"
+    assert "Sent the bytes `GET /robot/pose/ HTTP/1.1\\r\\nHost:\\r\\n\\r\\n`." in finding.text
+
+
+def test_without_a_request_the_check_or_a_subject_is_named():
+    assert _finding(None, found="0.4 m").text.startswith("Tested by the check test_pose.py::test_type. Expected")
+    given = _finding(None, "at most 0.1 m", found="0.4 m", subject="the drift at rest")
+    assert given.text == (
+        "Tested the drift at rest. Expected at most 0.1 m "
+        "(rest-resources/pose-type, contract.md#poses; paper, Table 1). Got 0.4 m."
+    )
+    assert in_full(given) == given.text
+
+
+def test_a_failed_check_shows_a_command_that_repeats_it():
+    assert in_full(_finding(Exchange(_GET, _PAGE))).endswith("http://r2:8080/robot/pose/")
+
+
+_JSON = (("Content-Type", "application/json"),)
+_XML = (("Content-Type", "text/xml"),)
+
+
+@pytest.mark.parametrize(
+    ("exchange", "kind"),
+    [
+        (Unanswered(_GET, "", NoAnswer.CLOSED), CauseKind.NO_RESPONSE),
+        (Unanswered(_GET, "", NoAnswer.REFUSED), CauseKind.NO_RESPONSE),
+        (Unanswered(_GET, "", NoAnswer.TIMEOUT), CauseKind.HANG),
+        (Unanswered(_GET, "", NoAnswer.CIRCUIT_OPEN), CauseKind.HANG),
+        (Unanswered(_GET, "", NoAnswer.MALFORMED), CauseKind.UNREADABLE),
+        (Exchange(_GET, Response(200, _JSON, b'{"x":', 1.0)), CauseKind.UNREADABLE),
+        (Exchange(_GET, Response(200, _XML, b"<a>", 1.0)), CauseKind.UNREADABLE),
+        (Exchange(_GET, Response(200, _JSON, b'{"x": 1}', 1.0)), CauseKind.RULE),
+        (Exchange(_GET, Response(503, (), b"", 1.0)), CauseKind.SERVER_ERROR),
+        (Exchange(_GET, Response(500, _XML, b"<e:Body><e:Fault><faultcode/></e:Fault></e:Body>", 1.0)), CauseKind.RULE),
+        (Exchange(_GET, _PAGE), CauseKind.RULE),
+        (None, CauseKind.RULE),
+    ],
+)
+def test_kinds_of_causes(exchange, kind):
+    assert kind_of(exchange) is kind
+
+
+def test_findings_beyond_those_that_are_kept_count_for_none_of_them():
+    judge = Judge({"http/x"})
+    for letter in "abcdefgh":
+        judge.check("http/x", False, None, f"thing {letter}", found="not so")
+    evidence = judge.evidence["http/x"]
+    assert [finding.seen for finding in evidence.findings.values()] == [1] * MAX_FINDINGS
+    assert (evidence.unshown, evidence.failures) == (3, 8)
