@@ -17,7 +17,7 @@ help:
 	@echo "make demo      set up, start the robot, certify it, measure it, leave the reports in $(OUT)/"
 	@echo "make test      set up, then lint, types and all tests"
 	@echo "make install   set up only: $(VENV) with the command roaas in it"
-	@echo "make selftest  show that the suite catches faulty robots and blames no good one (about half an hour)"
+	@echo "make selftest  show that the suite kills mutants and has no false positives (about half an hour)"
 	@echo "make bench     print the benchmarks' ratios"
 	@echo "make clean     remove what the others made"
 

@@ -177,7 +177,7 @@ def main() -> int:
 
 def _told(run: str, fault: Sometimes, outcome: Outcome, must: frozenset[str], broken: list[str]) -> bool:
     """Print what came of one run; return whether its fault was caught."""
-    failed = sorted(must & set(outcome.fails)) or sorted(outcome.caught())
+    failed = sorted(must & set(outcome.fails)) or sorted(outcome.not_passed())
     said = f"killed by {', '.join(failed[:3])}" if failed else f"survived, exit code {outcome.exit_code}"
     if broken:  # it did not do what its name says
         said, failed = f"void: {broken[0]}", []

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conformance.cli.contract import contract_option, loaded
+from conformance.cli.selftest_progress import Progress, compare
 from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.locating import ContractError
 
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from conformance.contract.pack import Contract
     from conformance.mutation.mutant import Mutant
     from conformance.mutation.self_test import GoodDevice, SelfTest
-    from conformance.selftest.comparison import SchemathesisResult
-    from conformance.selftest.controls import ControlResult
-    from conformance.selftest.mutant_run import MutantResult
     from conformance.selftest.report import Report
 
 # How many mutants `--short` judges where the pack does not name them.
@@ -186,37 +184,23 @@ def _finish(report: Report, run: Callable[[], None], options: dict[str, Any]) ->
 def _run(report: Report, chosen: list[Mutant], options: dict[str, Any]) -> None:
     from conformance.selftest.mutant_run import RobotPool, run_mutants, run_unchanged  # noqa: PLC0415 - see _by_hand()
 
-    progress = _Progress(report, len(chosen))
+    progress = Progress(report, len(chosen))
     if chosen:
         target = _target(report.contract, report.target)
         with RobotPool(report.contract, target, options["parallel"], options["domain_id"]) as pool:
             already: frozenset[str] = frozenset()
             if not options["short"]:
-                already = frozenset(run_unchanged(pool, options["effort"]).caught())
+                already = frozenset(run_unchanged(pool, options["effort"]).not_passed())
             report.mutant_results = run_mutants(
                 pool, chosen, effort=options["effort"], already=already, tell=progress.mutant
             )
             if options["compare"]:
-                _compare(report, pool, chosen, progress)
+                compare(report, pool, chosen, progress)
     if options["seeds"]:
         _run_controls(report, options, progress)
 
 
-def _compare(report: Report, pool: Any, chosen: list[Mutant], progress: _Progress) -> None:
-    from conformance.selftest import comparison  # noqa: PLC0415 - see _by_hand()
-
-    if comparison.command() is None:
-        report.notes.append("Schemathesis' command line is not installed, so that nothing was compared with it.")
-        return
-    good, report.compared = comparison.compare(pool, chosen, tell=progress.compared)
-    report.good = tuple(sorted(f"{operation} {code}" for operation, code in good))
-    report.notes.append(
-        f"Schemathesis ran with --max-examples {comparison.EXAMPLES}, phases examples, coverage, fuzzing, and at most "
-        f"{comparison.LIMIT_S:g} s for each mutant; findings that it has of the good device as well do not count."
-    )
-
-
-def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) -> None:
+def _run_controls(report: Report, options: dict[str, Any], progress: Progress) -> None:
     from conformance.selftest.controls import controls_of, run_controls  # noqa: PLC0415 - see _by_hand()
 
     controls = controls_of(report.contract, options["seeds"], short=options["short"], variants=options["variants"])
@@ -230,47 +214,3 @@ def _run_controls(report: Report, options: dict[str, Any], progress: _Progress) 
         domain_id=options["domain_id"],
         tell=progress.control,
     )
-
-
-class _Progress:
-    """Reports progress on stderr, and keeps each result in case that the run is interrupted."""
-
-    def __init__(self, report: Report, total: int) -> None:
-        self.total = total
-        self._report = report
-        self._done = 0
-        self._compared = 0
-        self._controls = 0
-
-    def mutant(self, result: MutantResult) -> None:
-        """Report a mutant that has been tried."""
-        self._report.mutant_results.append(result)
-        self._done += 1
-        said = result.not_tried or (
-            f"SURVIVED {', '.join(result.missed)}" if result.missed else f"killed by {_few(result)}"
-        )
-        click.echo(f"[{self._done}/{self.total}] {result.mutant.name}: {said} ({result.seconds:.1f} s)", err=True)
-
-    def compared(self, result: SchemathesisResult) -> None:
-        """Report a mutant that Schemathesis has tried."""
-        self._report.compared.append(result)
-        self._compared += 1
-        said = f"killed: {result.findings[0]}" if result.killed else "survived"
-        click.echo(f"[{self._compared}] Schemathesis, {result.mutant}: {said}", err=True)
-
-    def control(self, result: ControlResult) -> None:
-        """Report a good device that has been judged."""
-        self._report.control_results.append(result)
-        self._controls += 1
-        name = f"{result.robot} {result.variant}".strip()
-        said = result.not_tried or (
-            "conformant"
-            if result.conformant
-            else f"FALSE POSITIVE: {result.false_positives or result.unjudged or 'given up'}"
-        )
-        click.echo(f"[{self._controls}/{self.total}] {name}, seed {result.seed}: {said}"[:400], err=True)
-
-
-def _few(result: MutantResult) -> str:
-    rest = len(result.caught) - len(result.mutant.catches)
-    return ", ".join(result.mutant.catches) + (f" and {rest} more" if rest > 0 else "")

@@ -1,4 +1,4 @@
-"""What mutants are made of: which exchanges, and what becomes of them. What is SOAP's alone is in soap_responses."""
+"""What mutants are made of: conditions that choose exchanges, and edits of requests and responses."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def rest(method: str = "", *paths: str) -> Where:
 
 
 def unwanted(where: Where) -> Where:
-    """Those requests whose client wants to be told in something that no robot has."""
+    """Return a condition for those requests that accept only a media type that no device has."""
     return lambda request: where(request) and (request.field("Accept") or "").startswith("image/")
 
 

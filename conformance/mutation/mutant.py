@@ -19,7 +19,7 @@ class Mutant:
         make: makes the change for one run.
         incomplete_request: makes what is done with requests that are never completed, or None.
         probe: whether only a ROS probe can see it.
-        observer: whether only a ROS probe or the robot's list of deliveries can see it.
+        observer: whether only a ROS probe, or a device that shows what reached it, can see it.
         token: bearer token that the robot wants, or empty.
         serial: whether the robot takes the next request only when the one before is complete.
         backwards: whether of two requests that were sent at once on one connection the second is answered first.

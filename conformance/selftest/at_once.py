@@ -1,4 +1,4 @@
-"""Several robots judged at once, each told of as it is done, and Ctrl-C that does not wait for the others."""
+"""Several devices judged at once: each is reported when it is done, and Ctrl-C does not wait for the others."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def each_at_once(
     """
     lock, interrupted = threading.Lock(), threading.Event()
 
-    def told(item: _Item) -> _Result:
+    def reported(item: _Item) -> _Result:
         result = judge(item)
         with lock:
             if not interrupted.is_set():
@@ -38,7 +38,7 @@ def each_at_once(
         return result
 
     with ThreadPoolExecutor(at_once) as executor:
-        judged = [executor.submit(told, item) for item in items]
+        judged = [executor.submit(reported, item) for item in items]
         try:
             return [one.result() for one in judged]
         except BaseException:

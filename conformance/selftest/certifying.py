@@ -93,7 +93,7 @@ class Outcome:
         """Requirements that say fail."""
         return frozenset(id_ for id_, verdict in self.verdicts.items() if verdict == "fail")
 
-    def caught(self) -> tuple[str, ...]:
+    def not_passed(self) -> tuple[str, ...]:
         """Return the requirements that say fail or warn, or that met what another one says it for."""
         return tuple(id_ for id_, verdict in self.verdicts.items() if verdict in {"fail", "warn"} or id_ in self.met)
 
@@ -104,7 +104,7 @@ def job_at(robot: Robot, **more: Any) -> Job:
 
 
 def run_job(job: Job) -> Outcome:
-    """Run a certification and wait for it; a run that takes too long is given up, and has caught nothing."""
+    """Run a certification and wait for it; a run that takes too long is given up, and shows nothing."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOADED)
     os.environ.setdefault(PACK_VARIABLE, str(job.pack))

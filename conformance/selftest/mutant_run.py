@@ -25,17 +25,17 @@ class MutantResult:
 
     Attributes:
         mutant: which.
-        caught: requirements that said fail or warn, of those that must and of others.
-        missed: requirements that must have, and did not.
-        effort: the effort at which all had.
+        killed_by: requirements that said fail or warn, of those that must and of others.
+        survived: requirements that must have, and did not.
+        effort: of the last run.
         not_tried: why it was not tried, or empty.
         seconds: how long it took; runs: how many runs.
-        reasons: what was said of the missed ones.
+        reasons: what those said that it survived.
     """
 
     mutant: Mutant
-    caught: tuple[str, ...] = ()
-    missed: tuple[str, ...] = ()
+    killed_by: tuple[str, ...] = ()
+    survived: tuple[str, ...] = ()
     effort: str = ""
     not_tried: str = ""
     seconds: float = 0.0
@@ -163,14 +163,14 @@ def _try(mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, alr
         become(proxy, mutant)
         more = {"classes": classes, "requirements": requirements, "domain_id": domain_id, "token": mutant.token}
         outcome = run_job(job_for(robot, proxy, chosen, seed, **more))
-        seen.update(dict.fromkeys(outcome.caught()))
+        seen.update(dict.fromkeys(outcome.not_passed()))
         _note(result, outcome, tuple(seen), chosen)
         if proxy.broken:
             # What such a mutant does is not what it says: nothing that it shows counts.
-            result.missed = mutant.catches
+            result.survived = mutant.catches
             result.reasons = dict.fromkeys(mutant.catches, f"the mutant itself is broken: {proxy.broken[0]}")
             break
-        if not result.missed:
+        if not result.survived:
             break
     return result
 
@@ -178,9 +178,10 @@ def _try(mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, alr
 def _note(result: MutantResult, outcome: Outcome, seen: tuple[str, ...], effort: str) -> None:
     result.runs += 1
     result.seconds += outcome.seconds
-    result.caught, result.effort = seen, effort
-    result.missed = tuple(id_ for id_ in result.mutant.catches if id_ not in seen)
+    result.killed_by, result.effort = seen, effort
+    result.survived = tuple(id_ for id_ in result.mutant.catches if id_ not in seen)
     given_up = "the run was given up" if outcome.exit_code < 0 else "pass"
     result.reasons = {
-        id_: f"{outcome.verdicts.get(id_, 'not judged')}: {outcome.reasons.get(id_, given_up)}" for id_ in result.missed
+        id_: f"{outcome.verdicts.get(id_, 'not judged')}: {outcome.reasons.get(id_, given_up)}"
+        for id_ in result.survived
     }

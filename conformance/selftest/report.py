@@ -46,7 +46,7 @@ class Report:
     @property
     def survived(self) -> list[MutantResult]:
         """Mutants that survived a requirement which has to kill them."""
-        return [result for result in self.tried if result.missed]
+        return [result for result in self.tried if result.survived]
 
     @property
     def false_positives(self) -> list[ControlResult]:
@@ -74,8 +74,8 @@ class Report:
                     "says": result.mutant.says,
                     "interface": result.mutant.interface,
                     "must": list(result.mutant.catches),
-                    "caught": list(result.caught),
-                    "missed": list(result.missed),
+                    "caught": list(result.killed_by),
+                    "missed": list(result.survived),
                     "reasons": result.reasons,
                     "effort": result.effort,
                     "not_tried": result.not_tried,
@@ -140,11 +140,11 @@ class Report:
             "|---|---|---|---|---|",
         ]
         for result in self.mutant_results:
-            ours = [id_ for id_ in result.caught if id_ in result.mutant.catches]
-            others = len(result.caught) - len(ours)
+            ours = [id_ for id_ in result.killed_by if id_ in result.mutant.catches]
+            others = len(result.killed_by) - len(ours)
             caught = ", ".join(f"`{id_}`" for id_ in ours) + (f" and {others} more" if others else "")
             known = compared.get(result.mutant.name, "")
-            missed = ", ".join(f"`{id_}`" for id_ in result.missed)
+            missed = ", ".join(f"`{id_}`" for id_ in result.survived)
             cells = (result.mutant.name, result.mutant.says, result.not_tried or caught, missed, known)
             lines.append(f"| {' | '.join(cells)} |")
         return "\n".join(lines) + "\n"
@@ -154,7 +154,7 @@ class Report:
         tried, missed = len(self.tried), len(self.survived)
         lines = []
         if tried:
-            requirements = {id_ for result in self.tried for id_ in result.mutant.catches if id_ not in result.missed}
+            requirements = {id_ for result in self.tried for id_ in result.mutant.catches if id_ not in result.survived}
             lines.append(
                 f"{tried - missed} of {tried} mutants killed ({100 * (tried - missed) / tried:.1f} %), "
                 f"by {len(requirements)} requirements"
@@ -163,7 +163,7 @@ class Report:
         if not_tried:
             lines.append(f"{len(not_tried)} not tried, first {not_tried[0].mutant.name}: {not_tried[0].not_tried}")
         for result in self.survived:
-            said = "; ".join(f"{id_} said {result.reasons.get(id_, 'nothing')[:200]}" for id_ in result.missed)
+            said = "; ".join(f"{id_} said {result.reasons.get(id_, 'nothing')[:200]}" for id_ in result.survived)
             lines.append(f"SURVIVED {result.mutant.name} ({result.mutant.says}) {said}")
         if self.control_results:
             good = [one for one in self.control_results if one.outcome is not None]
@@ -182,7 +182,7 @@ class Report:
             lines.append(by_rule.summary(self.contract, self.generated_results))
         if self.compared:
             theirs = {seen.mutant for seen in self.compared if seen.killed}
-            ours = {result.mutant.name for result in self.tried if not result.missed}
+            ours = {result.mutant.name for result in self.tried if not result.survived}
             ours |= {result.mutant.name for result in self.generated_results if result.outcome == KILLED}
             ours &= {seen.mutant for seen in self.compared}
             lines.append(

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from conformance.contract.pack import Contract
 from conformance.mutation.self_test import GoodDevice, Start, self_test_of
@@ -135,8 +135,15 @@ def _started(command: list[str]) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen(  # noqa: S603
         command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment
     )
-    try:
+    with process, stopped(process):
         yield process
+
+
+@contextlib.contextmanager
+def stopped(process: subprocess.Popen[Any]) -> Iterator[None]:
+    """Stop a process in the end; kill it where it does not stop."""
+    try:
+        yield
     finally:
         process.terminate()
         try:
@@ -144,8 +151,6 @@ def _started(command: list[str]) -> Iterator[subprocess.Popen[str]]:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        if process.stdout is not None:
-            process.stdout.close()
 
 
 def _ready(process: subprocess.Popen[str], name: str) -> tuple[str, str]:

@@ -97,19 +97,19 @@ class _Control:
         """Return the requirements that the good device is known not to pass."""
         return frozenset(id_ for id_, refuted in self._known.get(effort, {}).items() if refuted)
 
-    def without(self, caught: tuple[str, ...], robot: Robot, proxy: Proxy, effort: str) -> tuple[str, ...]:
+    def without(self, ids: tuple[str, ...], robot: Robot, proxy: Proxy, effort: str) -> tuple[str, ...]:
         """Return those of some requirements that the good device passes; it is judged by each once."""
         with self._lock:
             known = self._known.setdefault(effort, {})
-            if new := tuple(id_ for id_ in caught if id_ not in known):
+            if new := tuple(id_ for id_ in ids if id_ not in known):
                 proxy.change = unchanged
                 classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in new))
                 outcome = run_job(job_for(robot, proxy, effort, self._seed, classes=classes, requirements=new))
                 if outcome.exit_code < 0:
                     # Nothing is known of the good device, so nothing is shown of the mutant.
                     return ()
-                known |= {id_: id_ in outcome.caught() for id_ in new}
-        return tuple(id_ for id_ in caught if not known[id_])
+                known |= {id_: id_ in outcome.not_passed() for id_ in new}
+        return tuple(id_ for id_ in ids if not known[id_])
 
 
 def _judge(
@@ -140,7 +140,7 @@ def _judge(
         if proxy.broken:
             result.outcome, result.reason = BROKEN, proxy.broken[0]
             return result
-        if shown := control.without(outcome.caught(), robot, proxy, effort):
+        if shown := control.without(outcome.not_passed(), robot, proxy, effort):
             _note(result, outcome, shown)
             return result
         # The good device does not pass what ended the run, which is known by now: once more, to its end.

@@ -12,10 +12,10 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from conformance.mutation.programs import built, program
-from conformance.selftest.robots import Robot, RobotError
+from conformance.selftest.robots import Robot, RobotError, stopped
 
 _HERE = Path(__file__).parent
-_START_S, _STOP_S = 20.0, 10.0
+_START_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -109,21 +109,15 @@ def behind(front: Front, robot: Robot) -> Iterator[Robot]:
         with log.open("wb") as output:
             # Made above, of a program that was found and a configuration of ours.
             process = subprocess.Popen(front.command(ports, folder), stdout=output, stderr=output)  # noqa: S603
-        try:
+        with stopped(process):
             for port in (ports.rest, ports.soap):
                 _await(port, process, front.name, log)
             publishers, subscribers = (
                 url and urlsplit(url)._replace(netloc=f"127.0.0.1:{ports.soap}").geturl()
                 for url in (robot.publishers, robot.subscribers)
             )
-            yield replace(robot, rest=f"http://127.0.0.1:{ports.rest}", publishers=publishers, subscribers=subscribers)
-        finally:
-            process.terminate()
-            try:
-                process.wait(_STOP_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            rest = f"http://127.0.0.1:{ports.rest}"
+            yield replace(robot, rest=rest, publishers=publishers, subscribers=subscribers)
 
 
 def _two_free_ports() -> tuple[int, int]:

@@ -38,12 +38,12 @@ def test_a_requirement_that_is_not_there_is_an_error():
 
 def test_a_run_that_takes_too_long_is_given_up_and_has_caught_nothing(listening):
     outcome = run_job(job(listening(lambda sock: sock.recv(1) and sock.recv(1)), timeout_s=0.2))
-    assert (outcome.exit_code, outcome.caught()) == (-1, ())
+    assert (outcome.exit_code, outcome.not_passed()) == (-1, ())
 
 
 def test_fail_and_warn_count_as_caught():
     verdicts = {"a": "pass", "b": "fail", "c": "warn", "d": "skip", "e": "error"}
-    assert Outcome(1, verdicts, {}, 1, 1.0).caught() == ("b", "c")
+    assert Outcome(1, verdicts, {}, 1, 1.0).not_passed() == ("b", "c")
 
 
 def test_no_further_check_begins_once_enough_is_known(tmp_path):

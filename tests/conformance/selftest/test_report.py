@@ -20,7 +20,9 @@ def outcome(code, **verdicts):
 def test_a_survivor_and_a_false_positive_are_reported(tmp_path):
     mutant = MUTANTS[0]
     report = Report(
-        CONTRACT, "reference", [MutantResult(mutant, missed=mutant.catches, reasons={mutant.catches[0]: "pass: pass"})]
+        CONTRACT,
+        "reference",
+        [MutantResult(mutant, survived=mutant.catches, reasons={mutant.catches[0]: "pass: pass"})],
     )
     report.control_results = [ControlResult("plain", "", 3, outcome(1, http_date="fail"))]
     assert not report.holds

@@ -1,0 +1,84 @@
+"""The progress of ``roaas selftest``: a line on stderr for each result, which the report keeps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from conformance.mutation.mutant import Mutant
+    from conformance.selftest.comparison import SchemathesisResult
+    from conformance.selftest.controls import ControlResult
+    from conformance.selftest.generated.judging import GeneratedResult
+    from conformance.selftest.mutant_run import MutantResult, RobotPool
+    from conformance.selftest.report import Report
+
+
+class Progress:
+    """Reports progress on stderr, and keeps each result in case that the run is interrupted."""
+
+    def __init__(self, report: Report, total: int) -> None:
+        self.total = total
+        self._report = report
+        self._done = 0
+        self._compared = 0
+        self._controls = 0
+
+    def mutant(self, result: MutantResult) -> None:
+        """Report a mutant that has been tried."""
+        self._report.mutant_results.append(result)
+        self._done += 1
+        said = result.not_tried or (
+            f"SURVIVED {', '.join(result.survived)}" if result.survived else f"killed by {_few(result)}"
+        )
+        click.echo(f"[{self._done}/{self.total}] {result.mutant.name}: {said} ({result.seconds:.1f} s)", err=True)
+
+    def by_rule(self, result: GeneratedResult) -> None:
+        """Report a mutant by rule that has been judged."""
+        self._report.generated_results.append(result)
+        self._done += 1
+        by = f" by {result.by[0]}" if result.by else ""
+        line = f"[{self._done}/{self.total}] {result.mutant.name}: {result.outcome}{by} ({result.seconds:.1f} s)"
+        click.echo(line, err=True)
+
+    def compared(self, result: SchemathesisResult) -> None:
+        """Report a mutant that Schemathesis has tried."""
+        self._report.compared.append(result)
+        self._compared += 1
+        said = f"killed: {result.findings[0]}" if result.killed else "survived"
+        click.echo(f"[{self._compared}] Schemathesis, {result.mutant}: {said}", err=True)
+
+    def control(self, result: ControlResult) -> None:
+        """Report a good device that has been judged."""
+        self._report.control_results.append(result)
+        self._controls += 1
+        name = f"{result.robot} {result.variant}".strip()
+        said = result.not_tried or (
+            "conformant"
+            if result.conformant
+            else f"FALSE POSITIVE: {result.false_positives or result.unjudged or 'given up'}"
+        )
+        click.echo(f"[{self._controls}/{self.total}] {name}, seed {result.seed}: {said}"[:400], err=True)
+
+
+def _few(result: MutantResult) -> str:
+    rest = len(result.killed_by) - len(result.mutant.catches)
+    return ", ".join(result.mutant.catches) + (f" and {rest} more" if rest > 0 else "")
+
+
+def compare(report: Report, pool: RobotPool, mutants: Iterable[Mutant], progress: Progress) -> None:
+    """Let plain Schemathesis try the REST mutants; the report has each as it is done."""
+    from conformance.selftest import comparison  # noqa: PLC0415 - it costs what --help need not pay
+
+    if comparison.command() is None:
+        report.notes.append("Schemathesis' command line is not installed, so that nothing was compared with it.")
+        return
+    good, report.compared = comparison.compare(pool, mutants, tell=progress.compared)
+    report.good = tuple(sorted(f"{operation} {code}" for operation, code in good))
+    report.notes.append(
+        f"Schemathesis ran with --max-examples {comparison.EXAMPLES}, phases examples, coverage, fuzzing, and at most "
+        f"{comparison.LIMIT_S:g} s for each mutant; findings that it has of the good device as well do not count."
+    )
