@@ -14,6 +14,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.observe.polling import poll
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import await_goal, goal_body
+from conformance.packs.table1.robot.letting_go import certain_s
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.transport.exchange import Exchange
@@ -25,8 +26,6 @@ PutGoal = Callable[[dict[str, Any]], Exchange]
 Act = Callable[[], bool | None]
 # So many readings at rest, each of another sample of the odometry, are no chance.
 _READINGS: Final = 3
-# How long a velocity is counted on to hold where the statement does not say, s.
-_COUNTED_ON_S: Final = 0.5
 _STEP_S: Final = 0.02
 # Of the settle time: from then on a velocity is there.
 _SETTLED: Final = 1.1
@@ -88,7 +87,7 @@ def _beside(api: RestInterface, act: Act, usual: Act) -> bool | None:
 def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
     """PUT a velocity over and over; whether the robot is seen to move, or not though it has had the time to."""
     limits = robot.limits
-    hold_s = _COUNTED_ON_S if limits.hold_s is None else 0.9 * limits.hold_s - _STEP_S
+    hold_s = certain_s(limits.hold_s)
     since = last_sent = math.inf  # from when on it holds without a gap; when it was put last
     counted = -math.inf
     at_rest = 0
