@@ -4,7 +4,6 @@ Whether each has arrived is seen as soon as all have; that none comes twice is s
 watched for a while, so that the batches need no pause between them.
 """
 
-import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import Final
 
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.xml_style import value_styles
+from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.delivery import COFFEE
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, Seen
 from conformance.packs.table1.robot.delivery import Delivery, path_of
@@ -88,7 +88,7 @@ class Batch:
         # However its XML is written, a message has the same values; one that is refused for it is for others to judge.
         self._styles = cycle(value_styles())
         # When the last batch had been collected, s of the monotonic clock.
-        self._collected = time.monotonic()
+        self._collected = WALL_CLOCK.now()
         observer.mark()
 
     def run(self, orders: Sequence[Order]) -> bool:
@@ -120,7 +120,7 @@ class Batch:
 
     def finish(self, watched_s: float) -> None:
         """Judge what arrived later than it should, in so many seconds since the last batch, which may have passed."""
-        left_s = self._collected + watched_s - time.monotonic()
+        left_s = self._collected + watched_s - WALL_CLOCK.now()
         self._judge_only([], self._observer.collect(0, max(0.0, left_s)))
 
     def look_again(self) -> None:
@@ -142,7 +142,7 @@ class Batch:
         seen = self._observer.collect(len(sent), 0.0)
         if sorted(self._key(one.delivery) for one in seen) != sorted(self._key(one.delivery) for one in sent):
             seen += self._observer.collect(0)
-        self._collected = time.monotonic()
+        self._collected = WALL_CLOCK.now()
         return seen
 
     def _send(self, order: Order) -> list[_Sent]:

@@ -1,11 +1,11 @@
 """Who sees what became of a delivery: a ROS probe beside the robot, or the robot's own list."""
 
-import time
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
 from conformance.api.rest.interface import RestInterface
-from conformance.observe.polling import Patience
+from conformance.observe.clock import WALL_CLOCK, Clock
+from conformance.observe.polling import Patience, poll, poll_for
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.message_shapes import read_as
@@ -62,13 +62,13 @@ class ListObserver:
     Args:
         rest: where it is.
         slow_s: how long the robot usually takes.
+        clock: by which it is read.
     """
 
     exact = False
 
-    def __init__(self, rest: HttpClient, slow_s: float) -> None:
-        self._rest = rest
-        self._slow_s = slow_s
+    def __init__(self, rest: HttpClient, slow_s: float, clock: Clock = WALL_CLOCK) -> None:
+        self._rest, self._slow_s, self._clock = rest, slow_s, clock
         self._before: list[Any] = []
 
     def mark(self) -> None:
@@ -77,13 +77,13 @@ class ListObserver:
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
         """See DeliveryObserver."""
-        patience = Patience(self._rest.connection.pace, _ARRIVES_S + 4 * self._slow_s)
-        listed = self._listed()
-        while len(self._new(listed)) < count and not patience.over:
-            time.sleep(_STEP_S)
+        patience = Patience(self._rest.connection.pace, _ARRIVES_S + 4 * self._slow_s, self._clock)
+        for _ in poll(self._clock, _STEP_S, lambda: patience.over):
             listed = self._listed()
+            if len(self._new(listed)) >= count:
+                break
         if then_s:
-            time.sleep(then_s)
+            self._clock.sleep(then_s)
             listed = self._listed()
         new = self._new(listed)
         self._before = listed
@@ -118,34 +118,34 @@ class ProbeObserver:
     Args:
         probe: its process.
         connection: tells when anything was asked for that might be a delivery.
+        clock: by which the node is read.
     """
 
     exact = True
 
-    def __init__(self, probe: Probe, connection: Connection) -> None:
-        self._probe = probe
-        self._connection = connection
+    def __init__(self, probe: Probe, connection: Connection, clock: Clock = WALL_CLOCK) -> None:
+        self._probe, self._connection, self._clock = probe, connection, clock
 
     def mark(self) -> None:
         """See DeliveryObserver."""
         # What was asked for since somebody collected may still be on its way.
         if self._connection.acted_at > self._probe.heard_at:
-            time.sleep(max(0.0, self._connection.acted_at + QUIET_S - time.monotonic()))
-            self._probe.heard_at = time.monotonic()
+            self._clock.sleep(self._connection.acted_at + QUIET_S - self._clock.now())
+            self._probe.heard_at = self._clock.now()
         self._probe.deliveries()
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
         """See DeliveryObserver."""
-        until = time.monotonic() + _ARRIVES_S
-        seen = self._probe.deliveries()
-        while len(seen) < count and time.monotonic() < until:
-            time.sleep(_STEP_S)
+        seen: list[Delivery] = []
+        for _ in poll_for(self._clock, _STEP_S, _ARRIVES_S):
             seen += self._probe.deliveries()
+            if len(seen) >= count:
+                break
         if then_s:
-            time.sleep(then_s)
+            self._clock.sleep(then_s)
             seen += self._probe.deliveries()
         if then_s >= QUIET_S:
-            self._probe.heard_at = time.monotonic()
+            self._probe.heard_at = self._clock.now()
         return [Seen(delivery) for delivery in seen]
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 from conformance.packs.table1.robot import drive_rules, windows
 from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Sighting, Trace, Turn
+from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, certain_s
 from conformance.packs.table1.robot.robot import STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.windows import SEVERAL
 from conformance.scenarios.scenario import NotPossibleError
@@ -14,8 +15,6 @@ from conformance.transport.exchange import Exchange
 
 # A turn of readings is not begun more often than this, s: the robot's odometry has tens of hertz.
 _PACE_S: Final = 0.02
-# How long a velocity is counted on to hold where the statement does not say, s.
-_COUNTED_ON_S: Final = 0.5
 # A velocity of which too few samples are seen is looked at for so much longer, s.
 _LONGER_S: Final = 1.0
 # So many requests are a look.
@@ -88,8 +87,7 @@ class Drive:
     @property
     def holds_until(self) -> float:
         """Until when the last command of all components certainly holds, s of the monotonic clock."""
-        hold_s = self.robot.limits.hold_s
-        return self.trace.full_sent + (_COUNTED_ON_S if hold_s is None else certain_s(hold_s))
+        return self.trace.full_sent + certain_s(self.robot.limits.hold_s)
 
     @property
     def look_s(self) -> float:
@@ -154,7 +152,7 @@ class Drive:
         count = SEVERAL if ids else 1
         lapses = 0
         # A velocity may end before it is reached, where it does not hold for as long as the robot takes to settle.
-        every = _COUNTED_ON_S if limits.hold_s is None else _renewed_s(limits.hold_s, limits.settle_s)
+        every = COUNTED_ON_S if limits.hold_s is None else _renewed_s(limits.hold_s, limits.settle_s)
         renews = limits.hold_s is None or limits.hold_s < patience
         while True:
             asked = self.clock.now()
@@ -241,8 +239,3 @@ def _renewed_s(hold_s: float, settle_s: float) -> float:
     Not before the robot has had its time, where the velocity lasts for that long and a while more.
     """
     return max(0.6 * hold_s, settle_s + _PACE_S) if settle_s + _PACE_S < 0.75 * hold_s else 0.6 * hold_s
-
-
-def certain_s(hold_s: float) -> float:
-    """How long a velocity that holds for so long is certainly there after its command was sent, s."""
-    return 0.9 * hold_s - 0.02

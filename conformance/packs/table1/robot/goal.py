@@ -1,11 +1,11 @@
 """Goals as they are put, and as they have to come back."""
 
 import math
-import time
 from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.documents.json_text import shown
+from conformance.observe.polling import poll
 from conformance.packs.table1.robot.geometry import Pose, quaternion_of
 from conformance.packs.table1.robot.message_shapes import STATUS
 from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
@@ -79,29 +79,29 @@ def status_fault(goal: Any) -> str:
     return "" if code in ACTIVE else f"status.code {code:g}"
 
 
-def await_goal(robot: Robot, put: dict[str, Any]) -> tuple[Any, str, Exchange]:
-    """Read the active goal until it is the one put, for as long as commands may take.
+def await_goal(robot: Robot, *put: dict[str, Any]) -> tuple[Any, str, Exchange]:
+    """Read the active goal until it is the one that was put, or one of several, for as long as commands may take.
 
     Returns:
-        The goal (None where none is shown), in what it differs, and the evidence.
+        The goal (None: the robot shows no goal), in what it differs, and the evidence.
     """
     patience = robot.patience(robot.settle_s)
-    while True:
+    for _ in poll(robot.clock, _STEP_S, lambda: patience.over):
         goal, exchange = robot.goal()
-        problem = exchange.came if goal is None else difference(goal, put)
-        if not problem or patience.over:
-            return goal, problem, exchange
-        time.sleep(_STEP_S)
+        problem = exchange.came if goal is None else min((difference(goal, one) for one in put), key=len)
+        if not problem:
+            break
+    return goal, problem, exchange
 
 
 def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
-    """Read the active goal until there is none, for as long as commands may take, or for so long."""
+    """Read the active goal until there is none, for as long as commands may take, or for so many seconds."""
     patience = robot.patience(robot.settle_s if seconds is None else seconds)
-    while True:
+    for _ in poll(robot.clock, _STEP_S, lambda: patience.over):
         exchange = robot.get(GOAL_PATH)
-        if exchange.response.status == HTTPStatus.NOT_FOUND or patience.over:
-            return exchange
-        time.sleep(_STEP_S)
+        if exchange.response.status == HTTPStatus.NOT_FOUND:
+            break
+    return exchange
 
 
 def arrived(robot: Robot, pose: Pose) -> bool:

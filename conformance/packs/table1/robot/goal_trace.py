@@ -123,3 +123,48 @@ class GoalReached:
     turned: Trace | None = None
     start: Start | None = None
     again: Exchange | None = None
+
+
+@dataclass(frozen=True)
+class SpecialGoal:
+    """A goal that was put because of one thing that is special about it.
+
+    Attributes:
+        special: that thing, as a noun phrase: "a quaternion of length 2".
+        exchange: of the PUT.
+    """
+
+    special: str
+    exchange: Exchange
+
+
+@dataclass(frozen=True)
+class FarGoal:
+    """A goal outside every map that was put.
+
+    Attributes:
+        exchange: of the PUT.
+        read: of the last GET of the goal; None: the goal was not accepted, so it was not read.
+        waited_s: how long the robot had to end the goal, s.
+    """
+
+    exchange: Exchange
+    read: Exchange | None
+    waited_s: float
+
+
+@dataclass(frozen=True)
+class RefusedGoals:
+    """Goals that a robot has to refuse, and two that only nearly have to be refused.
+
+    Attributes:
+        not_unit: goals with a quaternion whose length is not 1.
+        unit: goals with a quaternion whose length is 1 within the tolerance.
+        unknown_frames: goals in frames that the robot does not know.
+        far: goals outside every map.
+    """
+
+    not_unit: tuple[SpecialGoal, ...] = ()
+    unit: tuple[SpecialGoal, ...] = ()
+    unknown_frames: tuple[SpecialGoal, ...] = ()
+    far: tuple[FarGoal, ...] = ()

@@ -18,12 +18,21 @@ _OFF: Final = 1.5
 _LOOKED_AT: Final = 60
 # For so long a velocity holds at least, s.
 _AT_LEAST_S: Final = 0.1
+# How long a velocity is counted on to hold where no hold time is declared, s.
+COUNTED_ON_S: Final = 0.5
+# Of the hold time: for so long what holds is judged. Whoever still has to send something counts on less.
+JUDGED: Final = 0.95
+_COUNTED_ON: Final = 0.9
+_LATE_S: Final = 0.02
 # Readings that are farther apart than this share of the hold time say nothing of it.
 _GAP: Final = 0.25
-
-
 # Where no hold time is declared a velocity has to end within so long, s.
 _ENDS_S: Final = 10.0
+
+
+def certain_s(hold_s: float | None, share: float = _COUNTED_ON) -> float:
+    """Return how long after its command was sent a velocity certainly still holds, s; ``share``: of the hold time."""
+    return COUNTED_ON_S if hold_s is None else share * hold_s - _LATE_S
 
 
 def ends_by(limits: Limits, settle_s: float) -> float:
@@ -59,7 +68,7 @@ class LetGo:
 
     def was_held(self, limits: Limits) -> bool:
         """Whether the velocity was seen in its time: who answers too late to be looked at has not shown it."""
-        certain = self.full + 0.95 * (limits.hold_s or 0.0) - 0.02
+        certain = self.full + certain_s(limits.hold_s or 0.0, JUDGED)
         in_time = sum(turn.at <= certain for turn in self.turns)
         return any(self.holds_by(limits, count) for count in range(1, in_time + 1))
 
@@ -72,7 +81,8 @@ class LetGo:
 
         Without a declared hold time that is a moment: what was reached before does not end by being asked for again.
         """
-        certain = self.answered + _AT_LEAST_S if limits.hold_s is None else self.full + 0.95 * limits.hold_s - 0.02
+        hold_s = limits.hold_s
+        certain = self.answered + _AT_LEAST_S if hold_s is None else self.full + certain_s(hold_s, JUDGED)
         for count, turn in enumerate(self.turns, 1):
             if turn.at + turn.velocity_exchange.response.elapsed_ms / 1000 > certain:
                 return None

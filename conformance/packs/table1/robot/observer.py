@@ -4,7 +4,6 @@ A fault that shows once in fifty answers is seen by reading often; all reading t
 """
 
 import math
-import time
 from collections import deque
 from http import HTTPStatus
 from statistics import median
@@ -12,6 +11,7 @@ from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_schema import Shape
+from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.geometry import length_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
@@ -43,7 +43,7 @@ class _Samples:
 
     def add(self, twist: Any, stamp: tuple[int, int] | None) -> None:
         """Take a reading; ``stamp`` is that of the odometry read last, by any resource."""
-        now = time.monotonic()
+        now = WALL_CLOCK.now()
         if self._newest and stamp == self._stamp and now - self._begun < LONGEST_SAMPLE_S:
             self._newest[-1] = twist
             return
@@ -109,7 +109,7 @@ class Observer(Listener):
     def _single(self, path: str, value: Any, exchange: Exchange) -> None:
         """Compare single readings that came one after another: of several clients' answers, some may have crossed."""
         judge, limits = self._api.run.judge, said_of(self._api.run).limits
-        received = exchange.response.received_s or time.monotonic()
+        received = _received_s(exchange)
         if received - exchange.response.elapsed_ms / 1000 < self._read_until:
             self._sample, self._beside = OneSample(judge, limits), BesideOdometry(judge, limits, self._beside.out)
         self._read_until = max(self._read_until, received)
@@ -153,7 +153,7 @@ class Observer(Listener):
             found=f"length {length:.6g}",
         )
         # Of several clients' answers one is told after another, when all have come.
-        now = exchange.response.received_s or time.monotonic()
+        now = _received_s(exchange)
         sent = now - elapsed_ms / 1000
         stamp = (int(odometry["header"]["stamp"]["sec"]), int(odometry["header"]["stamp"]["nanosec"]))
         # Two answers that crossed on their way say nothing of order.
@@ -202,3 +202,8 @@ class Observer(Listener):
                 f"a measured {part} speed within the limit of {limit:g}",
                 found=f"{fastest:.4g}",
             )
+
+
+def _received_s(exchange: Exchange) -> float:
+    """Return when a response was received, s of the monotonic clock."""
+    return exchange.response.received_s or WALL_CLOCK.now()

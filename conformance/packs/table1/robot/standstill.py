@@ -7,12 +7,13 @@ follows. Only where the robot does move is each thing tried again by itself, wit
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from http import HTTPStatus
 
 from conformance.api.rest.interface import RestInterface
+from conformance.observe.clock import WALL_CLOCK, Clock
+from conformance.observe.polling import poll
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot
 from conformance.packs.table1.robot.stopping import bring_to_rest
@@ -46,10 +47,11 @@ class Standstill:
 
     Args:
         api: its REST interface.
+        clock: by which it is watched.
     """
 
-    def __init__(self, api: RestInterface) -> None:
-        self._api = api
+    def __init__(self, api: RestInterface, clock: Clock = WALL_CLOCK) -> None:
+        self._api, self._clock = api, clock
         self._tried: list[Tried] = []
         # What moved while something else was read.
         self._moved: _Seen | None = None
@@ -58,7 +60,7 @@ class Standstill:
         self, requirement: str, expected: str, again: Callable[[], None], *, seconds: float, goal: bool = False
     ) -> None:
         """Take down that something was tried just now; see Tried. It shows within so many ``seconds`` if at all."""
-        self._tried.append(Tried(requirement, expected, time.monotonic() + seconds, goal, again))
+        self._tried.append(Tried(requirement, expected, self._clock.now() + seconds, goal, again))
 
     @property
     def lasts(self) -> bool:
@@ -68,14 +70,14 @@ class Standstill:
         """
         if not self._tried:
             return False
-        robot = Robot(self._api)
+        robot = Robot(self._api, self._clock)
         none = robot.get(GOAL_PATH).response.status == HTTPStatus.NOT_FOUND
         return none and _stays(Drive(robot)) is not False
 
     def look(self) -> None:
         """Look once, where something was tried that might still show: for whoever has the robot to read meanwhile."""
-        if self._moved is None and self._tried and time.monotonic() < self._until:
-            self._moved = self._look(Drive(Robot(self._api)))
+        if self._moved is None and self._tried and self._clock.now() < self._until:
+            self._moved = self._look(Drive(Robot(self._api, self._clock)))
 
     def judge(self) -> None:
         """Watch until the last of what was tried would have shown, and judge all of it."""
@@ -104,15 +106,12 @@ class Standstill:
         return max(one.until for one in self._tried)
 
     def _watch(self) -> _Seen:
-        drive = Drive(Robot(self._api))
-        while True:
-            # The last look begins when all would have shown, however long the one before it took.
-            last = time.monotonic() > self._until
+        drive = Drive(Robot(self._api, self._clock))
+        for _ in poll(self._clock, 0.0, lambda: self._clock.now() > self._until):
             moved = self._look(drive)
             if moved is not None:
                 return moved
-            if last:
-                return _Seen(drive.trace.turns[-1].velocity_exchange, "")
+        return _Seen(drive.trace.turns[-1].velocity_exchange, "")
 
     def _look(self, drive: Drive) -> _Seen | None:
         """What moves, or is about to; None where nothing does."""

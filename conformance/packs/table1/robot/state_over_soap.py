@@ -1,6 +1,5 @@
 """A state of the robot as SOAP tells it, between two readings of the same over REST."""
 
-import time
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -40,10 +39,10 @@ def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float
     """
     path, operation, shape = STATES[name]
     before, _ = robot.read(path, shape)
-    time.sleep(apart_s)
+    robot.clock.sleep(apart_s)
     exchange = ask(subscribers, operation)
     between, problem = answered(exchange, shape)
-    time.sleep(apart_s)
+    robot.clock.sleep(apart_s)
     after, _ = robot.read(path, shape)
     if before is None or after is None:
         return None, exchange

@@ -1,14 +1,14 @@
 """Bringing a robot to rest: before a check that needs it there, and at the end of every run."""
 
 import math
-import time
 from dataclasses import replace
 from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_text import read_json
-from conformance.observe.polling import Patience
+from conformance.observe.clock import WALL_CLOCK
+from conformance.observe.polling import Patience, poll
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, GOAL_PATH, JSON_BODY, POSE, STILL, VELOCITY, Velocity
 from conformance.packs.table1.statement import said_of
@@ -21,6 +21,8 @@ _CANCEL_S: Final = 3.0
 # Beyond the settle time, which a loaded machine and a far network may stretch, s.
 _GRACE_S: Final = 1.5
 _STEP_S: Final = 0.02
+# Between two readings that both have to show rest, s.
+_AGAIN_S: Final = 0.002
 # At the end of a run a robot that does not answer must not keep the user waiting, s.
 _LAST_TIMEOUT_S: Final = 0.7
 _LAST_S: Final = 3.0
@@ -113,31 +115,30 @@ class _Stiller:
         return Patience(self._client.connection.pace, seconds)
 
     def _no_goal_left(self, patience: Patience) -> bool:
-        while True:
+        for _ in poll(WALL_CLOCK, 0.0, lambda: patience.over):
             cancelled = self._ask("DELETE", GOAL_PATH)
             current = self._ask("GET", GOAL_PATH, ACCEPT_JSON)
             # Anything but a goal that can be read: there is none, or no such resource, or no telling. Whether the robot
             # moves is seen by its velocity.
             if current is None or not current.response.ok or not _shows(current.response):
                 return True
-            if patience.over:
-                return False
             if cancelled is None or not cancelled.response.ok:
-                time.sleep(_STEP_S)
+                WALL_CLOCK.sleep(_STEP_S)
+        return False
 
     def _wait(self, patience: Patience) -> str:
-        calm = 0
-        while True:
+        rested = False
+        for _ in poll(WALL_CLOCK, _AGAIN_S, lambda: patience.over):
             velocity, problem = self._velocity()
             if problem:
                 return problem
             rests = all(abs(one) <= most for one, most in zip(velocity, self._slowest, strict=True))
-            calm = calm + 1 if rests else 0
-            if calm > 1:
+            if rests and rested:
                 return ""
-            if patience.over:
-                return f"it still moves: {velocity}"
-            time.sleep(_STEP_S if calm == 0 else 0.002)
+            if not rests:
+                WALL_CLOCK.sleep(_STEP_S)
+            rested = rests
+        return f"it still moves: {velocity}"
 
     def _velocity(self) -> tuple[Velocity, str]:
         """The measured velocity, and why it cannot be told."""

@@ -7,13 +7,14 @@ velocity may have ended by itself.
 """
 
 import math
-import time
 from collections.abc import Callable
 from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
+from conformance.observe.polling import poll
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import await_goal, goal_body
+from conformance.packs.table1.robot.letting_go import certain_s
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.transport.exchange import Exchange
@@ -25,8 +26,6 @@ PutGoal = Callable[[dict[str, Any]], Exchange]
 Act = Callable[[], bool | None]
 # So many readings at rest, each of another sample of the odometry, are no chance.
 _READINGS: Final = 3
-# How long a velocity is counted on to hold where the statement does not say, s.
-_COUNTED_ON_S: Final = 0.5
 _STEP_S: Final = 0.02
 # Of the settle time: from then on a velocity is there.
 _SETTLED: Final = 1.1
@@ -88,31 +87,30 @@ def _beside(api: RestInterface, act: Act, usual: Act) -> bool | None:
 def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
     """PUT a velocity over and over; whether the robot is seen to move, or not though it has had the time to."""
     limits = robot.limits
-    hold_s = _COUNTED_ON_S if limits.hold_s is None else 0.9 * limits.hold_s - _STEP_S
+    hold_s = certain_s(limits.hold_s)
     since = last_sent = math.inf  # from when on it holds without a gap; when it was put last
     counted = -math.inf
     at_rest = 0
     patience = robot.patience(2 * robot.settle_s + (_READINGS + 1) * (robot.sample_s + 4 * robot.usual_s))
-    while not patience.over:
-        sent = time.monotonic()
+    for _ in poll(robot.clock, _STEP_S, lambda: patience.over):
+        sent = robot.clock.now()
         if not put().response.ok:
             return None
-        answered = time.monotonic()
+        answered = robot.clock.now()
         if answered > last_sent + hold_s or since == math.inf:
             since, at_rest = answered, 0  # it may have ended meanwhile, and has to be reached anew
         last_sent = sent
-        asked = time.monotonic()
+        asked = robot.clock.now()
         velocity, _ = robot.velocity()
         if velocity is None:
             return None  # which the observers have judged
         if robot.near(velocity, wanted) or not robot.near(velocity, STILL, 2):
             return True
         settled = since + _SETTLED * limits.settle_s + robot.sample_s
-        if asked > max(settled, counted + robot.sample_s) and time.monotonic() < sent + hold_s:
+        if asked > max(settled, counted + robot.sample_s) and robot.clock.now() < sent + hold_s:
             counted, at_rest = asked, at_rest + 1
             if at_rest == _READINGS:
                 return False
-        time.sleep(_STEP_S)
     return None
 
 

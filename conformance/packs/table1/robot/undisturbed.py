@@ -6,8 +6,9 @@ import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from conformance.packs.table1.robot.drive import Drive, certain_s
+from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART
+from conformance.packs.table1.robot.letting_go import certain_s
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 
 if TYPE_CHECKING:

@@ -5,7 +5,6 @@ the first reading counts. A good robot's may be out as well, by one odometry mes
 other has not yet: then everything is done again, and only what is out after each change is judged.
 """
 
-import time
 from functools import partial
 from typing import Final
 
@@ -64,7 +63,7 @@ def _first_readings(
     drive.reach(wanted)
     # The first time as soon as may be; then when both interfaces must have heard of it.
     pause_s = drive.robot.sample_s if change else 0.0
-    time.sleep(pause_s)
+    drive.clock.sleep(pause_s)
     left = dict(suspects)
     for name, moves in suspects:
         if moves == (wanted != STILL):

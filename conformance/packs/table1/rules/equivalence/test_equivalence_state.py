@@ -1,6 +1,5 @@
 """One state, read over REST and over SOAP."""
 
-import time
 from typing import Final
 
 import pytest
@@ -8,6 +7,7 @@ import pytest
 from conformance.api.soap.service import SoapService
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element, projected
+from conformance.observe.polling import poll
 from conformance.packs.table1.robot.agreement import Slack, disagreement, entries_of, unstamped
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal
@@ -165,7 +165,7 @@ def test_goal(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effo
         await_goal(robot, body)
         if len(late) == index - 1:
             # Where SOAP's first answer was out each time so far, it gets the time that commands may take.
-            time.sleep(robot.settle_s if late else 0.0)
+            robot.clock.sleep(robot.settle_s if late else 0.0)
             problem, exchange = _goal_difference(robot, subscribers)
             late += [(problem, exchange)] if problem else []
         for _ in range(3):
@@ -182,11 +182,10 @@ def test_goal(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effo
 def _compare_goals(robot: Robot, subscribers: SoapService, judge: Judge) -> None:
     """Compare the goals that both interfaces show; the two may learn of a change one after the other."""
     patience = robot.patience(robot.settle_s)
-    while True:
+    for _ in poll(robot.clock, 0.05, lambda: patience.over):
         problem, exchange = _goal_difference(robot, subscribers)
-        if not problem or patience.over:
+        if not problem:
             break
-        time.sleep(0.05)
     if problem is not None:
         judge.check(
             "equivalence/goal", not problem, exchange, "the goal that REST gives", found=problem, cause=problem[:20]

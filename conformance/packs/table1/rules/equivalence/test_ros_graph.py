@@ -1,10 +1,10 @@
 """What only a look at the robot's ROS graph shows."""
 
-import time
 from typing import Final
 
 import pytest
 
+from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.probe.client import Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import SENSORS, STILL, Robot, Velocity
@@ -40,14 +40,14 @@ def test_sensors_are_on_the_graph(robot: Robot, seeing: Probe, judge: Judge) -> 
         pytest.skip("the robot's list of sensors cannot be read")
     listed = {("/" + entry["topic"].lstrip("/"), entry["type"]) for entry in entries}
     there: set[tuple[str, str]] = set()
-    until = time.monotonic() + _DISCOVERED_S
-    while not listed <= there and time.monotonic() < until:
+    for _ in poll_for(robot.clock, 0.05, _DISCOVERED_S):
+        if listed <= there:
+            break
         try:
             topics = seeing.topics()
         except ProbeError as error:
             pytest.skip(str(error))
         there = {(name, type_) for name, types in topics.items() for type_ in types}
-        time.sleep(0.05)
     kinds = {type_ for _, type_ in listed}
     unlisted = {pair for pair in there if pair[1] in _SENSOR_TYPES - kinds}
     for missing, found in ((listed - there, "not on the graph"), (unlisted, "not in the list")):
@@ -83,17 +83,17 @@ def _judge_one(robot: Robot, seeing: Probe, judge: Judge, wanted: Velocity) -> b
     exchange = robot.put_velocity(wanted)
     if not exchange.response.ok:
         return True
-    until = time.monotonic() + max(_ARRIVES_S, robot.settle_s)
     every_s = 0.4 * (robot.limits.hold_s or _ARRIVES_S)
-    renew_at = time.monotonic() + every_s
+    renew_at = robot.clock.now() + every_s
     seen: list[Velocity] = []
-    while not any(robot.near(one, wanted) for one in seen) and time.monotonic() < until:
+    for _ in poll_for(robot.clock, 0.005, max(_ARRIVES_S, robot.settle_s)):
         seen += seeing.velocities()
+        if any(robot.near(one, wanted) for one in seen):
+            break
         # What is smoothed on its way may end before it has come all the way.
-        if time.monotonic() > renew_at:
+        if robot.clock.now() > renew_at:
             robot.put_velocity(wanted)
-            renew_at = time.monotonic() + every_s
-        time.sleep(0.005)
+            renew_at = robot.clock.now() + every_s
     return judge.check(
         "equivalence/velocity-message",
         any(robot.near(one, wanted) for one in seen),

@@ -5,7 +5,6 @@ change may be what it tells first afterwards: so after each change the first rea
 each of several changes is judged. One may be out because a sample of the odometry came in between.
 """
 
-import time
 from collections.abc import Iterator
 from functools import partial
 from typing import Final
@@ -55,7 +54,7 @@ def test_formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> 
         for wanted in (moving, STILL):
             drive.command(wanted)
             drive.reach(wanted)
-            time.sleep(robot.sample_s if change else 0.0)
+            robot.clock.sleep(robot.sample_s if change else 0.0)
             for call in calls:
                 key = (call.operation.id, wanted == STILL)
                 drive.command(wanted)
@@ -87,7 +86,7 @@ def test_formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> N
             put_goal(robot, body)
             await_goal(robot, body)
             # Where the goal before was out, this one gets the time that commands may take.
-            time.sleep(robot.settle_s if number > 1 else 0.0)
+            robot.clock.sleep(robot.settle_s if number > 1 else 0.0)
             yield call
 
     _judge_first(api, put())

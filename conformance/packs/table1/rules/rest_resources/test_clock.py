@@ -1,9 +1,8 @@
 """The robot's clock, by all that was read of its odometry in the run."""
 
-import time
-
 import pytest
 
+from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.clock import SPAN_S, Clock
 from conformance.packs.table1.robot.robot import POSE, Robot
 from conformance.verdict.evidence import Judge
@@ -16,11 +15,10 @@ _STEP_S = 0.1
 @pytest.mark.requirement("rest-resources/pose-clock")
 def test_clock(robot: Robot, judge: Judge, clock: Clock) -> None:
     """The stamps advance as the time on the wall does."""
-    until = time.monotonic() + SPAN_S + 1
-    robot.odometry()  # which is kept when the last reading is a while ago
-    while clock.rate is None and time.monotonic() < until:
-        time.sleep(_STEP_S)
-        robot.odometry()
+    for _ in poll_for(robot.clock, _STEP_S, SPAN_S + 1):
+        robot.odometry()  # which is kept when the last reading is a while ago
+        if clock.rate is not None:
+            break
     rate, scale = clock.rate, robot.limits.time_scale
     if rate is None:
         judge.skip("rest-resources/pose-clock", f"no odometry could be read for {SPAN_S:g} s")

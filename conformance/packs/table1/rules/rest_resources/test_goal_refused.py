@@ -1,74 +1,46 @@
-"""Goals that a robot cannot take."""
+"""Goals that a robot has to refuse, and two that it has to accept."""
 
-from typing import Final
+from collections.abc import Iterator
 
-import pytest
-
-from conformance.packs.table1.robot.geometry import Pose
-from conformance.packs.table1.robot.goal import NEW, await_none, goal_body, put_goal
-from conformance.packs.table1.robot.goals import choose_goals
-from conformance.packs.table1.robot.robot import Robot
-from conformance.verdict.evidence import Judge
-
-pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
-# A robot may look for a way before it gives up, s.
-_GIVES_UP_S: Final = 10.0
-_FAR: Final = (Pose(1e6, 1e6, 0.0), Pose(-1e6, 0.0, 1.0), Pose(1e300, -1e300, 0.0))
-_LENGTHS: Final = (0.0, 0.5, 0.99, 0.9975, 1.0025, 1.005, 1.009, 1.01, 2.0, 1e200)
-_TAKEN: Final = (0.9991, 1.0009)
-_FRAMES: Final = ("no_such_frame", "map2")
+from conformance.packs.table1.robot.goal import NEW
+from conformance.packs.table1.robot.goal_trace import RefusedGoals, SpecialGoal
+from conformance.packs.table1.scenarios.refused_goals import refused_goals
+from conformance.scenarios.rule import Case, Outcome, rule
 
 
-@pytest.mark.requirement(
-    "rest-resources/goal-unreachable",
-    "rest-resources/goal-frame",
-    "rest-resources/goal-quaternion",
-    "rest-resources/goal-quaternion-taken",
-)
-def test_goals_that_cannot_be_taken(robot: Robot, judge: Judge) -> None:
-    """Outside the map, in an unknown frame, with an orientation that is none."""
-    frame = robot.statement.motion.frame
-    (near,) = choose_goals(robot, 1.0, 1)
-    for length in _LENGTHS:
-        _refused(robot, judge, "goal-quaternion", goal_body(near, frame, length=length), f"a quaternion of {length:g}")
-    for length in _TAKEN:
-        exchange = put_goal(robot, goal_body(near, frame, length=length))
-        judge.check(
-            "rest-resources/goal-quaternion-taken",
-            exchange.response.status in NEW,
-            exchange,
-            f"201 or 202 for a goal with a quaternion of {length:g}",
-            cause=exchange.came,
-        )
-    robot.delete_goal()
-    await_none(robot)
-    for unknown in _FRAMES:
-        if unknown != frame:
-            _refused(robot, judge, "goal-frame", goal_body(near, unknown), f"the frame {unknown!r}")
-    for pose in _FAR:
-        exchange = put_goal(robot, goal_body(pose, frame))
-        status = exchange.response.status
-        none = exchange
-        if status in {200, 201, 202, 204}:
-            none = await_none(robot, _GIVES_UP_S)
-        ended = none.response.status == 404
-        judge.check(
-            "rest-resources/goal-unreachable",
-            400 <= status < 500 or ended,
-            exchange,
+def _refused(put: SpecialGoal) -> Case:
+    holds = 400 <= put.exchange.response.status < 500
+    return Case(holds, put.exchange, f"4xx for a goal with {put.special}", cause=put.exchange.came)
+
+
+@rule("rest-resources/goal-quaternion", on=(refused_goals,))
+def goal_quaternion(trace: RefusedGoals) -> Iterator[Outcome]:
+    """Judge that goals with a quaternion of another length than 1 are refused."""
+    return map(_refused, trace.not_unit)
+
+
+@rule("rest-resources/goal-quaternion-taken", on=(refused_goals,))
+def goal_quaternion_taken(trace: RefusedGoals) -> Iterator[Outcome]:
+    """Judge that goals with a quaternion of length 1 within the tolerance are accepted."""
+    for put in trace.unit:
+        holds = put.exchange.response.status in NEW
+        yield Case(holds, put.exchange, f"201 or 202 for a goal with {put.special}", cause=put.exchange.came)
+
+
+@rule("rest-resources/goal-frame", on=(refused_goals,))
+def goal_frame(trace: RefusedGoals) -> Iterator[Outcome]:
+    """Judge that goals in unknown frames are refused."""
+    return map(_refused, trace.unknown_frames)
+
+
+@rule("rest-resources/goal-unreachable", on=(refused_goals,))
+def goal_unreachable(trace: RefusedGoals) -> Iterator[Outcome]:
+    """Judge that goals outside every map are refused, or accepted and then ended."""
+    for put in trace.far:
+        ended = put.read is not None and put.read.response.status == 404
+        yield Case(
+            400 <= put.exchange.response.status < 500 or ended,
+            put.exchange,
             "422 (another 4xx conforms), or a goal that is accepted and ends",
-            found=exchange.came if ended or none is exchange else f"the goal is current {_GIVES_UP_S:g} s later",
+            put.exchange.came if ended or put.read is None else f"a goal that is active {put.waited_s:g} s later",
         )
-        if none is not exchange and not ended:
-            robot.delete_goal()
-            return
-
-
-def _refused(robot: Robot, judge: Judge, name: str, body: dict[str, object], what: str) -> None:
-    exchange = put_goal(robot, body)
-    status = exchange.response.status
-    judge.check(
-        f"rest-resources/{name}", 400 <= status < 500, exchange, f"4xx for a goal with {what}", cause=exchange.came
-    )
-    if status < 400:
-        robot.delete_goal()

@@ -1,12 +1,12 @@
 """Clients that vanish, and clients that never come to an end."""
 
-import time
 from contextlib import closing
 from typing import Final
 
 import pytest
 
 from conformance.api.rest.interface import RestInterface
+from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, POSE, STILL, VELOCITY, Robot, Velocity
@@ -74,14 +74,11 @@ def _vanish(api: RestInterface, drive: Drive) -> str:
         (LINEAR, linear, None, True),
     ):
         partial = PartialRequest(rest, "PUT", path, sent=sent, promised=promised)
-        time.sleep(_READ_S)
+        robot.clock.sleep(_READ_S)
         partial.vanish(reset=reset)
-        until = time.monotonic() + _WATCH_S * robot.watchfulness**2
-        while True:
+        for _ in poll_for(robot.clock, 0.0, _WATCH_S * robot.watchfulness**2):
             if drive.sees(STILL, 2)[0] is False:
                 return f"rest after {partial.request.method} {path} of which not all octets were sent"
-            if time.monotonic() > until:
-                break
     return ""
 
 

@@ -1,11 +1,11 @@
 """Velocities that the robot must not take."""
 
-import time
 from collections.abc import Iterator
 from typing import Final
 
 import pytest
 
+from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.standstill import Standstill
@@ -92,10 +92,10 @@ def _judge_refused(robot: Robot, judge: Judge, bad: Velocity) -> None:
 def _judge_rest(robot: Robot, judge: Judge, *ids: str) -> None:
     """Nothing of what was refused shows in the settle time, by which a robot that took it would move."""
     drive = Drive(robot)
-    until = time.monotonic() + robot.limits.settle_s
-    still, found = drive.sees(STILL, 2)
-    while still is not False and time.monotonic() < until:
+    for _ in poll_for(robot.clock, 0.0, robot.limits.settle_s):
         still, found = drive.sees(STILL, 2)
+        if still is False:
+            break
     exchange = drive.trace.turns[-1].velocity_exchange
     for id_ in ids:
         judge.check(id_, still is not False, exchange, _EXPECTED, found=found, cause="moves")
@@ -125,11 +125,9 @@ def _judge_component(robot: Robot, judge: Judge, component: int) -> None:
 
 def _does(robot: Robot, wanted: Velocity) -> bool:
     """Whether the robot reaches a velocity that it took, and so can actuate it after all."""
-    until = time.monotonic() + robot.settle_s
-    while time.monotonic() < until:
+    for _ in poll_for(robot.clock, 0.02, robot.settle_s):
         velocity, _ = robot.velocity()
         if velocity is not None and not robot.near(velocity, STILL, 2) and robot.near(velocity, wanted):
             robot.put_velocity(STILL)
             return True
-        time.sleep(0.02)
     return False

@@ -1,6 +1,5 @@
 """Interoperability: zeep, the common SOAP client for Python, is made from the description and calls everything."""
 
-import time
 from typing import Any
 
 import pytest
@@ -9,6 +8,8 @@ from conformance.api.soap.callable_services import SoapServices, repetitions
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import example
 from conformance.api.soap.zeep_client import ZeepCaller
+from conformance.observe.clock import WALL_CLOCK
+from conformance.observe.polling import poll_for
 from conformance.packs.table1.delivery import COFFEE, COURIER, EXAMPLE
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.effort import Effort
@@ -109,12 +110,11 @@ def test_subscribers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             ("GetGoal", {}),
             ("GetPlan", plan or {"x": 0.0, "y": 0.0}),
         ):
-            result, problem, exchange = client.call(operation, **arguments)
-            until = time.monotonic() + _MOST_STALE_S
-            while operation in _VALUES and problem.startswith("fault") and time.monotonic() < until:
-                # Odometry that is late for a moment is none, and is told by a fault, as REST tells it by 503.
-                time.sleep(_AGAIN_S)
+            # Where odometry is late for a moment, SOAP responds with a fault, as REST responds with 503.
+            for _ in poll_for(WALL_CLOCK, _AGAIN_S, _MOST_STALE_S if operation in _VALUES else 0.0):
                 result, problem, exchange = client.call(operation, **arguments)
+                if not problem.startswith("fault"):
+                    break
             if problem.startswith("fault") and (operation == "GetGoal" or (operation == "GetPlan" and not plan)):
                 problem = ""
             elif not problem:

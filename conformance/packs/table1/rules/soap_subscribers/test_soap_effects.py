@@ -1,6 +1,5 @@
 """What a SOAP message does beside being answered: seen in the robot's list of deliveries, and in the goal it shows."""
 
-import time
 from collections.abc import Callable
 from functools import partial
 
@@ -13,7 +12,8 @@ from conformance.api.soap.valid_messages import call_valid
 from conformance.contract.interfaces import Interface
 from conformance.documents.xml_names import ENVELOPE, clark
 from conformance.documents.xml_node import Node
-from conformance.observe.polling import Patience
+from conformance.observe.clock import WALL_CLOCK
+from conformance.observe.polling import Patience, poll
 from conformance.packs.table1.robot import delivery_messages
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import goal_body, put_goal
@@ -117,9 +117,5 @@ def _goal_id(service: SoapService) -> str | None:
 
 
 def _until(condition: Callable[[], object], patience: Patience) -> bool:
-    """Ask until it is so, or the time is over."""
-    while not condition():
-        if patience.over:
-            return False
-        time.sleep(_STEP_S)
-    return True
+    """Return whether the condition holds before the time is over."""
+    return any(condition() for _ in poll(WALL_CLOCK, _STEP_S, lambda: patience.over))

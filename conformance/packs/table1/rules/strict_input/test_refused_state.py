@@ -1,6 +1,5 @@
 """What the contract does not allow changes nothing: neither the velocity, nor the goal, nor what the robot delivers."""
 
-import time
 from collections.abc import Callable
 from functools import partial
 from http import HTTPStatus
@@ -15,6 +14,7 @@ from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.calls import call
 from conformance.api.soap.service import SoapService
 from conformance.documents.openapi import operations_of
+from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, path_of, put_delivery
 from conformance.packs.table1.robot.delivery_messages import request
@@ -148,16 +148,12 @@ def test_an_invalid_goal_is_not_followed(api: RestInterface, robot: Robot, judge
 def _ends(robot: Robot, active: dict[str, Any], act: Callable[[], object]) -> bool:
     """Whether it is this act that ends the goal, and not the robot: without it, the goal outlasts twice the time."""
     put_goal(robot, active)
-    began = time.monotonic()
+    began = robot.clock.now()
     act()
     ended = robot.goal()[0] is None
-    took = time.monotonic() - began
+    took = robot.clock.now() - began
     put_goal(robot, active)
-    until = time.monotonic() + 2 * took
-    there = True
-    while there and time.monotonic() < until:
-        there = robot.goal()[0] is not None
-    return ended and there
+    return ended and all(robot.goal()[0] is not None for _ in poll_for(robot.clock, 0.0, 2 * took))
 
 
 def _invalid_goals(near: Any, frame: str) -> list[tuple[str, dict[str, Any]]]:

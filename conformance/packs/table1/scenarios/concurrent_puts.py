@@ -1,0 +1,132 @@
+"""Several clients that put at one moment: one goal, different goals, different velocities.
+
+Where the robot does not respond to a request, there is no trace: the one requirement of the scenario fails by that.
+"""
+
+from collections.abc import Sequence
+from http import HTTPStatus
+from typing import Any, Final
+
+from conformance.observe.polling import poll, poll_for
+from conformance.packs.table1.robot.concurrent_puts import (
+    Accepted,
+    ConcurrentGoal,
+    ConcurrentVelocities,
+    GoalRead,
+    VelocityRead,
+)
+from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, difference, goal_body
+from conformance.packs.table1.robot.goals import choose_goals
+from conformance.packs.table1.robot.message_shapes import body_of
+from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, STILL, VELOCITY, Robot, Velocity
+from conformance.scenarios.scenario import scenario
+from conformance.scenarios.stage import Need
+from conformance.transport.exchange import Attempt, Exchange
+from conformance.transport.parallel import Outgoing, is_busy, send_together
+from conformance.verdict.effort import Effort
+
+# How often velocities are put that ended before a read showed them, or that the robot did not reach in time.
+_TRIES: Final = 3
+_CLIENTS: Final = 4
+# How long after it was cancelled a goal is read, s.
+_WATCHED_S: Final = 0.1
+_GOAL_STEP_S: Final = 0.02
+_VELOCITY_STEP_S: Final = 0.01
+# Shares of the limits, ahead and turning: no velocity has one of its components in common with another.
+_SHARES: Final = ((0.5, -0.5), (-0.5, 0.5), (0.17, 0.17))
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def concurrent_goal(robot: Robot, effort: Effort) -> tuple[ConcurrentGoal, ...]:
+    """Put one new goal by several clients at one moment, then cancel it, again and again."""
+    pose = choose_goals(robot, 1.5, 1)[0]
+    trace: list[ConcurrentGoal] = []
+    for turn in range(effort.cases(20)):
+        body = goal_body(pose, robot.statement.motion.frame, f"clients {turn}")
+        attempts = _put_together(robot, GOAL_PATH, [body] * _CLIENTS)
+        puts = tuple(one for one in attempts if isinstance(one, Exchange) and not is_busy(one))
+        if all(HTTPStatus.BAD_REQUEST <= one.response.status < HTTPStatus.INTERNAL_SERVER_ERROR for one in puts):
+            continue  # a place that the robot refuses is refused to all
+        goal, differs, read = await_goal(robot, body)
+        if goal is None and arrived(robot, pose):
+            trace.append(ConcurrentGoal(puts, None))
+            break
+        robot.delete_goal()
+        await_none(robot)
+        trace.append(ConcurrentGoal(puts, GoalRead(read, differs), _after_cancel(robot, body)))
+    return tuple(trace)
+
+
+def _after_cancel(robot: Robot, body: dict[str, Any]) -> tuple[GoalRead, ...]:
+    """Read for a while whether a cancelled goal goes on as another one; the robot may have a goal of its own."""
+    reads: list[GoalRead] = []
+    for _ in poll_for(robot.clock, _GOAL_STEP_S, _WATCHED_S):
+        goal, exchange = robot.goal()
+        reads.append(GoalRead(exchange, "no goal" if goal is None else difference(goal, {"goal": body["goal"]})))
+        if not reads[-1].differs:
+            break
+    return tuple(reads)
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def concurrent_goals(robot: Robot, effort: Effort) -> tuple[GoalRead, ...]:
+    """Put different goals by several clients at one moment, and read which is active, again and again."""
+    poses = choose_goals(robot, 1.5, _CLIENTS)
+    reads: list[GoalRead] = []
+    for turn in range(effort.cases(20)):
+        bodies = [
+            goal_body(pose, robot.statement.motion.frame, f"client {number} of {turn}")
+            for number, pose in enumerate(poses)
+        ]
+        attempts = zip(bodies, _put_together(robot, GOAL_PATH, bodies), strict=True)
+        accepted = [body for body, one in attempts if isinstance(one, Exchange) and one.response.ok]
+        if not accepted:
+            continue
+        goal, differs, exchange = await_goal(robot, *accepted)
+        if goal is None and any(arrived(robot, pose) for pose in poses):
+            break
+        reads.append(GoalRead(exchange, differs))
+    robot.delete_goal()
+    await_none(robot)
+    return tuple(reads)
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def concurrent_velocities(robot: Robot, effort: Effort) -> tuple[ConcurrentVelocities, ...]:
+    """Put different velocities by several clients at one moment, and read which the robot reaches, again and again."""
+    velocities = [robot.share_of_limits(*shares) for shares in _SHARES]
+    trace: list[ConcurrentVelocities] = []
+    for _ in range(1 if effort.name == "quick" else 4):
+        for turn in range(1, _TRIES + 1):
+            trace.append(_put_velocities(robot, velocities, last=turn == _TRIES))
+            robot.put_velocity(STILL)
+            if trace[-1].is_decided(robot.limits):
+                break
+    return tuple(trace)
+
+
+def _put_velocities(robot: Robot, velocities: Sequence[Velocity], *, last: bool) -> ConcurrentVelocities:
+    """Put velocities at one moment, and read the velocity until it is one of them, or may have ended by itself."""
+    sent = robot.clock.now()
+    attempts = _put_together(robot, VELOCITY, [velocity.twist for velocity in velocities])
+    accepted = tuple(
+        Accepted(velocity, one)
+        for velocity, one in zip(velocities, attempts, strict=True)
+        if isinstance(one, Exchange) and one.response.ok
+    )
+    put = ConcurrentVelocities(accepted, sent, robot.clock.now(), (), last)
+    if not accepted:
+        return put
+    until = min(put.answered + robot.settle_s, put.ends(robot.limits))
+    for _ in poll(robot.clock, _VELOCITY_STEP_S, lambda: robot.clock.now() > until):
+        asked = robot.clock.now()
+        velocity, exchange = robot.velocity()
+        put = put.read(VelocityRead(asked, robot.clock.now(), velocity, exchange))
+        if put.is_unreadable or put.reached(robot.limits) is not None:
+            break
+    return put
+
+
+def _put_together(robot: Robot, path: str, values: Sequence[dict[str, Any]]) -> list[Attempt]:
+    """Send each value by a client of its own, all at one moment."""
+    return send_together([[Outgoing(robot.rest, "PUT", path, JSON_BODY, body_of(value)) for value in values]])[0]
