@@ -89,7 +89,7 @@ class Observer(Listener):
             is_named = "/" in answer.media_type
             expect(judge, "http/content-type", exchange).that(is_named, "Content-Type with a media type", found)
         twice = answer.repeated(*_SINGLE)
-        expected = "each header field once that is no list"
+        expected = "no header twice, unless its value is a list"
         expect(judge, "http/field-once", exchange).that(not twice, expected, f"{twice} several times")
         # RFC 9110 6.6.1 leaves 5xx free.
         if answer.status < HTTPStatus.INTERNAL_SERVER_ERROR and context.request.raw is None:

@@ -183,7 +183,11 @@ class Batch:
             interfaces = sorted(item.interface for item in seen if self._key(item.delivery) == key)
             problem = ""
             if count != wanted:
-                problem = f"{count} instead of {wanted}" if count or not strangers else f"not it, but {strangers[0]}"
+                problem = (
+                    f"{count} instead of {wanted}"
+                    if count or not strangers
+                    else f"a message that no request contained: {strangers[0]}"
+                )
             elif any(interfaces) and interfaces != _TWO.get(one.how, [one.interface])[: len(interfaces)]:
                 problem = f"{count} by {' and '.join(interfaces)}"
             well &= self._judge.check(

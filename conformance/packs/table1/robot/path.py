@@ -225,7 +225,7 @@ def _way(sums: Sequence[_Sums], noise: Noise) -> Case | None:
     return Case(
         any(miss <= 0 for miss in misses),
         last.exchange,
-        f"a way of ({whole.x:.3f}, {whole.y:.3f}) m, which is what the velocity adds up to",
+        f"a displacement of ({whole.x:.3f}, {whole.y:.3f}) m, which is what the velocity adds up to",
         observed=f"the pose moved by ({last.pose.x - first.pose.x:.3f}, {last.pose.y - first.pose.y:.3f}) m",
         cause="another way",
     )

@@ -219,7 +219,7 @@ def test_an_invalid_delivery_reaches_nobody(
             "strict-input/delivery-refused",
             others[method] not in seen or (exchange.response.ok and method not in SAFE_METHODS),
             exchange,
-            f"no message for {method} of what PUT orders",
+            f"no DeliveryRequestMsg on ROS after {method}: only PUT starts a delivery",
             cause=method,
         )
     strange = [one for one in seen if one not in {last, silent, *others.values()}]
