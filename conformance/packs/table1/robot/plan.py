@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
 from conformance.packs.table1.robot.robot import PLAN, Robot
-from conformance.scenarios.rule import Case, record
+from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
 
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
@@ -167,13 +167,6 @@ def start_of(
             break
         offs.append(_beyond_start(other, earlier, later))
     return Start(plan.poses[0], before, exchange, tuple(offs))
-
-
-def judge_start(robot: Robot, plan: Plan, before: Pose, exchange: Exchange, again: Callable[[], Plan | None]) -> None:
-    """Judge whether a path begins where the robot was; the arguments are those of start_of()."""
-    start = start_of(robot, plan, before, exchange, again)
-    if start is not None:
-        record(robot.judge, "rest-resources/plan-start", [start.case])
 
 
 def _beyond_start(plan: Plan, before: Pose, after: Pose) -> float:
