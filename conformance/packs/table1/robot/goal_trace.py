@@ -63,19 +63,19 @@ class Cancelled:
 
 @dataclass(frozen=True)
 class GoalLife:
-    """One goal through all that clients do with it, then another in its place, then none.
+    """The trace of the scenario goal_life: a goal is put, repeated, contradicted, replaced by another, and cancelled.
 
     Attributes:
-        none: before the first.
-        first: it was put, with all members that may be left out.
-        stamps: its stamp in two readings.
-        repeated: it was put again and again.
-        contradicted: another pose was put under its id.
-        velocity: the response to a velocity meanwhile; None: none was sent.
-        drive: what that velocity did, where it was accepted.
-        second: another goal was put, without an id.
-        renamed: whether the second goal is accepted when it has an id; None: it was accepted without one.
-        cancelled: the last goal was cancelled; None: it had ended.
+        none: readings and DELETEs before the first goal was put.
+        first: the PUT of the first goal, which has all optional members.
+        stamps: the first goal's stamp in two readings.
+        repeated: the PUTs of the active goal again.
+        contradicted: the PUTs of another pose under the active goal's id.
+        velocity: the response to a velocity that was sent while a goal was active; None: no velocity was sent.
+        drive: commands and readings of that velocity, where the robot accepted it.
+        second: the PUT of another goal without an id.
+        renamed: whether the second goal is accepted when it has an id; None: it was accepted without an id.
+        cancelled: the DELETEs of the active goal; empty: the goal had ended before.
     """
 
     none: tuple[NoGoal, ...] = ()

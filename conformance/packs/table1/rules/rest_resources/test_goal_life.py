@@ -41,7 +41,7 @@ def cancelled_without_goal(trace: GoalLife) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-delete-none-success", on=(goal_life,))
 def cancelled_without_goal_or_success(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge the same more mildly."""
+    """Judge that a DELETE without a goal is answered 404 or with success."""
     for one in trace.none:
         yield Case(one.cancelled.response.status in {404, 200, 204}, one.cancelled, "404 or 204 without a goal")
 

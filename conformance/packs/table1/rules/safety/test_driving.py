@@ -31,7 +31,7 @@ def limits_hold(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 @rule("safety/refused-keeps", on=(turn, velocity_walk))
 def refused_keeps(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that a refused velocity leaves the robot at the one before."""
+    """Judge that the robot keeps its velocity when it refuses another one."""
     return outcomes("safety/refused-keeps", trace.drive, said_of(run).limits)
 
 
