@@ -17,7 +17,7 @@ class Slack:
 
 
 def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str = "") -> str:
-    """In what ``between`` contradicts both its neighbours; empty where it does not.
+    """Return in what ``between`` contradicts both its neighbours; empty where it does not.
 
     Compared are the fields that all three have. A stamp that goes on is left to the caller.
     """
@@ -55,7 +55,7 @@ def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slac
 
 
 def _turned(quaternion: Any, like: Any) -> Any:
-    """A quaternion, or its negative where that is the one on the side of another; what is none stays as it is."""
+    """Return a quaternion, or its negative if that is nearer to another one; return other values as they are."""
     try:
         aside = sum(float(quaternion[axis]) * float(like[axis]) for axis in "xyzw") < 0
         return {**quaternion, **{axis: -quaternion[axis] for axis in "xyzw"}} if aside else quaternion
@@ -77,14 +77,14 @@ def _in_lists(before: list[Any], between: Any, after: list[Any], slack: Slack, w
 
 
 def unstamped(value: Any) -> Any:
-    """A message without its stamps: of what is made anew for each request they differ by right."""
+    """Return a copy of a message without its stamps, which may differ between responses."""
     if isinstance(value, dict):
         return {name: unstamped(item) for name, item in value.items() if name != "stamp"}
     return [unstamped(item) for item in value] if isinstance(value, list) else value
 
 
 def stamp_of(message: Any) -> tuple[float, float]:
-    """The stamp in a message's header, (sec, nanosec); zeros where there is none that can be read."""
+    """Return the stamp in a message's header, (sec, nanosec); zeros where it cannot be read."""
     header = message.get("header") if isinstance(message, dict) else None
     stamp = header.get("stamp") if isinstance(header, dict) else None
     if not isinstance(stamp, dict) or not is_number(stamp.get("sec")) or not is_number(stamp.get("nanosec")):
@@ -93,5 +93,5 @@ def stamp_of(message: Any) -> tuple[float, float]:
 
 
 def entries_of(listed: list[Any], names: tuple[str, ...]) -> list[str]:
-    """A list of entries in a form that can be compared, whatever its order."""
+    """Return a list of entries in a form that can be compared, whatever its order."""
     return sorted(json.dumps([entry.get(name) for name in names]) for entry in listed)

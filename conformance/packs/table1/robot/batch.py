@@ -72,7 +72,7 @@ class Batch:
     Args:
         rest, publishers: the interfaces.
         observer: sees what arrives.
-        judge: is told.
+        judge: takes the evidence.
     """
 
     def __init__(self, rest: HttpClient, publishers: SoapService, observer: DeliveryObserver, judge: Judge) -> None:
@@ -80,7 +80,7 @@ class Batch:
         self._observer, self._judge = observer, judge
         # What was sent in earlier batches, by its key, and how many batches had messages that nobody asked for.
         self._earlier: dict[bytes, _Sent] = {}
-        self._strange = 0
+        self._unsent = 0
         # What was not accepted, by its key.
         self._refused: dict[bytes, Exchange] = {}
         # Of what was sent without an answer, by its key: it may arrive, whenever.
@@ -129,7 +129,7 @@ class Batch:
         self._judge_again([one.delivery for one in seen if self._key(one.delivery) in self._earlier])
 
     def _accepted(self, sent: Sequence[_Sent]) -> list[_Sent]:
-        """Those that were answered as done; the others are kept in mind."""
+        """Return the deliveries that were accepted, and remember the others."""
         for one in sent:
             if one.exchange.response.status in _UNKNOWN:
                 self._maybe.add(self._key(one.delivery))
@@ -138,7 +138,7 @@ class Batch:
         return [one for one in sent if one.exchange.response.ok]
 
     def _collect(self, sent: Sequence[_Sent]) -> list[Seen]:
-        """What arrived since this was asked last; what is not just what was sent is looked at for a little longer."""
+        """Return what arrived since the last call; wait a little longer if that is not what was sent."""
         seen = self._observer.collect(len(sent), 0.0)
         if sorted(self._key(one.delivery) for one in seen) != sorted(self._key(one.delivery) for one in sent):
             seen += self._observer.collect(0)
@@ -167,26 +167,24 @@ class Batch:
         return delivery_outgoing(self._publishers, delivery, coffee=how == "coffee")
 
     def _key(self, delivery: Delivery) -> bytes:
-        """What a delivery is known by: all its bits, or its values where the observer does not see the sign of zero."""
+        """Return a key of a delivery: its bits, or its values where the observer does not see the sign of zero."""
         if not self._observer.exact:
             delivery = type(delivery)(delivery.message_code, *(value + 0.0 for value in delivery[1:]))
         return delivery.bits
 
     def _judge_each(self, sent: list[_Sent], seen: list[Seen]) -> bool:
         arrived = Counter(self._key(one.delivery) for one in seen)
-        asked = Counter(self._key(one.delivery) for one in sent)
-        strangers = [one.delivery for one in seen if self._key(one.delivery) not in asked]
+        wanted = Counter(self._key(one.delivery) for one in sent)
+        others = [one.delivery for one in seen if self._key(one.delivery) not in wanted]
         well = True
         for one in sent:
             key = self._key(one.delivery)
-            count, wanted = arrived[key], asked[key]
+            count, due = arrived[key], wanted[key]
             interfaces = sorted(item.interface for item in seen if self._key(item.delivery) == key)
             problem = ""
-            if count != wanted:
+            if count != due:
                 problem = (
-                    f"{count} instead of {wanted}"
-                    if count or not strangers
-                    else f"a message that no request contained: {strangers[0]}"
+                    f"{count} messages instead of {due}" if count or not others else f"another message, {others[0]}"
                 )
             elif any(interfaces) and interfaces != _TWO.get(one.how, [one.interface])[: len(interfaces)]:
                 problem = f"{count} by {' and '.join(interfaces)}"
@@ -209,24 +207,24 @@ class Batch:
         others = [one.delivery for one in seen if self._key(one.delivery) not in known.keys() | self._maybe]
         again = [delivery for delivery in others if self._key(delivery) in self._earlier]
         refused = [delivery for delivery in others if self._key(delivery) in self._refused]
-        self._strange += len(again) + len(refused) < len(others)
+        self._unsent += len(again) + len(refused) < len(others)
         self._earlier |= known
         self._judge_again(again)
         exchange, found, cause = next((one.exchange for one in known.values()), None), "", ""
         if again:
             exchange = self._earlier[self._key(again[0])].exchange
-            found, cause = f"once more, and later: {again[0]}", "later"
+            found, cause = f"an earlier message once more: {again[0]}", "later"
         elif refused:
             exchange = self._refused[self._key(refused[0])]
             found, cause = f"the message of a request that was not accepted: {refused[0]}", "not accepted"
-        elif others and self._strange >= _OFTEN:
-            exchange, found, cause = None, f"from nobody: {others[0]}", "from nobody"
+        elif others and self._unsent >= _OFTEN:
+            exchange, found, cause = None, f"a message that no client of the suite sent: {others[0]}", "not sent"
         return self._judge.check(
             _ONLY, not found, exchange, "no message beside the one for each accepted request", found=found, cause=cause
         )
 
     def _judge_again(self, again: list[Delivery]) -> None:
-        """An earlier delivery that comes once more was not one message, whenever that is noticed."""
+        """Judge that an earlier delivery does not arrive once more."""
         for delivery in again:
             one = self._earlier[self._key(delivery)]
             self._judge.check(
@@ -234,12 +232,12 @@ class Batch:
                 holds=False,
                 exchange=one.exchange,
                 expected=f"exactly one message for each accepted request, {delivery}",
-                found="one more, later",
+                found="one more message, later",
                 cause=f"{one.interface} later",
             )
 
     def _judge_order(self, sent: list[_Sent], seen: list[Seen]) -> bool:
-        """What was sent over one interface arrives in that order; two interfaces may have a publisher each."""
+        """Judge that deliveries over one interface arrive in order; two interfaces may have a publisher each."""
         well = True
         for interface in ("rest", "soap"):
             wanted = [self._key(one.delivery) for one in sent if one.interface == interface and one.how not in _TWO]

@@ -74,11 +74,11 @@ class Clock:
         return median(near) if len(near) >= _ENOUGH else None
 
     def is_right(self, time_scale: float) -> bool:
-        """Whether the rate is the declared one within 5 %, and what the odometry's age may come to."""
+        """Return whether the rate is the declared one within 5 %, and what the odometry's age may come to."""
         rate = self.rate
         return rate is not None and abs(rate - time_scale) <= time_scale * (_SHARE + _OLDER_S / self.span_s)
 
     def stands_between(self, time_scale: float) -> bool:
-        """Whether the stamps hardly advance within a second, and leap from one to the next."""
+        """Return whether the stamps hardly advance within a second, and leap from one to the next."""
         fine = self.fine_rate
         return fine is not None and abs(fine) < time_scale * _HARDLY

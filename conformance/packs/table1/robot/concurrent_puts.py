@@ -134,7 +134,7 @@ class ConcurrentVelocities:
         return bool(self.reads) and self.reads[-1].velocity is None
 
     def is_decided(self, limits: Limits) -> bool:
-        """Whether there is nothing to put again."""
+        """Return whether there is nothing to put again."""
         shown = self.reached(limits) is not None or self.missed(limits) is not None
         return not self.accepted or self.is_unreadable or shown
 

@@ -1,4 +1,4 @@
-"""Who sees what became of a delivery: a ROS probe beside the robot, or the robot's own list."""
+"""What shows the deliveries that arrived: a ROS probe beside the robot, or the robot's own list."""
 
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
@@ -46,14 +46,14 @@ class DeliveryObserver(Protocol):
         """Forget what was seen so far."""
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
-        """What was seen since the mark, or since this was asked last; oldest first.
+        """Return what was seen since the mark or the last call, oldest first.
 
         Waits for ``count`` of them, and then for so much longer, s.
         """
 
 
 class NoObserverError(Exception):
-    """Nobody sees what becomes of a delivery; the message says why."""
+    """Nothing shows which deliveries arrive; the message says why."""
 
 
 class ListObserver:
@@ -72,11 +72,11 @@ class ListObserver:
         self._before: list[Any] = []
 
     def mark(self) -> None:
-        """See DeliveryObserver."""
+        """Forget the entries that the list has now."""
         self._before = self._listed()
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
-        """See DeliveryObserver."""
+        """Return the new entries of the list."""
         patience = Patience(self._rest.connection.pace, _ARRIVES_S + 4 * self._slow_s, self._clock)
         for _ in poll(self._clock, _STEP_S, lambda: patience.over):
             listed = self._listed()
@@ -90,7 +90,7 @@ class ListObserver:
         return [Seen(Delivery.of(entry["request"]), entry["interface"]) for entry in reversed(new)]
 
     def _new(self, listed: list[Any]) -> list[Any]:
-        """The entries that the list had not before, newest first: those before the first old one."""
+        """Return the entries that the list had not before, newest first: those before the first old one."""
         now, old = [_identity(entry) for entry in listed], [_identity(entry) for entry in self._before]
         for count in range(len(now)):
             rest = now[count:]
@@ -107,7 +107,7 @@ class ListObserver:
 
 
 def _identity(entry: Any) -> tuple[Any, ...]:
-    """What of an entry stays the same; its state does not."""
+    """Return the part of an entry that stays the same: its state changes."""
     accepted = entry["accepted"]
     return (Delivery.of(entry["request"]).bits, accepted["sec"], accepted["nanosec"], entry["interface"])
 
@@ -117,7 +117,7 @@ class ProbeObserver:
 
     Args:
         probe: its process.
-        connection: tells when anything was asked for that might be a delivery.
+        connection: knows when a request was sent that might be a delivery.
         clock: by which the node is read.
     """
 
@@ -127,15 +127,15 @@ class ProbeObserver:
         self._probe, self._connection, self._clock = probe, connection, clock
 
     def mark(self) -> None:
-        """See DeliveryObserver."""
-        # What was asked for since somebody collected may still be on its way.
+        """Forget the messages that came so far."""
+        # A message of a request since the last collect() may still be on its way.
         if self._connection.acted_at > self._probe.heard_at:
             self._clock.sleep(self._connection.acted_at + QUIET_S - self._clock.now())
             self._probe.heard_at = self._clock.now()
         self._probe.deliveries()
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
-        """See DeliveryObserver."""
+        """Return the new messages."""
         seen: list[Delivery] = []
         for _ in poll_for(self._clock, _STEP_S, _ARRIVES_S):
             seen += self._probe.deliveries()
@@ -150,7 +150,7 @@ class ProbeObserver:
 
 
 def observer_of(api: RestInterface, probe: RosProbe) -> DeliveryObserver:
-    """The best observer that this run has.
+    """Return the ROS probe if there is one, otherwise the robot's own list.
 
     Raises:
         NoObserverError: it has none.

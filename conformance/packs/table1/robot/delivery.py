@@ -36,7 +36,7 @@ class Delivery(NamedTuple):
 
     @classmethod
     def of(cls, request: Mapping[str, Any]) -> Delivery:
-        """From JSON of the right shape."""
+        """Return the delivery in JSON of the right shape."""
         return cls(int(request["message_code"]), *(float(request[name]) for name in cls._fields[1:]))
 
     @property
@@ -51,13 +51,13 @@ class Delivery(NamedTuple):
 
 
 def path_of(code: str, *coordinates: str) -> str:
-    """The target of a delivery PUT with values as they are written: code, depot, destination, source."""
+    """Return the target of a delivery PUT with values as they are written: code, depot, destination, source."""
     pairs = "".join(f"/{name}/{value}" for name, value in zip(PATH_NAMES, coordinates, strict=True))
     return f"{DELIVERIES}{code}{pairs}"
 
 
 def put_delivery(api: RestInterface, path: str, *, fresh: bool = False, headers: Headers = ()) -> Exchange:
-    """PUT a delivery that has to be taken.
+    """Send a PUT of a delivery that has to be accepted.
 
     Raises:
         HarnessError: it is not valid by the contract.
@@ -68,7 +68,7 @@ def put_delivery(api: RestInterface, path: str, *, fresh: bool = False, headers:
 
 
 def written(value: float) -> tuple[str, ...]:
-    """The forms in which the contract lets a number be written: sign, fraction and exponent, or not."""
+    """Return the forms in which the contract lets a number be written: sign, fraction and exponent, or not."""
     forms = [repr(value), f"{value:.17e}", f"{value:+.20e}"]
     if abs(value) < _ONLY_DIGITS:
         plain = f"{value:.30f}"
@@ -81,17 +81,17 @@ def written(value: float) -> tuple[str, ...]:
 
 
 def doubles() -> st.SearchStrategy[float]:
-    """Finite doubles over their whole range, the corners often."""
+    """Return finite doubles over their whole range, the corners often."""
     return st.one_of(st.sampled_from(_KNOWN), st.floats(allow_nan=False, allow_infinity=False))
 
 
 def deliveries() -> st.SearchStrategy[Delivery]:
-    """Deliveries of any finite coordinates."""
+    """Return deliveries of any finite coordinates."""
     return st.builds(Delivery, st.sampled_from((COURIER, COFFEE)), *[doubles()] * len(PATH_NAMES))
 
 
 def lexical_deliveries() -> st.SearchStrategy[tuple[Delivery, tuple[str, ...]]]:
-    """Deliveries with each value as it is to be written."""
+    """Return deliveries with each value as it is to be written."""
 
     def forms(delivery: Delivery) -> st.SearchStrategy[tuple[Delivery, tuple[str, ...]]]:
         code = st.sampled_from((str(delivery.message_code), f"+{delivery.message_code}", f"0{delivery.message_code}"))

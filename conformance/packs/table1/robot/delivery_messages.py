@@ -15,7 +15,7 @@ NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
 
 
 def request(operation: str, **values: float | str) -> Node:
-    """A request, its elements in the order of the XSD.
+    """Return a request, its elements in the order of the XSD.
 
     Args:
         operation: its name.
@@ -27,7 +27,7 @@ def request(operation: str, **values: float | str) -> Node:
 
 
 def delivery(operation: str = "ExecuteDeliveryRequest", code: str = "4", **coordinates: str) -> Node:
-    """A delivery request.
+    """Return a delivery request.
 
     Args:
         operation: ExecuteDeliveryRequest or ExecuteCoffeeRequest.

@@ -36,7 +36,7 @@ class Drive:
         self._turn_at = 0.0
 
     def command(self, velocity: Velocity, *, integers: bool = False) -> bool:
-        """PUT a velocity; return whether it is answered as the contract wants.
+        """Put a velocity; return whether the response is as in the contract.
 
         Args:
             velocity: within the limits.
@@ -54,7 +54,7 @@ class Drive:
         return self._commanded(Command(velocity, sent, self.clock.now(), exchange, integers=integers))
 
     def command_linear(self, velocity: Velocity) -> bool:
-        """PUT the linear part of a velocity; return whether it is answered as the contract wants.
+        """Put the linear part of a velocity; return whether the response is as in the contract.
 
         Raises:
             NotPossibleError: a goal of the robot's own is active, so that it cannot be driven.
@@ -155,12 +155,12 @@ class Drive:
         every = COUNTED_ON_S if limits.hold_s is None else _renewed_s(limits.hold_s, limits.settle_s)
         renews = limits.hold_s is None or limits.hold_s < patience
         while True:
-            asked = self.clock.now()
-            lapsed = limits.hold_s is not None and asked > self.trace.sent + certain_s(limits.hold_s)
+            now = self.clock.now()
+            lapsed = limits.hold_s is not None and now > self.trace.sent + certain_s(limits.hold_s)
             # A command that has had no effect when the robot has had its time is not given again: that would hide it.
-            if not lapsed and asked > begun + limits.settle_s:
+            if not lapsed and now > begun + limits.settle_s:
                 renews = renews and not windows.is_stuck(self.trace.turns[first:], wanted, part)
-            if renews and self.trace.commands and asked > self.trace.sent + every:
+            if renews and self.trace.commands and now > self.trace.sent + every:
                 self._renew()
                 if lapsed and lapses < _LAPSES:
                     # Whoever looks was late, not the robot: that one may have slowed down meanwhile.
@@ -174,7 +174,7 @@ class Drive:
             settled = min(until, begun + limits.settle_s + self.robot.sample_s) if within is None else begun
             late = [turn for turn in turns if turn.at >= settled]
             decided = windows.shown(limits, late, wanted, part=part, count=count) is not None
-            if there or (asked > until and decided) or asked > until + _LONGER_S:
+            if there or (now > until and decided) or now > until + _LONGER_S:
                 break
         counted = settled if not there and windows.newest(late) else begun
         outlasted = not there and wanted != STILL and self._outlasts_hold
@@ -234,7 +234,7 @@ class Drive:
 
 
 def _renewed_s(hold_s: float, settle_s: float) -> float:
-    """When a velocity that is not reached yet is given again, s after its command.
+    """Return when a velocity that is not reached yet is given again, s after its command.
 
     Not before the robot has had its time, where the velocity lasts for that long and a while more.
     """

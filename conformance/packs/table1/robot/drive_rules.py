@@ -113,10 +113,10 @@ def answer_of(command: Command) -> Case:
 
 
 def _other_number(command: Command, value: Any) -> str:
-    """The first component that was accepted with another number than the one that was put; empty where none was."""
+    """Return the first component that was accepted with another number than was put; empty: there is none."""
     given = {"linear": value} if command.linear_only else value
-    for part, asked in command.velocity.twist.items():
-        for axis, number in asked.items() if part in given else ():
+    for part, put in command.velocity.twist.items():
+        for axis, number in put.items() if part in given else ():
             accepted = given[part][axis]
             if abs(float(accepted) - number) > ECHO:
                 return f"{part} {axis} {accepted} for {number}"
@@ -155,7 +155,7 @@ def agreement(trace: Trace, limits: Limits) -> Iterator[tuple[str, Case]]:
 
 
 def _is_steady(limits: Limits, readings: Sequence[Velocity]) -> bool:
-    """Whether there are readings, and all near their median."""
+    """Return whether there are readings, all of them near their median."""
     return bool(readings) and all(is_near(limits, one, middle(readings), 0.5) for one in readings)
 
 
@@ -170,7 +170,7 @@ def _same(
 
 
 def speed(trace: Trace) -> Case | None:
-    """Without declared limits: the robot is not faster than it was asked to be, however it overshoots.
+    """Return whether a robot without declared limits is no faster than it was commanded to be.
 
     None where there was no command, or too few samples that could be read.
     """
@@ -179,8 +179,8 @@ def speed(trace: Trace) -> Case | None:
         return None
     turn, measured = trace.turns[-1], middle(window)
     fastest = Velocity(*(max(map(abs, each)) for each in zip(*(one.velocity for one in trace.commands), strict=True)))
-    holds = all(abs(one) <= 1.5 * asked + 0.2 for one, asked in zip(measured, fastest, strict=True))
-    expected = f"a speed that was asked for, at most {rounded(fastest)}"
+    holds = all(abs(one) <= 1.5 * most + 0.2 for one, most in zip(measured, fastest, strict=True))
+    expected = f"a speed that was commanded, at most {rounded(fastest)}"
     return Case(holds, turn.velocity_exchange, expected, str(measured))
 
 
@@ -197,5 +197,5 @@ def arrival(trace: Trace, reach: Reach, limits: Limits) -> Case:
 
 
 def rounded(velocity: Velocity) -> Velocity:
-    """A velocity as it is shown."""
+    """Return a velocity as it is shown."""
     return Velocity(*(round(value, 4) for value in velocity))

@@ -56,7 +56,7 @@ class Examples:
         }
 
     def _direction(self) -> int:
-        """Ahead and back by turns, so that a robot does not creep up to a wall over many runs."""
+        """Return ahead and back by turns, so that a robot does not creep up to a wall over many runs."""
         self._turns += 1
         return 1 if self._turns % 2 else -1
 
@@ -69,7 +69,7 @@ class Examples:
         return {**value, "goal": {"target_pose": target}}
 
     def _near(self, api: RestInterface) -> Pose | None:
-        """A pose near the robot that it can reach; None where it knows no way to any."""
+        """Return a pose near the robot that it can reach; None where it knows no way to any."""
         robot = Robot(api)
         here = robot.map_pose()
         for distance in _FAR_M if here is not None else ():

@@ -13,9 +13,9 @@ from conformance.transport.exchange import Exchange
 
 NEW: Final = frozenset({201, 202})
 REPEATED: Final = frozenset({200, 202, 204})
-# 204 is what the contract asks for; a robot that says more than nothing says the same.
+# The contract has 204; a response with a body says the same.
 CANCELLED: Final = frozenset({200, 202, 204})
-# What a client would rather be told in: whatever that is, a goal is cancelled.
+# A media type that a client prefers: whatever that is, a goal is cancelled.
 RATHER_XML: Final = ("Accept", "application/xml, */*;q=0.1")
 ACTIVE: Final = frozenset({1, 2, 3})
 _STEP_S: Final = 0.02
@@ -24,7 +24,7 @@ _ARRIVED_M: Final = 0.35
 
 
 def goal_body(pose: Pose, frame: str, id_: str | None = None, *, length: float = 1.0) -> dict[str, Any]:
-    """A MoveBaseActionGoal as a client puts it.
+    """Return a MoveBaseActionGoal as a client puts it.
 
     Args:
         pose: where to go.
@@ -49,20 +49,20 @@ def goal_body(pose: Pose, frame: str, id_: str | None = None, *, length: float =
 
 
 def difference(goal: Any, put: dict[str, Any]) -> str:
-    """In what a goal that the robot shows is another than the one put; empty where it is the same.
+    """Return in what the goal that the robot shows differs from the one that was put; empty: in nothing.
 
     A quaternion and its negative are one orientation.
     """
     if "goal_id" in put and goal["goal_id"]["id"] != put["goal_id"]["id"]:
         return f"goal_id.id {shown(goal['goal_id']['id'])} for {shown(put['goal_id']['id'])}"
-    there, asked = goal["goal"]["target_pose"], put["goal"]["target_pose"]
-    if there["header"]["frame_id"] != asked["header"]["frame_id"]:
-        return f"frame_id {shown(there['header']['frame_id'])} for {shown(asked['header']['frame_id'])}"
-    for axis, wanted in asked["pose"]["position"].items():
-        found = float(there["pose"]["position"][axis])
-        if not math.isclose(found, wanted, rel_tol=1e-9, abs_tol=_CLOSE):
-            return f"position.{axis} {found:g} for {wanted:g}"
-    turned, wished = there["pose"]["orientation"], asked["pose"]["orientation"]
+    active, wanted = goal["goal"]["target_pose"], put["goal"]["target_pose"]
+    if active["header"]["frame_id"] != wanted["header"]["frame_id"]:
+        return f"frame_id {shown(active['header']['frame_id'])} for {shown(wanted['header']['frame_id'])}"
+    for axis, put_at in wanted["pose"]["position"].items():
+        found = float(active["pose"]["position"][axis])
+        if not math.isclose(found, put_at, rel_tol=1e-9, abs_tol=_CLOSE):
+            return f"position.{axis} {found:g} for {put_at:g}"
+    turned, wished = active["pose"]["orientation"], wanted["pose"]["orientation"]
     dot = sum(float(turned[axis]) * wished[axis] for axis in "xyzw")
     length = math.hypot(*(float(turned[axis]) for axis in "xyzw")) * math.hypot(*wished.values())
     if not abs(abs(dot) - length) <= _CLOSE or not length > _CLOSE:
@@ -71,7 +71,7 @@ def difference(goal: Any, put: dict[str, Any]) -> str:
 
 
 def status_fault(goal: Any) -> str:
-    """What is wrong with the status of an active goal."""
+    """Return what is wrong with the status of an active goal; empty: nothing."""
     problem = STATUS.problem(goal.get("status"), "status")
     if problem:
         return problem
@@ -105,7 +105,7 @@ def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
 
 
 def arrived(robot: Robot, pose: Pose) -> bool:
-    """Whether the robot is so near to a goal that it may have ended already."""
+    """Return whether the robot is so near to a goal that it may have ended already."""
     here = robot.map_pose()
     return here is None or here.distance(pose) < _ARRIVED_M
 

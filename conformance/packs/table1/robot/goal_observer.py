@@ -113,6 +113,6 @@ class GoalObserver(Listener):
 
 
 def _whole(place: str) -> str:
-    """The place of a value, or of the stamp that it is a part of."""
+    """Return the place of a value, or of the stamp that it is a part of."""
     parent = place.rpartition(".")[0]
     return parent if parent.endswith("stamp") else place

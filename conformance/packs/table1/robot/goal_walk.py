@@ -51,24 +51,24 @@ class GoalMachine(RuleBasedStateMachine):
 
     @rule()
     def ask(self) -> None:
-        """The active goal is shown, or 404."""
+        """Read the active goal, or 404."""
         self._walk.step(self._look)
 
     @rule(id_=_IDS, which=_WHICH)
     def put(self, id_: str | None, which: int) -> None:
-        """A goal is new, a repetition, or a contradiction, by its id."""
+        """Put a goal: by its id it is new, a repetition, or a contradiction."""
         self._walk.step(lambda: self._put(id_, which))
 
     @rule()
     def repeat(self) -> None:
-        """The active goal again."""
+        """Put the active goal again."""
         if self._active is not None and "goal_id" in self._active:
             which = self._poses.index(self._pose)
             self._walk.step(lambda: self._put(self._id, which))
 
     @rule()
     def cancel(self) -> None:
-        """DELETE, with a goal or without."""
+        """Cancel, with a goal or without."""
         self._walk.step(self._cancel)
 
     @property
@@ -101,7 +101,7 @@ class GoalMachine(RuleBasedStateMachine):
         return self._put_new(body, self._poses[which])
 
     def _put_again(self, body: dict[str, Any], pose: Pose) -> bool:
-        """The active goal's id: a repetition, or a contradiction."""
+        """Put a goal under the active goal's id: a repetition, or a contradiction."""
         exchange = put_goal(self._robot, body)
         status = exchange.response.status
         if arrived(self._robot, self._pose):
@@ -115,7 +115,7 @@ class GoalMachine(RuleBasedStateMachine):
         return well and self._look()
 
     def _put_new(self, body: dict[str, Any], pose: Pose) -> bool:
-        """Another goal than the active one, or the first."""
+        """Put another goal than the active one, or the first."""
         exchange = put_goal(self._robot, body)
         status = exchange.response.status
         displaces = self._active is not None

@@ -25,7 +25,7 @@ _ARRIVES_S: Final = 10.0
 
 
 def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
-    """So many different poses about ``distance`` metres from the robot (nearer where the statement says so).
+    """Return so many different poses about ``distance`` metres from the robot (nearer where the statement says so).
 
     Poses to which the robot has a plan, or that lie on the way to one. Ends the check that asks, as one that cannot be
     judged, where the robot has no plan to anywhere near; a robot that answers no such question is sent straight ahead.
@@ -45,7 +45,7 @@ def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
 
 
 def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | None:
-    """The pose at a share of the straight way to a goal, where the robot has a plan to it."""
+    """Return the pose at a share of the straight way to a goal, where the robot has a plan to it."""
     x, y = (one + share * (other - one) for one, other in zip(here[:2], goal[:2], strict=True))
     pose = Pose(x, y, goal.yaw)
     _, plan, _ = ask(robot, pose)
@@ -53,7 +53,7 @@ def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | No
 
 
 def _turned(goal: Pose, part: int) -> Pose:
-    """The place of a goal with another heading: another pose, and as reachable."""
+    """Return the place of a goal with another heading: another pose, and as reachable."""
     return Pose(goal.x, goal.y, math.remainder(goal.yaw + part, math.tau))
 
 
@@ -109,7 +109,7 @@ def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
 
 
 def _is_open(robot: Robot, pose: Pose, ahead_m: float) -> bool:
-    """Whether the robot knows plain ways from a pose into all directions, of another length ahead and back."""
+    """Return whether the robot knows plain ways from a pose into all directions, of another length ahead and back."""
     around = [pose.ahead(_NEAR_M, math.radians(angle)) for angle in range(60, 360, 60)]
     for there in (pose.ahead(ahead_m), pose.ahead(-ahead_m), *around):
         _, plan, _ = ask(robot, there, pose)

@@ -49,7 +49,7 @@ class LetGo:
         full: when the last command of all components was sent, s of the monotonic clock.
         answered: when the last command was answered.
         turns: what was seen since.
-        resumed: the first turn after a while in which nobody asked, where there was such a while.
+        resumed: the first turn after a while without requests; None: there was no such while.
     """
 
     velocity: Velocity
@@ -59,7 +59,7 @@ class LetGo:
     resumed: int | None = None
 
     def holds_by(self, limits: Limits, count: int) -> bool | None:
-        """Whether the first turns, so many, end with the velocity; None where they are too few to say."""
+        """Return whether the first turns, so many, end with the velocity; None where they are too few to say."""
         begin = max(0, count - _LOOKED_AT)
         if self.resumed is not None and count > self.resumed:
             # Samples from before the silence say nothing of what is behind it.
@@ -67,17 +67,17 @@ class LetGo:
         return windows.verdict(limits, self.turns[begin:count], self.velocity, _OFF)
 
     def was_held(self, limits: Limits) -> bool:
-        """Whether the velocity was seen in its time: who answers too late to be looked at has not shown it."""
+        """Return whether the velocity was seen while it had to hold: a robot may respond too late for that."""
         certain = self.full + certain_s(limits.hold_s or 0.0, JUDGED)
         in_time = sum(turn.at <= certain for turn in self.turns)
         return any(self.holds_by(limits, count) for count in range(1, in_time + 1))
 
     def rests(self, limits: Limits) -> bool:
-        """Whether the newest samples say that the robot is at rest."""
+        """Return whether the newest samples say that the robot is at rest."""
         return bool(windows.shown(limits, self.turns[-_LOOKED_AT:], STILL))
 
     def early(self, limits: Limits) -> Turn | None:
-        """The first turn in which the velocity had ended before its time, if there is one.
+        """Return the first turn in which the velocity had ended before its time, if there is one.
 
         Without a declared hold time that is a moment: what was reached before does not end by being asked for again.
         """
@@ -91,7 +91,7 @@ class LetGo:
         return None
 
     def late(self, limits: Limits) -> Turn | None:
-        """The first turn in which the velocity still held although it had to have begun to end, if there is one."""
+        """Return the first turn in which the velocity still held after it had to end, if there is one."""
         if limits.hold_s is None:
             return None
         last = self.answered + self.longest(limits)
@@ -101,7 +101,7 @@ class LetGo:
         return None
 
     def longest(self, limits: Limits) -> float:
-        """For how long after the command the velocity may be seen, s.
+        """Return for how long after the command the velocity may be seen, s.
 
         A command and an odometry are on their way for a part of the settle time; half as long again is no such delay.
         """
@@ -112,7 +112,7 @@ class LetGo:
         return hold + max(0.4 * hold, 0.5 * limits.settle_s, windows.LONGEST_SAMPLE_S) + 2 * period
 
     def is_void(self, limits: Limits) -> bool:
-        """Whether an answer came so late that the turns say nothing of the hold time."""
+        """Return whether a response came so late that the turns say nothing of the hold time."""
         gap = _GAP * (limits.hold_s or 0.0)
         before, behind = self.turns[: self.resumed], self.turns[len(self.turns[: self.resumed]) :]
         times = [self.full, self.answered, *(turn.at for turn in before)]

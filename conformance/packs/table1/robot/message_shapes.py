@@ -18,7 +18,7 @@ _ANSWERS: Final = {operation.id: operation.shape for operation in operations_of(
 
 
 def _answer_of(operation_id: str) -> Schema:
-    """The schema of what an operation of the contract answers where it succeeds."""
+    """Return the schema of what an operation of the contract answers where it succeeds."""
     schema = _ANSWERS[operation_id]
     if schema is None:
         raise ValueError(f"{operation_id} answers nothing")
@@ -26,7 +26,7 @@ def _answer_of(operation_id: str) -> Schema:
 
 
 def _without(schema: Schema, name: str) -> Schema:
-    """A schema of an object less one of its fields."""
+    """Return a schema of an object less one of its fields."""
     return {
         **schema,
         "required": [one for one in schema["required"] if one != name],
@@ -35,7 +35,7 @@ def _without(schema: Schema, name: str) -> Schema:
 
 
 def _with_any_type(entries: Schema) -> Schema:
-    """A list of entries, less what has requirements of its own: the form of ``type``, and no entry twice."""
+    """Return a list of entries, less what has requirements of its own: the form of ``type``, and no entry twice."""
     entry = entries["items"]
     return {
         "type": "array",
@@ -62,7 +62,7 @@ SERVICE_TYPE: Final = Shape(_SERVICES["items"]["properties"]["type"])
 
 
 def read_as(response: Response, shape: Shape) -> tuple[Any, str]:
-    """The value of a shape in an answer with status 200.
+    """Return the value of a shape in an answer with status 200.
 
     Returns:
         (value, ""), or (None, what is wrong with the answer).
@@ -75,5 +75,5 @@ def read_as(response: Response, shape: Shape) -> tuple[Any, str]:
 
 
 def body_of(value: Mapping[str, Any]) -> bytes:
-    """A JSON body."""
+    """Return a JSON body."""
     return json.dumps(value).encode()

@@ -51,7 +51,7 @@ class _Samples:
         self._stamp, self._begun = stamp, now
 
     def fastest(self, part: str) -> float:
-        """The greatest component, each of which is a median; 0 while there are too few samples to say."""
+        """Return the greatest component, each of which is a median; 0 while there are too few samples to say."""
         if len(self._newest) < SEVERAL:
             return 0.0
         return max(abs(median(float(twist[part][axis]) for twist in self._newest)) for axis in "xyz")
@@ -121,7 +121,7 @@ class Observer(Listener):
             self._beside.velocity(Velocity.of(value), exchange, received)
 
     def _unavailable(self, path: str, exchange: Exchange) -> None:
-        """There is no odometry (any more): the answer says when to ask again, and there is no velocity either."""
+        """Judge a 503: it has Retry-After, and the velocity is 503 as well."""
         judge = self._api.run.judge
         name = "pose-unavailable" if path == POSE else "pose-fresh"
         after = bool(exchange.response.header("retry-after"))
@@ -129,13 +129,13 @@ class Observer(Listener):
         if path == POSE:
             # Not at once: the velocity may have been asked for just before the odometry came, or was too old.
             if self._none and self._velocity_of_none is not None:
-                told = self._velocity_of_none
+                earlier = self._velocity_of_none
                 expected = "503 for the velocity while the pose is 503"
-                judge.check("rest-resources/pose-fresh", holds=False, exchange=told, expected=expected)
+                judge.check("rest-resources/pose-fresh", holds=False, exchange=earlier, expected=expected)
             self._none, self._velocity_of_none = True, None
 
     def _plain(self, exchange: Exchange) -> bool:
-        """Whether a request is one that has nothing odd about it, and so has to be answered 200."""
+        """Return whether a request has only the usual headers, so that it has to be answered 200."""
         fields = {name.lower(): value for name, value in exchange.request.headers}
         # The client shows its own token by this name; a check may send another one, or none, to see it refused.
         if fields.get("authorization") != ("Bearer $ROAAS_TOKEN" if self._api.client.connection.token else None):
@@ -150,7 +150,7 @@ class Observer(Listener):
             abs(length - 1) <= _UNIT,
             exchange,
             "an orientation of unit length within 1e-3",
-            found=f"length {length:.6g}",
+            found=f"an orientation of length {length:.6g}",
         )
         # Of several clients' answers one is told after another, when all have come.
         now = _received_s(exchange)
@@ -163,7 +163,7 @@ class Observer(Listener):
                 stamp >= self._last_stamp,
                 exchange,
                 "a stamp that never runs backwards",
-                found=f"sec, nanosec {stamp} after {self._last_stamp}",
+                found=f"the stamp (sec, nanosec) {stamp} after {self._last_stamp}",
                 cause="runs backwards",
             )
         if stamp != self._last_stamp:
@@ -174,7 +174,7 @@ class Observer(Listener):
                 holds=False,
                 exchange=exchange,
                 expected="503 where the odometry is older than one second",
-                found=f"one that came {sent - self._fresh_at:.1f} s ago already",
+                found=f"odometry that came {sent - self._fresh_at:.1f} s ago already",
                 cause="old",
             )
         self._clock.take(now - elapsed_ms / 2000, stamp[0] + stamp[1] / 1e9)
@@ -182,7 +182,7 @@ class Observer(Listener):
         self._last_received = max(self._last_received, now)
 
     def _limits(self, samples: _Samples, twist: Any, exchange: Exchange) -> None:
-        """The measured speed is within the declared limits at any time, also on the robot's own missions."""
+        """Judge that the measured speed is within the declared limits, also on the robot's own missions."""
         limits = said_of(self._api.run).limits
         samples.add(twist, self._last_stamp)
         linear, angular = limits.tolerance_linear_m_s, limits.tolerance_angular_rad_s
@@ -200,7 +200,7 @@ class Observer(Listener):
                 fastest <= limit * (1 + limits.tolerance) + room,
                 exchange,
                 f"a measured {part} speed within the limit of {limit:g}",
-                found=f"{fastest:.4g}",
+                found=f"a {part} speed of {fastest:.4g}",
             )
 
 

@@ -77,7 +77,7 @@ class _Sum(NamedTuple):
     turned_error: float = 0.0
 
     def miss(self, earlier: _Sum) -> _Miss:
-        """By how much pose and heading miss what was summed up since an earlier reading."""
+        """Return by how much pose and heading miss what was summed up since an earlier reading."""
         way = math.hypot(self.x_error - earlier.x_error, self.y_error - earlier.y_error)
         way = max(way, abs(self.along_error - earlier.along_error))
         turn = max(abs(self.turn_error - earlier.turn_error), abs(self.turned_error - earlier.turned_error))
@@ -99,7 +99,7 @@ class _Sums(NamedTuple):
     each: Sequence[_Sum]
 
     def middle_miss(self, course: Sequence[float], part: Callable[[_Miss], float]) -> float:
-        """The median window's miss, as far as it would lead on the whole course.
+        """Return the median window's miss, as far as it would lead on the whole course.
 
         A window counts for as much of the course as lies between its first reading and the next one, so that a robot
         which rests, and is read meanwhile, has no more say than one that drives.
@@ -166,12 +166,12 @@ def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_sta
 
 
 def _signed(error: float, speed: float, fastest: float) -> float:
-    """An error in the direction of a speed; none where that is little, and its direction perhaps noise."""
+    """Return an error in the direction of a speed; none where that is little, and its direction perhaps noise."""
     return math.copysign(error, error * speed) if error and abs(speed) > _MOVES * fastest else 0.0
 
 
 def _longest_lapse(trace: Sequence[Odometry]) -> float:
-    """How far the stamps of two samples may be apart that nothing has held up, s."""
+    """Return how far the stamps of two samples may be apart that nothing has held up, s."""
     lapses = [two.stamp - one.stamp for one, two in itertools.pairwise(trace) if two.stamp != one.stamp]
     return max(_SKIPPED_S, _HELD_UP_TIMES * median(lapses)) if lapses else _SKIPPED_S
 
@@ -205,7 +205,7 @@ def way_and_turn(
 
 
 def _longest_unbroken(trace: Sequence[Odometry]) -> slice:
-    """The longest part of the readings in which none is held up."""
+    """Return the longest part of the readings in which none is held up."""
     steps = [two.sent - one.sent for one, two in itertools.pairwise(trace)]
     most = max(_HELD_UP_S, _HELD_UP_TIMES * median(steps))
     ends = [0, *(index for index, step in enumerate(steps, 1) if step > most), len(trace)]

@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
 from conformance.packs.table1.robot.robot import PLAN, Robot
-from conformance.scenarios.rule import Case, record
+from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
 
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
@@ -19,7 +19,7 @@ _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130
 _DETOUR: Final = 1.3
 # Where a plan ends at the pose itself, and not only within its tolerance, m.
 EXACT: Final = 1e-6
-# A plan that ends farther away than this was not made for the place that was asked for, m.
+# A plan that ends farther away than this was not made for the place in the request, m.
 _BESIDE: Final = 0.3
 # How far from the robot, or from the given start, a path may begin: a planner's grid is not finer, m.
 START_OFF: Final = 0.25
@@ -51,14 +51,14 @@ class Plan:
 
 
 def plan_of(message: Any) -> Plan:
-    """The plan in a nav_msgs/GetPlan response of the right shape."""
+    """Return the plan in a nav_msgs/GetPlan response of the right shape."""
     path = message["plan"]
     frames = {path["header"]["frame_id"], *(pose["header"]["frame_id"] for pose in path["poses"])}
     return Plan(frozenset(frames), tuple(pose_of(pose["pose"]) for pose in path["poses"]))
 
 
 def query(**parameters: float | str | None) -> str:
-    """The target of a plan request; parameters that are None are left out."""
+    """Return the target of a plan request; parameters that are None are left out."""
     given = {
         name: value if isinstance(value, str) else repr(float(value))
         for name, value in parameters.items()
@@ -87,7 +87,7 @@ def ask(
 
 
 def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list[Pose]:
-    """Poses about ``distance`` metres from the robot, inside the arena, to which the robot says there is a plain way.
+    """Return poses inside the arena, about so many metres away, to which the robot has a plan without a detour.
 
     Declared goals come first, where they are about so far away; a distance at which there is nothing is halved, twice.
     """
@@ -125,7 +125,7 @@ class Start:
         first: the first pose of the path.
         robot: the robot's pose just before the plan.
         exchange: of the plan.
-        beyond_m: by how much the path begins farther from the robot than it may, m, for each plan that was asked for.
+        beyond_m: by how much the path begins farther from the robot than it may, m, for each plan that was requested.
     """
 
     first: Pose
@@ -169,13 +169,6 @@ def start_of(
     return Start(plan.poses[0], before, exchange, tuple(offs))
 
 
-def judge_start(robot: Robot, plan: Plan, before: Pose, exchange: Exchange, again: Callable[[], Plan | None]) -> None:
-    """Judge whether a path begins where the robot was; the arguments are those of start_of()."""
-    start = start_of(robot, plan, before, exchange, again)
-    if start is not None:
-        record(robot.judge, "rest-resources/plan-start", [start.case])
-
-
 def _beyond_start(plan: Plan, before: Pose, after: Pose) -> float:
-    """By how much a path begins farther away from the robot than it may, m; not above zero where it does not."""
+    """Return by how much a path begins farther away from the robot than it may, m; not above zero where it does not."""
     return plan.poses[0].distance(before) - START_OFF - before.distance(after)

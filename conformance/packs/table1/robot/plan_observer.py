@@ -61,7 +61,7 @@ class PlanObserver(Listener):
 
 
 def longest_leap(poses: tuple[Pose, ...]) -> float:
-    """How far a path leaps to one of its poses and back again, m; 0 where it does not."""
+    """Return how far a path leaps to one of its poses and back again, m; 0 where it does not."""
     if len(poses) < _FEWEST:
         return 0.0
     steps = [one.distance(two) for one, two in itertools.pairwise(poses)]

@@ -13,12 +13,12 @@ from conformance.transport.exchange import Response
 
 _PLACES = 4
 _FAR_M = 1.0
-# Places that are nearer to each other than this cannot be told apart by where a planner ends, m.
+# Places that are nearer to each other than this cannot be distinguished by where a plan ends, m.
 _APART_M = 0.4
 
 
 def plan_questions(api: RestInterface) -> list[Question]:
-    """Questions for plans to places around the robot; none where it has no plans, or no such contract."""
+    """Return questions for plans to places around the robot; none where it has no plans, or no such contract."""
     robot = Robot(api)
     here = robot.map_pose()
     places: list[Pose] = []
@@ -33,7 +33,7 @@ def plan_questions(api: RestInterface) -> list[Question]:
 
 
 def _ends_elsewhere(place: Pose, others: list[Pose]) -> Callable[[Response], str]:
-    """Whether a path ends nearer to where another client asked for."""
+    """Return whether a path ends nearer to the goal of another client's request."""
 
     def mismatch(answer: Response) -> str:
         message, problem = read_as(answer, GET_PLAN)

@@ -44,7 +44,7 @@ class Velocity(NamedTuple):
 
     @classmethod
     def of(cls, twist: Mapping[str, Any]) -> Velocity:
-        """From JSON."""
+        """Return the velocity in JSON."""
         return cls(*(float(twist[part][axis]) for part in ("linear", "angular") for axis in "xyz"))
 
     @property
@@ -72,7 +72,7 @@ _SELDOM_HZ: Final = 5.0
 
 
 def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float = 1.0, samples: float = 1) -> bool:
-    """Whether each component is what was wanted, within ``factor`` times the declared tolerance, and the noise.
+    """Return whether each component is what was wanted, within ``factor`` times the declared tolerance, and the noise.
 
     Args:
         limits: of the robot.
@@ -96,7 +96,7 @@ class Odometry:
     """One reading of the odometry.
 
     Attributes:
-        sent, received: when it was asked for and came, s of the monotonic clock.
+        sent, received: when it was requested and received, s of the monotonic clock.
         stamp: the robot's own, s.
         pose: in the odometry frame.
         velocity: in the robot's frame.
@@ -148,11 +148,11 @@ class Robot:
         return 1 / (self.limits.odometry_hz or _SELDOM_HZ)
 
     def patience(self, seconds: float) -> Patience:
-        """A wait for what the robot has so many seconds for."""
+        """Return a wait of so many seconds, in which delays of the responses do not count."""
         return Patience(self.rest.connection.pace, seconds, self.clock)
 
     def get(self, path: str) -> Exchange:
-        """GET as JSON.
+        """Send a GET for JSON.
 
         Raises:
             HarnessError: the parameters are not valid by the contract.
@@ -162,13 +162,13 @@ class Robot:
         return self.rest.send("GET", path, headers=ACCEPT_JSON)
 
     def read(self, path: str, shape: Shape) -> tuple[Any, Exchange]:
-        """GET a message, without what a robot adds to it; None where the answer is something else."""
+        """Read a message, without members that a robot adds; None where the response is something else."""
         exchange = self.get(path)
         value, problem = read_as(exchange.response, shape)
         return (None if problem else projected(value, shape.schema)), exchange
 
     def put(self, path: str, value: Mapping[str, Any]) -> Exchange:
-        """PUT as JSON: what the contract's schema lets be put, whatever the robot then makes of the values.
+        """Send a PUT of JSON that is valid by the contract's schema.
 
         Raises:
             HarnessError: it does not.
@@ -178,7 +178,7 @@ class Robot:
         return self.rest.send("PUT", path, headers=JSON_BODY, body=body)
 
     def odometry(self) -> Odometry | None:
-        """The odometry, or None where it cannot be read (which the observers have judged)."""
+        """Return the odometry, or None where it cannot be read (which the observers have judged)."""
         sent = self.clock.now()
         message, exchange = self.read(POSE, ODOMETRY)
         if message is None:
@@ -194,12 +194,12 @@ class Robot:
         )
 
     def velocity(self) -> tuple[Velocity | None, Exchange]:
-        """The measured velocity, or None where it cannot be read."""
+        """Return the measured velocity, or None where it cannot be read."""
         twist, exchange = self.read(VELOCITY, TWIST)
         return (None if twist is None else Velocity.of(twist)), exchange
 
     def linear(self) -> tuple[Velocity | None, Exchange]:
-        """The linear part of the measured velocity, as a velocity that does not turn."""
+        """Return the linear part of the measured velocity, as a velocity that does not turn."""
         vector, exchange = self.read(LINEAR, VECTOR3)
         return (None if vector is None else Velocity(*(float(vector[axis]) for axis in "xyz"))), exchange
 
@@ -212,7 +212,7 @@ class Robot:
         return self.put(LINEAR, velocity.linear)
 
     def goal(self) -> tuple[Any, Exchange]:
-        """The active goal as JSON, or None."""
+        """Return the active goal as JSON, or None."""
         exchange = self.get(GOAL_PATH)
         return read_as(exchange.response, GOAL)[0], exchange
 
@@ -221,42 +221,42 @@ class Robot:
         return self.rest.send("DELETE", GOAL_PATH, headers=headers)
 
     def map_pose(self) -> Pose | None:
-        """Where the robot is in the frame of goals and plans, by the statement's transform."""
+        """Return where the robot is in the frame of goals and plans, by the statement's transform."""
         odometry = self.odometry()
         return self.in_map(odometry.pose) if odometry else None
 
     def in_map(self, pose: Pose) -> Pose:
-        """A pose of the odometry in the frame of goals and plans."""
+        """Return a pose of the odometry in the frame of goals and plans."""
         return pose.seen_from(Pose(*self.statement.motion.odom_to_map))
 
     def in_odometry(self, pose: Pose) -> Pose:
-        """A pose in the frame of goals and plans, in the odometry's frame."""
+        """Return a pose in the frame of goals and plans, in the odometry's frame."""
         return pose.seen_in(Pose(*self.statement.motion.odom_to_map))
 
     def in_arena(self, pose: Pose) -> bool:
-        """Whether the statement lets the robot be driven to a pose in the frame of goals."""
+        """Return whether the statement lets the robot be driven to a pose in the frame of goals."""
         arena = self.statement.motion.arena
         return arena is None or (arena[0] <= pose.x <= arena[2] and arena[1] <= pose.y <= arena[3])
 
     def near(self, measured: Velocity, wanted: Velocity, factor: float = 1.0) -> bool:
-        """Whether each component is what was wanted, within ``factor`` times the tolerance."""
+        """Return whether each component is what was wanted, within ``factor`` times the tolerance."""
         return is_near(self.limits, measured, wanted, factor)
 
     def share_of_limits(self, linear: float, angular: float) -> Velocity:
-        """A velocity ahead and turning, by shares of the limits; zero in what the robot cannot actuate."""
+        """Return a velocity ahead and turning, by shares of the limits; zero in what the robot cannot actuate."""
         return Velocity(
             linear_x=linear * self.limits.linear_m_s if self.actuated(0) else 0.0,
             angular_z=angular * self.limits.angular_rad_s if self.actuated(5) else 0.0,
         )
 
     def limit_of(self, component: int) -> float:
-        """The limit of a component by its place in Velocity, declared or not, m/s or rad/s."""
+        """Return the limit of a component by its place in Velocity, declared or not, m/s or rad/s."""
         return self.limits.linear_m_s if component < len("xyz") else self.limits.angular_rad_s
 
     def limit_declared(self, component: int) -> bool:
-        """Whether the statement names the limit of a component."""
+        """Return whether the statement names the limit of a component."""
         return self.limits.linear_declared if component < len("xyz") else self.limits.angular_declared
 
     def actuated(self, component: int) -> bool:
-        """Whether the statement says that the robot can actuate a component."""
+        """Return whether the statement says that the robot can actuate a component."""
         return Velocity._fields[component].replace("_", ".") in self.statement.motion.actuated

@@ -49,7 +49,7 @@ class OneSample:
     that goes back to the very numbers from before.
 
     Args:
-        judge: is told.
+        judge: takes the evidence.
         limits: of the robot, whose noise may be in each answer.
     """
 
@@ -74,14 +74,14 @@ class OneSample:
                 _SAMPLE,
                 not problem,
                 odd,
-                f"the odometry with the stamp {stamp[0]}.{stamp[1]:09} as it was told just before and just after",
+                f"the odometry with the stamp {stamp[0]}.{stamp[1]:09} as in the response just before and just after",
                 found=problem,
-                cause="told otherwise",
+                cause="another value",
             )
 
 
 def _numbers(message: Any) -> dict[str, float]:
-    """The numbers of pose and twist, by their places; what a robot adds to the message is not looked at."""
+    """Return the numbers of pose and twist, by their places; what a robot adds to the message is not looked at."""
     pose, twist = message["pose"]["pose"], message["twist"]["twist"]
     return {
         **{f"position.{axis}": pose["position"][axis] for axis in "xyz"},
@@ -116,7 +116,7 @@ class BesideOdometry:
     """Judges the readings of the velocity in one run, in their order.
 
     Args:
-        judge: is told.
+        judge: takes the evidence.
         limits: of the robot.
         out: how many readings were out before.
         requirement: of which the readings are.
@@ -174,7 +174,7 @@ class BesideOdometry:
             )
 
     def _neighbours(self, around: tuple[_Sample, ...]) -> bool:
-        """Whether nobody could have read a sample between these that was not read here."""
+        """Return whether no sample lies between these that was not read."""
         if not self._lapses:
             return False
         hertz = self._limits.odometry_hz
@@ -183,6 +183,6 @@ class BesideOdometry:
 
 
 def _between(velocity: Velocity, around: list[Velocity]) -> Velocity:
-    """The velocity of which each component lies between some others, and nearest to that of this one."""
+    """Return the velocity of which each component lies between some others, and nearest to that of this one."""
     ranges = [(min(some), max(some)) for some in zip(*around, strict=True)]
     return Velocity(*(max(low, min(one, high)) for one, (low, high) in zip(velocity, ranges, strict=True)))

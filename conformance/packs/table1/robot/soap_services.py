@@ -48,14 +48,14 @@ def send_delivery(
 
 
 def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Outgoing:
-    """The same as a request that is to be sent beside others."""
+    """Return the same as a request that is to be sent beside others."""
     operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
     given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
     return outgoing(publishers, request(operation, **given))
 
 
 def outgoing(service: SoapService, payload: Node) -> Outgoing:
-    """A call that is to be sent beside others."""
+    """Return a call that is to be sent beside others."""
     headers = (("Content-Type", MEDIA_TYPE), ("SOAPAction", '""'))
     return Outgoing(
         service.client, "POST", service.path, headers, envelope((require_valid_message(service, payload),)).written()
@@ -68,7 +68,7 @@ def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> 
 
 
 def declared_return(service: SoapService, operation: str) -> Element:
-    """What an operation returns, by the contract.
+    """Return what an operation returns, by the contract.
 
     Raises:
         NotPossibleError: the contract has no such operation.
@@ -80,7 +80,7 @@ def declared_return(service: SoapService, operation: str) -> Element:
 
 
 def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
-    """The ``return`` elements of a response, and what is wrong where it is none."""
+    """Return the ``return`` elements of a response, and what is wrong where it is none."""
     answer = read_exchange(exchange)
     if not answer.accepted or answer.first is None:
         return [], f"no SOAP response: {exchange.came}"
@@ -88,7 +88,7 @@ def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
 
 
 def position(subscribers: SoapService) -> tuple[float, float] | None:
-    """Where GetPose says that the robot is, in its odometry frame, m; None where it does not say.
+    """Return where GetPose says that the robot is, in its odometry frame, m; None where it does not say.
 
     Raises:
         NoAnswerError: no HTTP response came.
@@ -101,7 +101,7 @@ def position(subscribers: SoapService) -> tuple[float, float] | None:
 
 
 def known_messages(service: SoapService, operation: Operation) -> Iterator[Node]:
-    """Messages that a robot takes, likeliest first; none for operations that need none but the obvious.
+    """Yield messages that a robot takes, likeliest first; none for operations that need none but the obvious.
 
     Raises:
         NoAnswerError: no HTTP response came.

@@ -1,8 +1,8 @@
-"""One watch for many attempts that must leave a robot at rest.
+"""One watch for many actions that must leave a robot at rest.
 
-What a robot was not to take may still move it a moment later, so whoever tried it has to look for as long as the robot
-takes to settle. The looks are alike, whatever was tried: so all is tried first, one thing after another, and one watch
-follows. Only where the robot does move is each thing tried again by itself, with a watch of its own, to learn which.
+A request that the robot had to refuse may still move it a moment later, so the suite has to watch the robot for as long
+as it takes to settle. The suite does all actions first, one after another, and then watches once. Only if the robot
+moves, the suite repeats each action with a watch of its own, to learn which one moves it.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ _OFF = 2
 
 
 @dataclass(frozen=True)
-class Tried:
-    """What was tried on a robot at rest.
+class Expectation:
+    """That a robot stays at rest after an action.
 
     Attributes:
-        requirement: that it stays there.
-        expected: in words.
-        until: how long it may take to show, s of the monotonic clock.
-        goal: whether a goal that is current again is a failure as well.
-        again: tries it once more, watches, and judges.
+        requirement: its id.
+        expected: what a finding says, as a noun phrase.
+        until: when an effect of the action would have shown, s of the run's clock.
+        goal: whether a goal that is active again is a failure as well.
+        again: repeats the action, watches, and judges.
     """
 
     requirement: str
@@ -43,7 +43,7 @@ class Tried:
 
 
 class Standstill:
-    """A robot that has to stay at rest, whatever is tried.
+    """A robot that has to stay at rest.
 
     Args:
         api: its REST interface.
@@ -52,58 +52,62 @@ class Standstill:
 
     def __init__(self, api: RestInterface, clock: Clock = WALL_CLOCK) -> None:
         self._api, self._clock = api, clock
-        self._tried: list[Tried] = []
-        # What moved while something else was read.
+        self._expectations: list[Expectation] = []
+        # What moved while another check read the robot.
         self._moved: _Seen | None = None
 
-    def tried(
+    def expect(
         self, requirement: str, expected: str, again: Callable[[], None], *, seconds: float, goal: bool = False
     ) -> None:
-        """Take down that something was tried just now; see Tried. It shows within so many ``seconds`` if at all."""
-        self._tried.append(Tried(requirement, expected, self._clock.now() + seconds, goal, again))
+        """Expect that the robot stays at rest after an action just now.
+
+        The arguments are those of Expectation; an effect would show within so many ``seconds``.
+        """
+        until = self._clock.now() + seconds
+        self._expectations.append(Expectation(requirement, expected, until, goal, again))
 
     @property
     def lasts(self) -> bool:
-        """Whether something was tried, and the robot is at rest and has no goal: nothing need be done to stop it.
+        """Whether there is an expectation, and the robot is at rest without a goal, so that it need not be stopped.
 
-        To command rest, or to cancel, might end what was tried before it shows.
+        A command of rest, or a cancel, might end the effect of an action before it shows.
         """
-        if not self._tried:
+        if not self._expectations:
             return False
         robot = Robot(self._api, self._clock)
         none = robot.get(GOAL_PATH).response.status == HTTPStatus.NOT_FOUND
         return none and _stays(Drive(robot)) is not False
 
     def look(self) -> None:
-        """Look once, where something was tried that might still show: for whoever has the robot to read meanwhile."""
-        if self._moved is None and self._tried and self._clock.now() < self._until:
+        """Look once, if an effect might still show: a check that reads the robot meanwhile calls this."""
+        if self._moved is None and self._expectations and self._clock.now() < self._until:
             self._moved = self._look(Drive(Robot(self._api, self._clock)))
 
     def judge(self) -> None:
-        """Watch until the last of what was tried would have shown, and judge all of it."""
-        tried = self._tried
-        if not tried:
+        """Watch until the last effect would have shown, and judge all expectations."""
+        expectations = self._expectations
+        if not expectations:
             return
         try:
             seen = self._moved or self._watch()
         finally:
-            self._tried, self._moved = [], None
+            self._expectations, self._moved = [], None
         judge = self._api.run.judge
         if seen.found:
             before = judge.refuted()
-            for one in tried:
+            for one in expectations:
                 bring_to_rest(self._api)
                 one.again()
-            if any(judge.refuted().get(one.requirement, 0) > before.get(one.requirement, 0) for one in tried):
+            if any(judge.refuted().get(one.requirement, 0) > before.get(one.requirement, 0) for one in expectations):
                 return
-        # What moved the robot once, and not when it was tried again, is not known: any of it.
-        for one in tried:
+        # No action moved the robot when it was repeated: any of them may have done so before.
+        for one in expectations:
             judge.check(one.requirement, not seen.found, seen.exchange, one.expected, found=seen.found, cause="moves")
 
     @property
     def _until(self) -> float:
-        """When the last of what was tried would have shown, s of the monotonic clock."""
-        return max(one.until for one in self._tried)
+        """When the last effect would have shown, s of the run's clock."""
+        return max(one.until for one in self._expectations)
 
     def _watch(self) -> _Seen:
         drive = Drive(Robot(self._api, self._clock))
@@ -114,14 +118,14 @@ class Standstill:
         return _Seen(drive.trace.turns[-1].velocity_exchange, "")
 
     def _look(self, drive: Drive) -> _Seen | None:
-        """What moves, or is about to; None where nothing does."""
+        """Return what moves, or is about to; None where nothing does."""
         if _stays(drive) is False:
             turn = drive.trace.turns[-1]
-            return _Seen(turn.velocity_exchange, f"velocity {turn.velocity}")
-        if any(one.goal for one in self._tried):
+            return _Seen(turn.velocity_exchange, f"the velocity ({turn.velocity})")
+        if any(one.goal for one in self._expectations):
             active, shown = drive.robot.goal()
             if active is not None:
-                return _Seen(shown, "a goal is active again")
+                return _Seen(shown, "an active goal")
         return None
 
 

@@ -25,7 +25,7 @@ STATES: Final[dict[str, tuple[str, str, Shape]]] = {
 
 
 def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
-    """The one value that a response returns, and what is wrong where it returns none."""
+    """Return the one value that a response returns, and what is wrong where it returns none."""
     found, problem = returned(exchange)
     if problem or len(found) != 1:
         return None, problem or f"{len(found)} return elements"
@@ -48,8 +48,8 @@ def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float
         return None, exchange
     broken = ""
     if not problem:
-        broken = shape.problem(between) or restamped(between, before, after) or retold(between, before, after)
-    if broken:  # which is none that will be right a moment later
+        broken = shape.problem(between) or restamped(between, before, after) or contradiction(between, before, after)
+    if broken:  # which is not right a moment later either
         judge_difference(robot, name, broken, exchange)
     problem = problem or disagreement(before, between, after, _slack(robot))
     if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
@@ -58,7 +58,7 @@ def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float
 
 
 def restamped(message: Any, *others: Any) -> str:
-    """How a message has nearly the stamp of another: no robot samples so fast, so it is the same one told wrongly."""
+    """Return how a stamp differs by less than a sample from another message's: it is the same one, written wrongly."""
     sec, nanosec = stamp_of(message)
     for other in map(stamp_of, others):
         apart_ns = 1e9 * (sec - other[0]) + nanosec - other[1]
@@ -67,8 +67,8 @@ def restamped(message: Any, *others: Any) -> str:
     return ""
 
 
-def retold(message: Any, before: Any, after: Any) -> str:
-    """How a message contradicts another of its stamp that REST told alike before and after it."""
+def contradiction(message: Any, before: Any, after: Any) -> str:
+    """Return how a message contradicts the one with its stamp that REST gave before and after it."""
     of_one_sample = stamp_of(before) == stamp_of(message) == stamp_of(after) != (0.0, 0.0)
     if not of_one_sample or disagreement(before, after, before, _SLACK):
         return ""
@@ -76,7 +76,7 @@ def retold(message: Any, before: Any, after: Any) -> str:
 
 
 def _slack(robot: Robot) -> Slack:
-    """What a sample may lie outside those before and after it: with the noise, of which each sample has its own."""
+    """Return by how much a sample may lie outside those before and after it, as each has its own noise."""
     noise = robot.limits.noise
     return Slack(_SLACK.absolute + FARTHEST * max(msgspec.structs.astuple(noise)), _SLACK.relative)
 

@@ -74,7 +74,7 @@ def leave_at_rest(api: RestInterface) -> None:
 
 
 def _slowest(api: RestInterface) -> Velocity:
-    """The greatest velocity that counts as rest: two noisy samples of which may follow each other."""
+    """Return the greatest velocity that counts as rest: two noisy samples of which may follow each other."""
     limits = said_of(api.run).limits
     linear = limits.tolerance_linear_m_s + 3 * limits.noise.linear_m_s
     angular = limits.tolerance_angular_rad_s + 3 * limits.noise.angular_rad_s
@@ -82,7 +82,7 @@ def _slowest(api: RestInterface) -> Velocity:
 
 
 def _shows(answer: Response) -> bool:
-    """Whether an answer shows anything that may be a goal."""
+    """Return whether an answer shows anything that may be a goal."""
     text = read_json(answer.body)
     return not text.unreadable and isinstance(text.value, dict) and bool(text.value)
 
@@ -141,7 +141,7 @@ class _Stiller:
         return f"it still moves: {velocity}"
 
     def _velocity(self) -> tuple[Velocity, str]:
-        """The measured velocity, and why it cannot be told."""
+        """Return the measured velocity, and why it cannot be told."""
         read = self._ask("GET", VELOCITY, ACCEPT_JSON)
         if read is not None and read.response.status == HTTPStatus.NOT_FOUND:
             return STILL, ""  # a robot without this resource: nothing says that it moves

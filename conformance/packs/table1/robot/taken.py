@@ -22,7 +22,7 @@ from conformance.transport.exchange import Exchange
 # How a PUT is sent.
 Put = Callable[[], Exchange]
 PutGoal = Callable[[dict[str, Any]], Exchange]
-# What is done, and whether it has its effect; None where that cannot be told.
+# What is done, and whether it has its effect; None where that cannot be said.
 Act = Callable[[], bool | None]
 # So many readings at rest, each of another sample of the odometry, are no chance.
 _READINGS: Final = 3
@@ -37,7 +37,7 @@ _MOVED_RAD: Final = 0.3
 
 
 def velocity_has_effect(api: RestInterface, wanted: Velocity, put: Put, usual: Put) -> bool | None:
-    """Whether a robot at rest moves when a velocity is put that is answered as done. Leaves it at rest.
+    """Return whether a robot at rest moves when a velocity is put that is answered as done. Leaves it at rest.
 
     Args:
         api: of the robot.
@@ -55,7 +55,7 @@ def velocity_has_effect(api: RestInterface, wanted: Velocity, put: Put, usual: P
 
 
 def goal_has_effect(api: RestInterface, put: PutGoal, usual: PutGoal) -> bool | None:
-    """Whether a goal is there, or was followed, when it is put and answered as done. Leaves the robot at rest.
+    """Return whether a goal is there, or was followed, when it is put and answered as done. Leaves the robot at rest.
 
     Args:
         api: of the robot.
@@ -70,7 +70,7 @@ def goal_has_effect(api: RestInterface, put: PutGoal, usual: PutGoal) -> bool | 
 
 
 def _beside(api: RestInterface, act: Act, usual: Act) -> bool | None:
-    """Whether an act has its effect; without it the usual one has to have it, and the act once more not to have it."""
+    """Return whether an act has its effect; False only if the usual one has it, and the act twice has not."""
     found = act()
     bring_to_rest(api)
     if found is not False:
@@ -85,7 +85,7 @@ def _beside(api: RestInterface, act: Act, usual: Act) -> bool | None:
 
 
 def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
-    """PUT a velocity over and over; whether the robot is seen to move, or not though it has had the time to."""
+    """Put a velocity over and over; return whether the robot moves, or None where that cannot be said."""
     limits = robot.limits
     hold_s = certain_s(limits.hold_s)
     since = last_sent = math.inf  # from when on it holds without a gap; when it was put last
@@ -100,27 +100,27 @@ def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
         if answered > last_sent + hold_s or since == math.inf:
             since, at_rest = answered, 0  # it may have ended meanwhile, and has to be reached anew
         last_sent = sent
-        asked = robot.clock.now()
+        requested = robot.clock.now()
         velocity, _ = robot.velocity()
         if velocity is None:
             return None  # which the observers have judged
         if robot.near(velocity, wanted) or not robot.near(velocity, STILL, 2):
             return True
         settled = since + _SETTLED * limits.settle_s + robot.sample_s
-        if asked > max(settled, counted + robot.sample_s) and robot.clock.now() < sent + hold_s:
-            counted, at_rest = asked, at_rest + 1
+        if requested > max(settled, counted + robot.sample_s) and robot.clock.now() < sent + hold_s:
+            counted, at_rest = requested, at_rest + 1
             if at_rest == _READINGS:
                 return False
     return None
 
 
 def turned_goal(robot: Robot, here: Pose) -> dict[str, Any]:
-    """A goal that a robot reaches by turning where it stands."""
+    """Return a goal that a robot reaches by turning where it stands."""
     return goal_body(Pose(here.x, here.y, here.yaw + _TURN), robot.statement.motion.frame, "not acceptable")
 
 
 def _follows(robot: Robot, put: PutGoal, lasts: int = 1) -> bool | None:
-    """PUT a goal; whether it is shown, for so many readings, or the robot has moved."""
+    """Put a goal; return whether the robot shows it in so many readings, or has moved."""
     before = robot.map_pose()
     if before is None:
         return None

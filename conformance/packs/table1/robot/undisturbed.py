@@ -146,7 +146,7 @@ def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
 
 
 def arc(robot: Robot, drive: Drive, bent: Velocity) -> None:
-    """PUT the linear part, ahead and then back: the angular one has to stay.
+    """Put the linear part, ahead and then back: the angular one has to stay.
 
     Args:
         robot: with its limits.

@@ -12,7 +12,7 @@ _MOVES: Final = 1.6
 
 
 def slowest(robot: Robot) -> Velocity:
-    """A velocity ahead, and to the left, that can just be told from rest; at most half as fast as the robot can be."""
+    """Return a velocity ahead and to the left that just differs from rest, at most half of the limits."""
     limits = robot.limits
     linear = _MOVES * (limits.tolerance_linear_m_s + FARTHEST * limits.noise.linear_m_s)
     angular = _MOVES * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
@@ -23,7 +23,7 @@ def slowest(robot: Robot) -> Velocity:
 
 
 def fastest(robot: Robot, component: int) -> float:
-    """How fast a robot is driven by one component of its velocity, m/s or rad/s."""
+    """Return how fast a robot is driven by one component of its velocity, m/s or rad/s."""
     return robot.limit_of(component) * (1.0 if robot.limit_declared(component) else _UNDECLARED)
 
 
@@ -36,6 +36,6 @@ def reach(drive: Drive, velocity: Velocity) -> bool:
 
 
 def direction(robot: Robot) -> int:
-    """Ahead (1) where the arena has room for it, else back (-1)."""
+    """Return ahead (1) where the arena has room for it, else back (-1)."""
     pose = robot.map_pose()
     return 1 if pose is None or robot.in_arena(pose.ahead(robot.limits.linear_m_s)) else -1

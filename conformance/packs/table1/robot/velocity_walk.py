@@ -8,7 +8,7 @@ from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
 from conformance.packs.table1.robot.robot import STILL, Velocity
 from conformance.packs.table1.robot.walk import Walk
 
-# Of the limits: fast enough to be told from rest, slow enough to stay near.
+# Of the limits: fast enough to differ from rest, slow enough to stay near.
 _LINEAR_SHARE = 0.35
 _ANGULAR_SHARE = 0.6
 # Farther than this from where the walk began, the next way leads back, m.
@@ -17,7 +17,7 @@ _SHARES = st.floats(0.15, 1.0)
 
 
 def room_for(limits: Limits) -> float:
-    """How far from where it began a walk may take a robot, m: off its leash by one more velocity."""
+    """Return how far from where it began a walk may take a robot, m: off its leash by one more velocity."""
     return _LEASH_M + _LINEAR_SHARE * limits.linear_m_s * limits.settle_s
 
 
@@ -40,30 +40,30 @@ class VelocityMachine(RuleBasedStateMachine):
 
     @rule()
     def ask(self) -> None:
-        """Readings agree with each other at any time."""
+        """Read: readings agree with each other at any time."""
         self._walk.step(lambda: self._drive.look()[0] is not None)
 
     @rule(forward=st.booleans(), left=st.booleans(), linear=_SHARES, angular=_SHARES, which=st.sampled_from("ab2"))
     def command(self, *, forward: bool, left: bool, linear: float, angular: float, which: str) -> None:
-        """Any velocity within the limits is reached."""
+        """Command a velocity within the limits: the robot reaches it."""
         ahead = self._ahead(linear, forward=forward) if which in "a2" else 0.0
         turn = angular * _ANGULAR_SHARE * self._robot.limits.angular_rad_s * (1 if left else -1) if which in "b2" else 0
         self._walk.step(lambda: self._full(Velocity(linear_x=ahead, angular_z=turn if self._robot.actuated(5) else 0)))
 
     @rule()
     def stop(self) -> None:
-        """Zero is a velocity like others."""
+        """Command zero, a velocity like others."""
         self._walk.step(lambda: self._full(STILL))
 
     @rule(forward=st.booleans(), linear=_SHARES)
     def command_linear(self, *, forward: bool, linear: float) -> None:
-        """The linear part alone is replaced."""
+        """Command the linear part: the robot keeps the angular one."""
         self._walk.step(lambda: self._linear(self._ahead(linear, forward=forward)))
 
     @precondition(lambda self: self._wanted != STILL)
     @rule(component=st.integers(0, 5), times=st.sampled_from((1.0, -1.0)))
     def refused(self, component: int, times: float) -> None:
-        """What is refused changes nothing."""
+        """Command a velocity that is refused: nothing changes."""
         self._walk.step(lambda: self._refuse(component, times))
 
     def _ahead(self, share: float, *, forward: bool) -> float:

@@ -22,7 +22,7 @@ _NO_NEARER: Final = 0.8
 
 
 def newest(turns: Sequence[Turn], count: int = SEVERAL) -> list[Turn]:
-    """The last turn of each of the newest samples in which a velocity could be read, the oldest first."""
+    """Return the last turn of each of the newest samples in which a velocity could be read, the oldest first."""
     found: list[Turn] = []
     for turn in reversed(turns):
         if turn.velocity is None:
@@ -41,23 +41,23 @@ def _is_another(turn: Turn, later: Turn) -> bool:
 
 
 def velocities(turns: Sequence[Turn]) -> list[Velocity]:
-    """What the turns say of the velocity."""
+    """Return what the turns say of the velocity."""
     return [turn.velocity for turn in turns if turn.velocity is not None]
 
 
 def middle(readings: Sequence[Velocity]) -> Velocity:
-    """The median of each component."""
+    """Return the median of each component."""
     return Velocity(*map(median, zip(*readings, strict=True)))
 
 
 def part_of(velocity: Velocity, part: slice) -> Velocity:
-    """A velocity with zeros in the components that do not count."""
+    """Return a velocity with zeros in the components that do not count."""
     chosen = set(range(len(velocity))[part])
     return Velocity(*(value if index in chosen else 0.0 for index, value in enumerate(velocity)))
 
 
 def is_stuck(turns: Sequence[Turn], wanted: Velocity, part: slice = ALL) -> bool:
-    """Whether several readings show a velocity that comes no nearer to another one."""
+    """Return whether several readings show a velocity that comes no nearer to another one."""
     seen = velocities(turns)
     if len(seen) < SEVERAL:
         return False
@@ -71,7 +71,7 @@ def _apart(one: Velocity, other: Velocity, part: slice) -> float:
 def verdict(
     limits: Limits, turns: Sequence[Turn], wanted: Velocity, factor: float = 1.0, part: slice = ALL
 ) -> bool | None:
-    """Whether turns show a velocity: the newest does, or the median of the newest samples.
+    """Return whether turns show a velocity: the newest does, or the median of the newest samples.
 
     Returns:
         None where the newest does not and there are too few samples to say more.
@@ -90,7 +90,7 @@ def shown(
     part: slice = ALL,
     count: int = SEVERAL,
 ) -> bool | None:
-    """Whether the median of the newest samples is the velocity, within ``factor`` times the tolerance.
+    """Return whether the median of the newest samples is the velocity, within ``factor`` times the tolerance.
 
     Returns:
         None where there are too few samples.

@@ -119,9 +119,9 @@ def _put_velocities(robot: Robot, velocities: Sequence[Velocity], *, last: bool)
         return put
     until = min(put.answered + robot.settle_s, put.ends(robot.limits))
     for _ in poll(robot.clock, _VELOCITY_STEP_S, lambda: robot.clock.now() > until):
-        asked = robot.clock.now()
+        requested = robot.clock.now()
         velocity, exchange = robot.velocity()
-        put = put.read(VelocityRead(asked, robot.clock.now(), velocity, exchange))
+        put = put.read(VelocityRead(requested, robot.clock.now(), velocity, exchange))
         if put.is_unreadable or put.reached(robot.limits) is not None:
             break
     return put

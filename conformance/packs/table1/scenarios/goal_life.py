@@ -84,7 +84,7 @@ class _Player:
         await_motion(robot)
         if not self._cancel(back):
             meanwhile(robot, ID, lambda _, pose, __: self._cancel(pose))
-        standstill.tried(
+        standstill.expect(
             "safety/cancel-stays",
             "rest, and no goal, after the goal was cancelled",
             lambda: _cancel_again(robot, second),
@@ -198,7 +198,7 @@ def _judge_rest(robot: Robot) -> None:
             not moves and goal is None,
             drive.trace.turns[-1].velocity_exchange if moves else shown,
             "rest, and no goal, after the goal was cancelled",
-            found=f"velocity {seen}" if moves else "a goal is active again",
+            found=f"the velocity ({seen})" if moves else "an active goal",
             cause="does not stay",
         )
 

@@ -138,7 +138,7 @@ class _Way:
         )
 
     def look_back(self, start: Pose, before: Command | None, body: dict[str, Any]) -> None:
-        """Behind a goal that was reached: watch for the velocity from before it, plan the way back, put it again."""
+        """Watch, after a goal was reached, for the velocity from before it; request a plan back; put the goal again."""
         trace, robot = self.trace, self.robot
         if trace.undecided or not trace.ended or trace.left_m >= trace.reached_m or trace.way_m <= trace.has_to_m:
             return
@@ -146,9 +146,9 @@ class _Way:
             self._watch_for(before)
         # Away from where it was at first: a plan that always starts there is seen now.
         arrived = robot.map_pose()
-        _, plan, asked = ask(robot, start)
+        _, plan, exchange = ask(robot, start)
         if plan is not None and arrived is not None:
-            found = start_of(robot, plan, arrived, asked, lambda: ask(robot, start)[1])
+            found = start_of(robot, plan, arrived, exchange, lambda: ask(robot, start)[1])
             self.trace = replace(self.trace, start=found)
         self.trace = replace(self.trace, again=put_goal(robot, body))
         await_none(robot, 0.1)
@@ -165,5 +165,5 @@ class _Way:
         # has a goal of its own may turn for that.
         if turns and self.robot.goal()[0] is None:
             expected = "a velocity from before the goal that has ended for good"
-            drive.saw("safety/watchdog", expected, f"velocity {seen}", "taken up after a goal", holds=False)
+            drive.saw("safety/watchdog", expected, f"the velocity ({seen})", "taken up after a goal", holds=False)
         self.trace = replace(self.trace, turned=drive.trace)

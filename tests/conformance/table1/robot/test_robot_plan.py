@@ -1,28 +1,23 @@
 """A path has to begin where the robot is, and one reading of its localisation may be out."""
 
-from dataclasses import dataclass, field
-
 import pytest
 
 from conformance.packs.table1.robot.geometry import Pose, middle_of
-from conformance.packs.table1.robot.plan import Plan, judge_start
+from conformance.packs.table1.robot.plan import Plan, start_of
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Judge
 
-_ID = "rest-resources/plan-start"
 _HERE, _OUT = Pose(1.0, 2.0, 0.0), Pose(1.5, 2.5, 0.0)
 _EVIDENCE = Exchange(Request("GET", "http://robot/robot/pose/"), Response(200, (), b"", 1.0))
 
 
-@dataclass
 class Localised:
-    """A robot that tells these poses, one after another."""
+    """A robot whose localisation gives these poses, one after another."""
 
-    told: list[Pose]
-    judge: Judge = field(default_factory=lambda: Judge({_ID}))
+    def __init__(self, poses: list[Pose]) -> None:
+        self._poses = poses
 
     def map_pose(self) -> Pose:
-        return self.told.pop(0)
+        return self._poses.pop(0)
 
 
 def path(first: Pose) -> Plan:
@@ -41,8 +36,8 @@ def path(first: Pose) -> Plan:
 )
 def test_most_of_several_plans_tell(before, poses, plans, refuted):
     robot, (first, *others) = Localised(list(poses)), map(path, plans)
-    judge_start(robot, first, before, _EVIDENCE, lambda: others.pop(0))
-    assert bool(robot.judge.refuted()) is refuted
+    start = start_of(robot, first, before, _EVIDENCE, lambda: others.pop(0))
+    assert start.case.holds is not refuted
 
 
 def test_the_middle_of_several_poses_is_not_moved_by_one():

@@ -72,7 +72,7 @@ class Trial:
 
     def tried(self, standstill: Standstill, *, goal: bool = False) -> None:
         self.act()
-        standstill.tried(self.requirement, "rest", self.again, seconds=_WATCH_S, goal=goal)
+        standstill.expect(self.requirement, "rest", self.again, seconds=_WATCH_S, goal=goal)
 
     def again(self) -> None:
         self.again_at.append(time.monotonic())
@@ -181,7 +181,7 @@ def test_nobody_looks_when_what_was_tried_would_have_shown():
     with _serving(body) as api:
         standstill = Standstill(api)
         standstill.look()
-        standstill.tried(_REFUSED, "rest", lambda: None, seconds=0.0)
+        standstill.expect(_REFUSED, "rest", lambda: None, seconds=0.0)
         body.drives_at = 0.0
         standstill.look()
         assert api.client.connection.sent == 0

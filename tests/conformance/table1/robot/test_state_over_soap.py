@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.packs.table1.robot.state_over_soap import restamped, retold
+from conformance.packs.table1.robot.state_over_soap import contradiction, restamped
 
 
 def stamped(sec, nanosec):
@@ -24,8 +24,8 @@ def test_the_same_stamp_and_that_of_another_sample_are_in_order():
 
 def test_a_sample_that_rest_tells_alike_is_no_other_over_soap():
     first, second = ({**stamped(5, 100), "x": x} for x in (1.0, 1.5))
-    assert "x is 1.5 for 1.0" in retold(second, first, first)
-    assert not retold(first, first, first)
+    assert "x is 1.5 for 1.0" in contradiction(second, first, first)
+    assert not contradiction(first, first, first)
     # A pose of the moment under a stamp that is coarse, and another sample.
-    assert not retold(second, first, second)
-    assert not retold({**second, **stamped(5, 200)}, first, first)
+    assert not contradiction(second, first, second)
+    assert not contradiction({**second, **stamped(5, 200)}, first, first)

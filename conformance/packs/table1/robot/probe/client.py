@@ -80,18 +80,18 @@ class Probe:
             raise
 
     def deliveries(self) -> list[Delivery]:
-        """The DeliveryRequestMsg that came since this was asked last, in their order."""
+        """Return the DeliveryRequestMsg that came since the last call, in their order."""
         return [
             Delivery(int(code), *(float.fromhex(value) for value in values))
             for code, *values in self._ask("deliveries")["deliveries"]
         ]
 
     def velocities(self) -> list[Velocity]:
-        """The velocity commands that came since this was asked last, in their order."""
+        """Return the velocity commands that came since the last call, in their order."""
         return [Velocity(*map(float.fromhex, values)) for values in self._ask("velocities")["velocities"]]
 
     def topics(self) -> dict[str, list[str]]:
-        """The types of each topic that somebody publishes, by its full name."""
+        """Return the types of each topic that somebody publishes, by its full name."""
         topics: dict[str, list[str]] = self._ask("graph")["topics"]
         return topics
 
@@ -161,7 +161,7 @@ class RosProbe:
             self._problem = error
 
     def ready(self) -> Probe:
-        """The probe, once it sees the robot.
+        """Return the probe, once it sees the robot.
 
         Raises:
             ProbeError: no domain is given, or it cannot be used.

@@ -62,15 +62,15 @@ class ProbeNode:
         return found
 
     def deliveries(self) -> dict[str, Any]:
-        """What came on the delivery topic since this was asked last."""
+        """Return what came on the delivery topic since the last call."""
         return {"deliveries": _emptied(self._deliveries)}
 
     def velocities(self) -> dict[str, Any]:
-        """What came on the velocity topic since this was asked last."""
+        """Return what came on the velocity topic since the last call."""
         return {"velocities": _emptied(self._velocities)}
 
     def graph(self) -> dict[str, Any]:
-        """The topics that somebody publishes, with their types."""
+        """Return the topics that somebody publishes, with their types."""
         topics = self._node.get_topic_names_and_types()
         return {"topics": {name: types for name, types in topics if self._node.count_publishers(name)}}
 

@@ -50,7 +50,7 @@ _LATER_S = (2.0, 0.45)
 
 @pytest.fixture(scope="session")
 def watched() -> list[Batch]:
-    """The deliveries that were sent, of which more may come."""
+    """Return the deliveries that were sent, of which more may come."""
     return []
 
 

@@ -193,7 +193,7 @@ def _compare_goals(robot: Robot, subscribers: SoapService, judge: Judge) -> None
 
 
 def _goal_difference(robot: Robot, subscribers: SoapService) -> tuple[str | None, Exchange]:
-    """In what SOAP's goal is another than REST's; None where REST's has changed meanwhile."""
+    """Return in what SOAP's goal is another than REST's; None where REST's has changed meanwhile."""
     before, first = robot.goal()
     exchange = ask(subscribers, "GetGoal")
     found, problem = returned(exchange)
@@ -202,7 +202,7 @@ def _goal_difference(robot: Robot, subscribers: SoapService) -> tuple[str | None
     if before is not None and after is not None and before["goal_id"]["id"] == after["goal_id"]["id"]:
         between = from_element(found[0], GOAL_AND_STATUS.schema) if found else None
         broken = "" if between is None else GOAL_AND_STATUS.problem(between)
-        if broken:  # which is none that will be right a moment later
+        if broken:  # which is not right a moment later either
             robot.judge.check("equivalence/goal", False, exchange, "a complete goal, as REST gives it", found=broken)
         shown = [projected(goal, GOAL_AND_STATUS.schema) for goal in (before, after)]
         problem = problem or ("no goal" if between is None else disagreement(shown[0], between, shown[1], _SLACK))

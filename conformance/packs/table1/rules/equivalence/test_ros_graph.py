@@ -24,7 +24,7 @@ _DISCOVERED_S: Final = 10.0
 
 @pytest.fixture(name="seeing")
 def _seeing(probe: RosProbe) -> Probe:
-    """The ROS probe, which sees the robot."""
+    """Return the ROS probe, which sees the robot."""
     try:
         return probe.ready()
     except ProbeError as error:

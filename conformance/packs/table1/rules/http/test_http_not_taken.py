@@ -46,7 +46,7 @@ def test_what_is_not_acceptable_is_not_done(
     def again() -> None:
         _try_each(api, robot, robot.limits.settle_s)
 
-    standstill.tried(_ID, "rest, and no goal, after 406", again, seconds=robot.limits.settle_s, goal=True)
+    standstill.expect(_ID, "rest, and no goal, after 406", again, seconds=robot.limits.settle_s, goal=True)
     if moved:
         # By this, or by what was tried before: each is tried again by itself.
         standstill.judge()

@@ -17,7 +17,7 @@ _LEAST = 50
 
 
 def _read(rest: HttpClient, judge: Judge) -> list[Delivery] | None:
-    """The list's requests, newest first; None where there is no list, or none that can be read."""
+    """Return the list's requests, newest first; None where there is no list, or none that can be read."""
     exchange = rest.send("GET", DELIVERIES, headers=ACCEPT_JSON)
     if exchange.response.status == 404:
         pytest.skip("the robot has no list of deliveries, which it may leave out")
@@ -72,5 +72,5 @@ def test_list_of_many(api: RestInterface, rest: HttpClient, judge: Judge, effort
         missing is None and not other,
         exchange,
         "each delivery with its values, by rest",
-        found=f"not {missing}" if missing else f"one by {other}",
+        found=f"a list without {missing}" if missing else f"a delivery by {other}",
     )

@@ -168,10 +168,10 @@ def _judge_first(api: RestInterface, changes: Iterator[Call]) -> None:
 
 
 def _reader(api: RestInterface, template: str) -> Call | None:
-    """What reads a resource, where it has several formats."""
+    """Return what reads a resource, where it has several formats."""
     return next((call for call in reads(api) if call.operation.template == template and _others(call)), None)
 
 
 def _others(call: Call | None) -> list[str]:
-    """The formats of a resource besides JSON."""
+    """Return the formats of a resource besides JSON."""
     return [name for name in call.operation.formats if name != JSON] if call else []

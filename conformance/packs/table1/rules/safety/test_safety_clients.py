@@ -36,7 +36,7 @@ _TRIES: Final = 3
 def test_client_vanished(api: RestInterface, robot: Robot, standstill: Standstill) -> None:
     """A velocity of which not all octets came is none, also where those that came would make one."""
     moved = _vanish(api, Drive(robot))
-    standstill.tried(_VANISHED, _EXPECTED, lambda: _vanish_again(api, robot), seconds=robot.limits.settle_s)
+    standstill.expect(_VANISHED, _EXPECTED, lambda: _vanish_again(api, robot), seconds=robot.limits.settle_s)
     if moved:
         # By this, or by what was tried before: each is tried again by itself.
         standstill.judge()
@@ -52,7 +52,7 @@ def _vanish_again(api: RestInterface, robot: Robot) -> None:
     still, found = drive.sees(STILL, 2)
     exchange = drive.trace.turns[-1].velocity_exchange
     stays = bool(still) and not expected
-    robot.judge.check(_VANISHED, stays, exchange, expected or _EXPECTED, found=f"velocity {found}", cause="moves")
+    robot.judge.check(_VANISHED, stays, exchange, expected or _EXPECTED, found=f"the velocity ({found})", cause="moves")
     if not stays:
         bring_to_rest(api)
 
@@ -95,14 +95,14 @@ def test_half_requests(robot: Robot, rest: HttpClient, judge: Judge) -> None:
     ):
         expected = f"an answer within {patience_s:g} s while three other requests are incomplete"
         for path in (POSE, VELOCITY, POSE):
-            attempt = _asked(rest, path, patience_s)
+            attempt = _sent(rest, path, patience_s)
             answered = isinstance(attempt, Exchange)
             if not judge.check("safety/half-request", answered, attempt, expected):
                 return
 
 
-def _asked(client: HttpClient, path: str, patience_s: float) -> Attempt:
-    """What became of a GET, which is asked again when its answer does not come in time."""
+def _sent(client: HttpClient, path: str, patience_s: float) -> Attempt:
+    """Return what became of a GET, which is sent again when its response does not come in time."""
     attempt = _ask_once(client, path, patience_s)
     for _ in range(_TRIES - 1):
         if isinstance(attempt, Unanswered) and attempt.kind is NoAnswer.TIMEOUT:

@@ -39,7 +39,7 @@ def _beyond(robot: Robot) -> Iterator[Velocity]:
 def test_what_is_not_to_be_taken(robot: Robot, effort: Effort, standstill: Standstill) -> None:
     """What is beyond the limits or not to be actuated is refused, on both resources, and the robot stays at rest."""
     _try(robot, effort)
-    standstill.tried(_KEEPS, _EXPECTED, lambda: _try_again(robot, effort), seconds=robot.limits.settle_s)
+    standstill.expect(_KEEPS, _EXPECTED, lambda: _try_again(robot, effort), seconds=robot.limits.settle_s)
 
 
 def _try_again(robot: Robot, effort: Effort) -> None:
@@ -124,7 +124,7 @@ def _judge_component(robot: Robot, judge: Judge, component: int) -> None:
 
 
 def _does(robot: Robot, wanted: Velocity) -> bool:
-    """Whether the robot reaches a velocity that it took, and so can actuate it after all."""
+    """Return whether the robot reaches a velocity that it took, and so can actuate it after all."""
     for _ in poll_for(robot.clock, 0.02, robot.settle_s):
         velocity, _ = robot.velocity()
         if velocity is not None and not robot.near(velocity, STILL, 2) and robot.near(velocity, wanted):

@@ -26,7 +26,7 @@ _AGAIN_S = 0.2
 
 
 def _has(result: Any, path: str) -> bool:
-    """Whether there is a number at a path of names in what zeep returned, whatever it is wrapped in."""
+    """Return whether there is a number at a path of names in what zeep returned, whatever it is wrapped in."""
     from zeep.helpers import serialize_object  # noqa: PLC0415 - see _client
 
     return _found(serialize_object(result), path.split("."))
@@ -65,7 +65,7 @@ def _client(judge: Judge, id_: str, service: SoapService | None) -> ZeepCaller |
 
 
 def _plan(service: SoapService) -> dict[str, float]:
-    """The arguments of a plan that the robot gives to a message of our own; none where it gives none."""
+    """Return the arguments of a plan that the robot gives to a message of our own; none where it gives none."""
     operation = next((item for item in service.contract.operations if item.name == "GetPlan"), None)
     message = example(service, operation) if operation is not None else None
     return (

@@ -34,7 +34,7 @@ _LISTED_S = 1.0
 
 
 def _listed(rest: HttpClient, depot_x: float) -> int | None:
-    """How many deliveries with that depot the robot lists; None where it lists none at all."""
+    """Return how many deliveries with that depot the robot lists; None where it lists none at all."""
     deliveries, problem = read_as(rest.send("GET", DELIVERIES_PATH).response, DELIVERIES)
     if problem:
         return None
@@ -70,8 +70,8 @@ def test_misunderstood_has_no_effect(interfaces: Interfaces, judge: Judge, effor
                 id_,
                 not listed,
                 answer.exchange,
-                "a request that is answered MustUnderstand to have no effect",
-                found="it is in the robot's list of deliveries",
+                "no effect of a request that is answered MustUnderstand",
+                found="the delivery in the robot's list",
             )
 
 

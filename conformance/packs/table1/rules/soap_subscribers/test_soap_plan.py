@@ -43,7 +43,7 @@ class _Path:
 
 
 def _path(wrapper: etree._Element, expected: Element) -> tuple[_Path | None, str]:
-    """The path that an answer holds, and what is wrong with it."""
+    """Return the path that an answer holds, and what is wrong with it."""
     returned = content.content_of(wrapper, expected)
     if returned is None:
         return None, "an empty response"
@@ -61,7 +61,7 @@ def _path(wrapper: etree._Element, expected: Element) -> tuple[_Path | None, str
 
 
 def _here(soap: SoapServices, service: SoapService) -> Pose | None:
-    """Where the robot is in the frame of plans."""
+    """Return where the robot is in the frame of plans."""
     position = soap_services.position(service)
     if position is None:
         return None
@@ -69,7 +69,7 @@ def _here(soap: SoapServices, service: SoapService) -> Pose | None:
 
 
 def _targets(soap: SoapServices, here: Pose) -> Iterator[Pose]:
-    """Poses near the robot that it may reach; the last one is where it is."""
+    """Yield poses near the robot that it may reach; the last one is where it is."""
     for goal in said_of(soap.run).motion.goals:
         yield Pose(*goal)
     for reach in (1.0, 0.5):
@@ -112,7 +112,7 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
 
 
 def _told(answer: SoapResponse, expected: Element) -> tuple[_Path | None, str]:
-    """The path that an answer without a fault tells, and what is wrong with it."""
+    """Return the path that an answer without a fault tells, and what is wrong with it."""
     wrapper = answer.first if answer.accepted else None
     return (None, answer.describe()) if wrapper is None else _path(wrapper, expected)
 
@@ -133,14 +133,14 @@ def _after_refusals(subscribers: SoapService, judge: Judge, expected: Element, r
 
 
 def _problem(path: _Path, before: Pose, after: Pose, target: Pose, frame: str) -> str:
-    """What is wrong with a path; empty when nothing is."""
+    """Return what is wrong with a path; empty when nothing is."""
     first, last = path.points[0], path.points[-1]
     start = math.hypot(first[0] - before.x, first[1] - before.y)
     end = math.hypot(last[0] - target.x, last[1] - target.y)
     if start > START_OFF + before.distance(after):
         return f"it starts {start:.3f} m from the robot"
     if end > _TOLERANCE:
-        return f"it ends {end:.3f} m from the asked position"
+        return f"it ends {end:.3f} m from the position in the request"
     if path.frames != {frame}:
         return f"it is in the frame {', '.join(sorted(path.frames - {frame}))!r}, not {frame!r}"
     return ""

@@ -39,7 +39,7 @@ _IDS = dict(
 
 
 def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapResponse) -> etree._Element | None:
-    """The response wrapper of an answer without a fault, judged by its name and by the description."""
+    """Return the response wrapper of an answer without a fault, judged by its name and by the description."""
     expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
     first = answer.first if answer.fault is None else None
     if first is None or first.tag != expected:
@@ -137,7 +137,7 @@ def test_after_a_refusal(subscribers: SoapService, judge: Judge, effort: Effort)
 
 
 def _list_problem(wrapper: etree._Element, expected: Element) -> str:
-    """What is wrong with a list; empty when nothing is. An empty list is a list."""
+    """Return what is wrong with a list; empty when nothing is. An empty list is a list."""
     seen: set[tuple[str | None, ...]] = set()
     names = [local(child.tag) for child in expected.children]
     for item in content.items(wrapper, expected):
@@ -210,7 +210,7 @@ def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Ef
 
 
 def _strings(judge: Judge, service: SoapService, operation: str) -> list[tuple[str, str]]:
-    """The strings of a state, such as the names of its frames; none where it is not told."""
+    """Return the strings of a state, such as the names of its frames; none where it is not told."""
     answer = call_valid(service, Node(clark(delivery_messages.NAMESPACE, operation)))
     returned = _content(judge, _OWN, service, operation, answer) if answer.succeeded else None
     return [] if returned is None else list(content.strings(returned, declared_return(service, operation)))

@@ -60,7 +60,7 @@ def test_an_invalid_velocity_moves_nothing(api: RestInterface, robot: Robot, sta
     """A robot at rest stays there, whatever is wrong with what it is sent."""
     _try_velocities(api, robot, 0.0)
     again = partial(_try_velocities, api, robot, robot.limits.settle_s)
-    standstill.tried(_VELOCITY, "rest after invalid velocities", again, seconds=robot.limits.settle_s)
+    standstill.expect(_VELOCITY, "rest after invalid velocities", again, seconds=robot.limits.settle_s)
 
 
 def _try_velocities(api: RestInterface, robot: Robot, watched_s: float) -> None:
@@ -92,7 +92,7 @@ def _judge_still(drive: Drive, judge: Judge, sent: list[tuple[str, Exchange]]) -
     taken = [one for one in sent if one[1].response.status < 400]
     what, exchange = (taken or sent)[-1]
     return judge.check(
-        _VELOCITY, still is not False, exchange, f"rest after PUT {what}", found=f"velocity {found}", cause=what
+        _VELOCITY, still is not False, exchange, f"rest after PUT {what}", found=f"the velocity ({found})", cause=what
     )
 
 
@@ -114,7 +114,7 @@ def test_an_invalid_goal_is_not_followed(api: RestInterface, robot: Robot, judge
             goal is None,
             exchange,
             f"no goal after PUT of one with {what}",
-            found="it is the active goal",
+            found="this goal as the active one",
             cause=what,
         ):
             robot.delete_goal()
@@ -146,7 +146,7 @@ def test_an_invalid_goal_is_not_followed(api: RestInterface, robot: Robot, judge
 
 
 def _ends(robot: Robot, active: dict[str, Any], act: Callable[[], object]) -> bool:
-    """Whether it is this act that ends the goal, and not the robot: without it, the goal outlasts twice the time."""
+    """Return whether this act ends the goal: without the act, the goal lasts for twice the time."""
     put_goal(robot, active)
     began = robot.clock.now()
     act()
@@ -239,17 +239,17 @@ def _judge_unwanted(judge: Judge, answer: Exchange, *, came: bool) -> None:
     if answer.response.status == HTTPStatus.NOT_ACCEPTABLE:
         judge.check(_UNDONE, not came, answer, "no message for a delivery that is answered 406")
     elif answer.response.ok:
-        judge.check(_DONE, came, answer, "a message for a delivery that is accepted", found="none")
+        judge.check(_DONE, came, answer, "a message for a delivery that is accepted", found="no message")
 
 
 def _is_of_ours(delivery: Delivery) -> bool:
-    """Whether a delivery was made of an invalid one, of which one value was wrong."""
+    """Return whether a delivery was made of an invalid one, of which one value was wrong."""
     same = sum(value == float(sent) for value, sent in zip(delivery[1:], _CORRECT[1:], strict=True))
     return same >= len(_CORRECT) // 2
 
 
 def _invalid_soap(publishers: SoapService) -> list[Exchange]:
-    """Messages with a bad code, a value that is not finite, a missing and a second element."""
+    """Return messages with a bad code, a value that is not finite, a missing and a second element."""
     values = dict(zip(Delivery._fields, _CORRECT, strict=True))
     changes: list[dict[str, str | None]] = [
         {"message_code": "5"},
