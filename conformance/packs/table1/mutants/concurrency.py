@@ -8,12 +8,19 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from conformance.mutation.changes import Make, Where, inputs, instead, parsed, plain, posted, problem, rest, soap
+from conformance.mutation.changes import Make, Where, inputs, parsed, plain, posted, problem, rest, soap
 from conformance.mutation.messages import Change, Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.crowd import COMPANY_S, Crowd, when_crowded
 from conformance.packs.table1.mutants.paths import GOAL, TNS, VELOCITY, deliveries
 from conformance.packs.table1.mutants.soap_responses import enveloped
+
+MUTANTS = Table()
+_order = MUTANTS.of_class("soap-delivery", "soap")
+_resource = MUTANTS.of_class("rest-resources", "rest")
+_mutant = MUTANTS.of_class("http", "rest")
+_message = MUTANTS.of_class("equivalence", "both", observer=True)
+_state = MUTANTS.of_class("soap-subscribers", "soap")
 
 # How long an answer waits for another one to be mixed up with, s.
 _MEETS_S: Final = 0.05
@@ -78,8 +85,10 @@ def _exchanged(one: Response, two: Response) -> tuple[Response, Response]:
     return two, one
 
 
+@_mutant(
+    "clients-spliced", "concurrent-answers", "An answer ends as another one does that is made at the same moment."
+).through(_mixed)
 def _spliced(one: Response, two: Response) -> tuple[Response, Response]:
-    """The second client gets its own beginning and the other one's end."""
     half = len(two.body) // 2
     two.body = two.body[:half] + one.body[half:]
     return one, two
@@ -109,9 +118,12 @@ def _created(response: Response) -> Response:
     return response
 
 
+@_resource(
+    "clients-goal-doubled",
+    "goal-concurrent",
+    "A goal that two clients put at one moment is two goals: one goes on when the other is cancelled.",
+)
 class _GoalOfTwo:
-    """A goal that came while another one did is put again, under another id, when it is cancelled."""
-
     def __init__(self) -> None:
         self._crowd = Crowd()
         self._second: Request | None = None
@@ -157,128 +169,77 @@ class _Blended:
 
 _PUT_GOAL, _PUT_VELOCITY = rest("PUT", GOAL), rest("PUT", VELOCITY)
 _SMALL: Final = 32 * 1024
-_order = of_class("soap-delivery", "soap")
-_resource = of_class("rest-resources", "rest")
-_mutant = of_class("http", "rest")
-_message = of_class("equivalence", "both", observer=True)
 _EMPTY = plain(204)
 _SOAP_DELIVERY = soap("ExecuteDeliveryRequest")
 _ACCEPTED = enveloped(f'<t:ExecuteDeliveryRequestResponse xmlns:t="{TNS}"/>')
 
-MUTANTS = (
-    _mutant(
-        "clients-crossed",
-        "Two clients that ask at one moment get each other's answers.",
-        "concurrent-answers",
-        _mixed(_exchanged),
-    ),
-    _mutant(
-        "clients-crossed-seldom",
-        "One time in fifty, two clients that ask at one moment get each other's answers.",
-        "concurrent-answers",
-        _mixed(_exchanged, 50),
-    ),
-    _mutant(
-        "clients-spliced",
-        "An answer ends as another one does that is made at the same moment.",
-        "concurrent-answers",
-        _mixed(_spliced),
-    ),
-    _mutant(
-        "clients-one-buffer",
-        "Answers that are made at one moment have one body.",
-        "concurrent-answers",
-        _mixed(_repeated, 10),
-    ),
-    _mutant(
-        "http-pipelining-backwards",
-        "Of two requests that were sent at once, the second is answered first.",
-        "pipelining",
-        lambda: lambda request, forward: forward(request),
-        backwards=True,
-    ),
-    _message(
-        "clients-delivery-lost",
-        "A REST delivery that comes while another one is being answered is accepted and forgotten.",
-        "delivery-concurrent",
-        when_crowded(deliveries, lambda request, _: _EMPTY(request)),
-    ),
-    _message(
-        "clients-delivery-lost-seldom",
-        "Of the REST deliveries that come while another one is being answered, each 50th is forgotten.",
-        "delivery-concurrent",
-        when_crowded(deliveries, lambda request, _: _EMPTY(request), 50),
-    ),
-    _message(
-        "clients-delivery-doubled",
-        "A REST delivery that comes while another one is being answered is published twice.",
-        "delivery-concurrent",
-        when_crowded(deliveries, _twice),
-    ),
-    _message(
-        "clients-delivery-shared-field",
-        "Deliveries that come at one moment have one source_y.",
-        "delivery-concurrent",
-        when_crowded(deliveries, _with_another_source),
-    ),
-    _message(
-        "clients-soap-delivery-lost",
-        "A SOAP delivery that comes while another one is being answered is accepted and forgotten.",
-        "delivery-concurrent",
-        when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)),
-    ),
-    _resource(
-        "clients-goal-new-to-all",
-        "Each client that puts the same new goal at one moment is told that it is new.",
-        "goal-concurrent",
-        when_crowded(_PUT_GOAL, lambda request, forward: _created(forward(request))),
-    ),
-    _resource(
-        "clients-goal-conflict",
-        "A goal that is put while another client puts the same one is a conflict.",
-        "goal-concurrent",
-        when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2),
-    ),
-    _resource(
-        "clients-goal-doubled",
-        "A goal that two clients put at one moment is two goals: one goes on when the other is cancelled.",
-        "goal-concurrent",
-        _GoalOfTwo,
-    ),
-    _resource(
-        "clients-goal-of-two",
-        "Of goals that come at one moment, one has the pose of another.",
-        "concurrent-puts",
-        lambda: _Blended(_PUT_GOAL, "goal"),
-    ),
-    _resource(
-        "clients-velocity-lost",
-        "Of velocities that come at one moment, none is carried out.",
-        "concurrent-puts",
-        when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request)),
-    ),
-    _resource(
-        "clients-velocity-of-two",
-        "Of velocities that come at one moment, the robot turns by one and drives by another.",
-        "concurrent-puts",
-        lambda: _Blended(_PUT_VELOCITY, "angular"),
-    ),
-    _order(
-        "clients-soap-crossed",
-        "Two clients that order at one moment get each other's answers.",
-        "concurrent-answers",
-        lambda: _Mixed(posted, _exchanged, 1),
-    ),
-    of_class("soap-subscribers", "soap")(
-        "clients-soap-states-crossed",
-        "Two clients that ask at one moment get each other's answers.",
-        "concurrent-answers",
-        lambda: _Mixed(posted, _exchanged, 1),
-    ),
-    _order(
-        "soap-small-messages",
-        "A message over 32 KiB is 413.",
-        "size",
-        instead(lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")),
-    ),
+_mutant("clients-crossed", "concurrent-answers", "Two clients that ask at one moment get each other's answers.").made(
+    _mixed(_exchanged)
+)
+_mutant(
+    "clients-crossed-seldom",
+    "concurrent-answers",
+    "One time in fifty, two clients that ask at one moment get each other's answers.",
+).made(_mixed(_exchanged, 50))
+_mutant("clients-one-buffer", "concurrent-answers", "Answers that are made at one moment have one body.").made(
+    _mixed(_repeated, 10)
+)
+_mutant(
+    "http-pipelining-backwards",
+    "pipelining",
+    "Of two requests that were sent at once, the second is answered first.",
+    backwards=True,
+)(lambda request, forward: forward(request))
+_message(
+    "clients-delivery-lost",
+    "delivery-concurrent",
+    "A REST delivery that comes while another one is being answered is accepted and forgotten.",
+).made(when_crowded(deliveries, lambda request, _: _EMPTY(request)))
+_message(
+    "clients-delivery-lost-seldom",
+    "delivery-concurrent",
+    "Of the REST deliveries that come while another one is being answered, each 50th is forgotten.",
+).made(when_crowded(deliveries, lambda request, _: _EMPTY(request), 50))
+_message(
+    "clients-delivery-doubled",
+    "delivery-concurrent",
+    "A REST delivery that comes while another one is being answered is published twice.",
+).made(when_crowded(deliveries, _twice))
+_message(
+    "clients-delivery-shared-field", "delivery-concurrent", "Deliveries that come at one moment have one source_y."
+).made(when_crowded(deliveries, _with_another_source))
+_message(
+    "clients-soap-delivery-lost",
+    "delivery-concurrent",
+    "A SOAP delivery that comes while another one is being answered is accepted and forgotten.",
+).made(when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)))
+_resource(
+    "clients-goal-new-to-all",
+    "goal-concurrent",
+    "Each client that puts the same new goal at one moment is told that it is new.",
+).made(when_crowded(_PUT_GOAL, lambda request, forward: _created(forward(request))))
+_resource(
+    "clients-goal-conflict",
+    "goal-concurrent",
+    "A goal that is put while another client puts the same one is a conflict.",
+).made(when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2))
+_resource(
+    "clients-goal-of-two", "concurrent-puts", "Of goals that come at one moment, one has the pose of another."
+).made(lambda: _Blended(_PUT_GOAL, "goal"))
+_resource(
+    "clients-velocity-lost", "concurrent-puts", "Of velocities that come at one moment, none is carried out."
+).made(when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request)))
+_resource(
+    "clients-velocity-of-two",
+    "concurrent-puts",
+    "Of velocities that come at one moment, the robot turns by one and drives by another.",
+).made(lambda: _Blended(_PUT_VELOCITY, "angular"))
+_order(
+    "clients-soap-crossed", "concurrent-answers", "Two clients that order at one moment get each other's answers."
+).made(lambda: _Mixed(posted, _exchanged, 1))
+_state(
+    "clients-soap-states-crossed", "concurrent-answers", "Two clients that ask at one moment get each other's answers."
+).made(lambda: _Mixed(posted, _exchanged, 1))
+_order("soap-small-messages", "size", "A message over 32 KiB is 413.").instead(
+    lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")
 )

@@ -3,10 +3,13 @@
 import re
 from collections.abc import Callable
 
-from conformance.mutation.changes import JSON, altered, becomes, hanging_up, instead, page, plain, problem, rewritten
+from conformance.mutation.changes import JSON, becomes, hanging_up, page, plain, problem
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import deliveries
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("rest-delivery", "rest")
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NON_FINITE = re.compile(r"[+-]?(nan|inf|infinity|1e400|\d+e\d{3,})", re.IGNORECASE)
@@ -56,9 +59,8 @@ def _written(pattern: str) -> Callable[[Request], bool]:
     return where
 
 
+@_mutant("delivery-only-once", "put-repeated", "The same delivery again is 409.")
 class _OnlyOnce:
-    """The same delivery again is refused."""
-
     def __init__(self) -> None:
         self._seen: set[str] = set()
 
@@ -70,71 +72,33 @@ class _OnlyOnce:
         return forward(request)
 
 
-_mutant = of_class("rest-delivery", "rest")
-
-
-MUTANTS = (
-    _mutant("delivery-crashes", "A delivery is answered 500.", "put", altered(deliveries, becomes(500))),
-    _mutant(
-        "delivery-coffee-unknown",
-        "There is no coffee: code 4 is 404.",
-        "put",
-        instead(
-            lambda request: deliveries(request) and request.path.split("/")[_CODE] == "4",
-            problem(404, "code: 4 is not known"),
-        ),
-    ),
-    _mutant("delivery-silent", "A delivery is accepted by closing the connection.", "put", hanging_up(deliveries)),
-    _mutant(
-        "delivery-sometimes-lost",
-        "One delivery in 50 is answered 500.",
-        "put-range",
-        altered(deliveries, becomes(500), nth=50),
-    ),
-    _mutant(
-        "delivery-talks",
-        "A delivery is answered 200 with a page.",
-        "put-no-content",
-        altered(deliveries, page(200, b'{"accepted":true}', JSON)),
-    ),
-    _mutant(
-        "delivery-positive-only",
-        "Negative coordinates are refused.",
-        "put-range",
-        instead(_written(r"-.*"), problem(422, "depot_x: negative")),
-    ),
-    _mutant(
-        "delivery-no-exponents",
-        "Numbers with an exponent are refused.",
-        "put-range",
-        instead(_written(r"[+-]?[\d.]+[eE].*"), problem(422, "depot_x: no number")),
-    ),
-    _mutant(
-        "delivery-wants-no-body",
-        "A body on the delivery is refused.",
-        "put-body",
-        instead(lambda request: deliveries(request) and bool(request.body), problem(415, "a body is not expected")),
-    ),
-    _mutant("delivery-only-once", "The same delivery again is 409.", "put-repeated", _OnlyOnce),
-    _mutant(
-        "delivery-text-is-zero",
-        "Letters in place of a number count as 0.",
-        "refuses-text",
-        rewritten(deliveries, segments(lenient)),
-    ),
-    _mutant(
-        "delivery-takes-nan",
-        "NaN and Infinity are accepted.",
-        "refuses-non-finite",
-        rewritten(deliveries, segments(finite)),
-    ),
-    _mutant(
-        "delivery-takes-any-code", "Any code is accepted.", "refuses-code", rewritten(deliveries, segments(any_code))
-    ),
-    _mutant(
-        "delivery-swallows",
-        "Whatever stands in a delivery's path is accepted.",
-        "refuses-text",
-        instead(deliveries, plain(204)),
-    ),
+_mutant("delivery-crashes", "put", "A delivery is answered 500.").altered(deliveries, becomes(500))
+_mutant("delivery-coffee-unknown", "put", "There is no coffee: code 4 is 404.").instead(
+    lambda request: deliveries(request) and request.path.split("/")[_CODE] == "4", problem(404, "code: 4 is not known")
+)
+_mutant("delivery-silent", "put", "A delivery is accepted by closing the connection.").made(hanging_up(deliveries))
+_mutant("delivery-sometimes-lost", "put-range", "One delivery in 50 is answered 500.").altered(
+    deliveries, becomes(500), nth=50
+)
+_mutant("delivery-talks", "put-no-content", "A delivery is answered 200 with a page.").altered(
+    deliveries, page(200, b'{"accepted":true}', JSON)
+)
+_mutant("delivery-positive-only", "put-range", "Negative coordinates are refused.").instead(
+    _written(r"-.*"), problem(422, "depot_x: negative")
+)
+_mutant("delivery-no-exponents", "put-range", "Numbers with an exponent are refused.").instead(
+    _written(r"[+-]?[\d.]+[eE].*"), problem(422, "depot_x: no number")
+)
+_mutant("delivery-wants-no-body", "put-body", "A body on the delivery is refused.").instead(
+    lambda request: deliveries(request) and bool(request.body), problem(415, "a body is not expected")
+)
+_mutant("delivery-text-is-zero", "refuses-text", "Letters in place of a number count as 0.").rewritten(
+    deliveries, segments(lenient)
+)
+_mutant("delivery-takes-nan", "refuses-non-finite", "NaN and Infinity are accepted.").rewritten(
+    deliveries, segments(finite)
+)
+_mutant("delivery-takes-any-code", "refuses-code", "Any code is accepted.").rewritten(deliveries, segments(any_code))
+_mutant("delivery-swallows", "refuses-text", "Whatever stands in a delivery's path is accepted.").instead(
+    deliveries, plain(204)
 )

@@ -4,11 +4,14 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import Make, When, altered, header, instead, problem, rest, rewritten, success, text
+from conformance.mutation.changes import Make, When, altered, header, problem, rest, success, text
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
+from conformance.mutation.xml_trees import each, named, says, tree
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, POSE, VELOCITY
-from conformance.packs.table1.mutants.xml_trees import each, named, says, tree
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("rest-formats", "rest")
 
 _GET = rest("GET")
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
@@ -67,9 +70,7 @@ def _as_properties(response: Response) -> None:
     )
 
 
-_mutant = of_class("rest-formats", "rest")
-
-
+@_mutant("format-no-xml-input", "xml-input", "XML is not taken in PUT.")
 def _no_xml_input(request: Request, forward: Forward) -> Response:
     if _xml_put(request):
         return problem(415, f"Content-Type: {request.media_type} is not taken")(request)
@@ -92,106 +93,55 @@ def _json_problem(response: Response) -> None:
         response.put("Content-Type", "application/problem+json")
 
 
-MUTANTS = (
-    _mutant(
-        "format-xml-by-default", "Without Accept, the answer is XML.", "json-default", rewritten(_GET, _any_is_xml)
-    ),
-    _mutant("format-xml-broken", "XML is not closed.", "xml", _told(text(r"</\w+>\s*$", ""), _XML)),
-    _mutant(
-        "format-xml-as-html",
-        "XML comes as text/html.",
-        "xml",
-        _told(header("Content-Type", "text/html; charset=utf-8"), _XML),
-    ),
-    _mutant(
-        "format-xml-item-missing", "XML lacks the last item of an array.", "same-values", _told(tree(_shortened), _XML)
-    ),
-    _mutant(
-        "format-xml-root",
-        "The root of XML is always <response>.",
-        "xml-root",
-        _told(tree(lambda root: setattr(root, "tag", "response")), _XML),
-    ),
-    _mutant("format-text-unreadable", "Text is no YAML.", "text", _told(_as_properties, _TEXT)),
-    _mutant(
-        "format-text-as-octets",
-        "Text comes as application/octet-stream.",
-        "text",
-        _told(header("Content-Type", "application/octet-stream"), _TEXT),
-    ),
-    _mutant("format-xml-rounded", "XML rounds to one digit.", "same-values", _told(tree(_rounded), _XML)),
-    _mutant(
-        "format-text-rounded",
-        "Text rounds numbers down.",
-        "same-values",
-        altered(rest("GET", POSE), text(r"0\.0\d+", "0.0"), _TEXT),
-    ),
-    _mutant(
-        "format-text-without-frame",
-        "Text leaves child_frame_id out.",
-        "same-values",
-        altered(rest("GET", POSE), text(r"child_frame_id:[^\n]*\n", ""), _TEXT),
-    ),
-    _mutant(
-        "format-q-ignored",
-        "Quality values are ignored.",
-        "q-values",
-        rewritten(_GET, _accept(lambda given: re.sub(r"\s*;\s*q=0?\.[0-9]+", "", given))),
-    ),
-    _mutant(
-        "format-wildcard-wins",
-        "A wildcard wins over a specific range.",
-        "specific-range",
-        rewritten(
-            _GET, _accept(lambda given: "*/*" if re.search(r"\*/\*(?!\s*;\s*q=0(\.0*)?\s*(,|$))", given) else given)
-        ),
-    ),
-    _mutant("format-no-vary", "Answers carry no Vary.", "vary", _told(header("Vary", None))),
-    _mutant("format-vary-sometimes", "XML answers carry no Vary.", "vary", _told(header("Vary", None), _XML)),
-    _mutant(
-        "format-charset-wrong",
-        "XML and text in UTF-8 are said to be UTF-16.",
-        "charset",
-        _told(lambda answer: answer.put("Content-Type", f"{answer.media_type}; charset=utf-16")),
-    ),
-    _mutant(
-        "format-named-twice",
-        "Answers name two media types, each in a field of its own.",
-        "http/field-once",
-        _told(lambda answer: answer.fields.append(("Content-Type", "text/html"))),
-    ),
-    _mutant(
-        "format-large-xml",
-        "More than 32 KiB of XML are 413.",
-        "xml-input",
-        instead(lambda request: _xml_put(request) and len(request.body) > _SMALL, problem(413, "too large")),
-    ),
-    _mutant(
-        "format-xml-id-lost", "A goal that comes as XML gets another id.", "xml-input", rewritten(_xml_put, _no_id)
-    ),
-    _mutant(
-        "format-text-unquoted",
-        "An id in plain text is never quoted, whatever YAML makes of it then.",
-        "text-quoted",
-        _told(text(r"(?m)^(\s*id: )['\"]([^'\"\\]*)['\"]", r"\1\2"), _TEXT),
-    ),
-    _mutant(
-        "format-xml-whole-seconds",
-        "The pose's stamp in XML has no nanoseconds.",
-        "same-values",
-        altered(rest("GET", POSE), tree(each("nanosec", says("0"))), _XML),
-    ),
-    _mutant("format-no-xml-input", "XML is not taken in PUT.", "xml-input", lambda: _no_xml_input),
-    _mutant(
-        "format-problems-in-json",
-        "Errors are JSON, although XML was asked for.",
-        "problem-xml",
-        altered(_GET, _json_problem, lambda response: response.status >= 400),
-    ),
-    _mutant(
-        "format-problems-of-input-in-json",
-        "Errors of what is put are JSON, although XML was asked for.",
-        "problem-xml",
-        altered(_PUT, _json_problem, lambda response: response.status >= 400),
-    ),
+_mutant("format-xml-by-default", "json-default", "Without Accept, the answer is XML.").rewritten(_GET, _any_is_xml)
+_mutant("format-xml-broken", "xml", "XML is not closed.").altered(_GET, text(r"</\w+>\s*$", ""), _XML)
+_mutant("format-xml-as-html", "xml", "XML comes as text/html.").altered(
+    _GET, header("Content-Type", "text/html; charset=utf-8"), _XML
 )
+_mutant("format-xml-item-missing", "same-values", "XML lacks the last item of an array.").altered(
+    _GET, tree(_shortened), _XML
+)
+_mutant("format-xml-root", "xml-root", "The root of XML is always <response>.").altered(
+    _GET, tree(lambda root: setattr(root, "tag", "response")), _XML
+)
+_mutant("format-text-unreadable", "text", "Text is no YAML.").altered(_GET, _as_properties, _TEXT)
+_mutant("format-text-as-octets", "text", "Text comes as application/octet-stream.").altered(
+    _GET, header("Content-Type", "application/octet-stream"), _TEXT
+)
+_mutant("format-xml-rounded", "same-values", "XML rounds to one digit.").altered(_GET, tree(_rounded), _XML)
+_mutant("format-text-rounded", "same-values", "Text rounds numbers down.").altered(
+    rest("GET", POSE), text(r"0\.0\d+", "0.0"), _TEXT
+)
+_mutant("format-text-without-frame", "same-values", "Text leaves child_frame_id out.").altered(
+    rest("GET", POSE), text(r"child_frame_id:[^\n]*\n", ""), _TEXT
+)
+_mutant("format-q-ignored", "q-values", "Quality values are ignored.").rewritten(
+    _GET, _accept(lambda given: re.sub(r"\s*;\s*q=0?\.[0-9]+", "", given))
+)
+_mutant("format-wildcard-wins", "specific-range", "A wildcard wins over a specific range.").rewritten(
+    _GET, _accept(lambda given: "*/*" if re.search(r"\*/\*(?!\s*;\s*q=0(\.0*)?\s*(,|$))", given) else given)
+)
+_mutant("format-no-vary", "vary", "Answers carry no Vary.").altered(_GET, header("Vary", None))
+_mutant("format-vary-sometimes", "vary", "XML answers carry no Vary.").altered(_GET, header("Vary", None), _XML)
+_mutant("format-charset-wrong", "charset", "XML and text in UTF-8 are said to be UTF-16.").altered(
+    _GET, lambda answer: answer.put("Content-Type", f"{answer.media_type}; charset=utf-16")
+)
+_mutant("format-named-twice", "http/field-once", "Answers name two media types, each in a field of its own.").altered(
+    _GET, lambda answer: answer.fields.append(("Content-Type", "text/html"))
+)
+_mutant("format-large-xml", "xml-input", "More than 32 KiB of XML are 413.").instead(
+    lambda request: _xml_put(request) and len(request.body) > _SMALL, problem(413, "too large")
+)
+_mutant("format-xml-id-lost", "xml-input", "A goal that comes as XML gets another id.").rewritten(_xml_put, _no_id)
+_mutant(
+    "format-text-unquoted", "text-quoted", "An id in plain text is never quoted, whatever YAML makes of it then."
+).altered(_GET, text(r"(?m)^(\s*id: )['\"]([^'\"\\]*)['\"]", r"\1\2"), _TEXT)
+_mutant("format-xml-whole-seconds", "same-values", "The pose's stamp in XML has no nanoseconds.").xml(
+    rest("GET", POSE), each("nanosec", says("0")), _XML
+)
+_mutant("format-problems-in-json", "problem-xml", "Errors are JSON, although XML was asked for.").altered(
+    _GET, _json_problem, lambda response: response.status >= 400
+)
+_mutant(
+    "format-problems-of-input-in-json", "problem-xml", "Errors of what is put are JSON, although XML was asked for."
+).altered(_PUT, _json_problem, lambda response: response.status >= 400)

@@ -11,20 +11,18 @@ from conformance.mutation.changes import (
     becomes,
     guarded,
     inputs,
-    instead,
     page,
     parsed,
     plain,
     problem,
     rest,
-    rewritten,
     status,
     success,
     unwanted,
     values,
 )
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.goal_memory import (
     Abandoned,
     Lingering,
@@ -39,6 +37,9 @@ from conformance.packs.table1.mutants.goal_memory import (
 )
 from conformance.packs.table1.mutants.paths import GOAL
 
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("rest-resources", "rest")
+
 _AT, _GET, _PUT, _DELETE = rest("", GOAL), rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 
 
@@ -47,6 +48,7 @@ def _told(edit: Callable[[Any], Any]) -> Make:
     return altered(_GET, values(edit))
 
 
+@_mutant("goal-get-swapped", "goal-get", "GET gives a goal with x and y exchanged.").through(_told)
 def _swap(goal: Any) -> None:
     at = position(goal)
     at["x"], at["y"] = at["y"], at["x"]
@@ -120,15 +122,14 @@ def _off_by(least: float, most: float) -> Callable[[Request], bool]:
     return where
 
 
-_mutant = of_class("rest-resources", "rest")
-
-
+@_mutant("goal-delete-none-conflict", "goal-delete-none-success", "DELETE without a goal is 409.")
 def _delete_conflict(request: Request, forward: Forward) -> Response:
     if _DELETE(request) and active(forward, request) is None:
         return problem(409, "there is no goal")(request)
     return forward(request)
 
 
+@_mutant("goal-beside", "goal-drives", "The robot stops 80 cm beside the goal, and shows the goal that it was given.")
 def _beside(request: Request, forward: Forward) -> Response:
     if not _AT(request):
         return forward(request)
@@ -141,155 +142,79 @@ def _beside(request: Request, forward: Forward) -> Response:
     return response
 
 
-MUTANTS = (
-    _mutant(
-        "goal-none-empty",
-        "Without a goal, GET is 200 with null.",
-        "goal-none",
-        altered(_GET, page(200, b"null", JSON), status(404)),
-    ),
-    _mutant(
-        "goal-none-no-content", "Without a goal, GET is 204.", "goal-none", altered(_GET, becomes(204), status(404))
-    ),
-    _mutant("goal-put-ok", "PUT of a new goal is 200.", "goal-put", altered(_PUT, becomes(200), status(201, 202))),
-    _mutant("goal-get-swapped", "GET gives a goal with x and y exchanged.", "goal-get", _told(_swap)),
-    _mutant(
-        "goal-get-frame",
-        "GET gives a goal in another frame.",
-        "goal-get",
-        _told(lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2")),
-    ),
-    _mutant("goal-resumed", "A displaced goal is driven to after the one in its place.", "goal-drives", Resumed),
-    _mutant("goal-get-stale", "GET gives the goal before the active one.", "goal-preempt", Previous),
-    _mutant(
-        "goal-get-other-id",
-        "GET gives the goal under another id.",
-        "goal-get",
-        _told(lambda goal: goal["goal_id"].update(id="goal-1")),
-    ),
-    _mutant(
-        "goal-without-status",
-        "The active goal has no status.",
-        "goal-status",
-        _told(lambda goal: goal.pop("status") and None),
-    ),
-    _mutant(
-        "goal-status-succeeded",
-        "The active goal has status 4, succeeded.",
-        "goal-status",
-        _told(lambda goal: goal["status"].update(code=4)),
-    ),
-    _mutant(
-        "goal-wants-id",
-        "A goal without goal_id is refused.",
-        "goal-fills-in",
-        instead(_without_id, problem(422, "goal_id: missing")),
-    ),
-    _mutant(
-        "goal-empty-id",
-        "A goal without goal_id gets an empty one.",
-        "goal-fills-in",
-        _renamed(lambda id_: "" if len(id_) >= 32 else id_),
-    ),
-    _mutant("goal-id-cut", "Ids are cut after 32 characters.", "goal-id", _renamed(lambda id_: id_[:32])),
-    _mutant(
-        "goal-id-ascii",
-        "Ids come back in lower case.",
-        "goal-id",
-        _renamed(lambda id_: id_.lower().encode("ascii", "replace").decode()),
-    ),
-    _mutant(
-        "goal-repeat-refused",
-        "The same goal again is refused with 409.",
-        "goal-repeat",
-        _when_active(problem(409, "goal_id.id: there already"), same=True, other_pose=False),
-    ),
-    _mutant(
-        "goal-repeat-created",
-        "The same goal again is 201.",
-        "goal-repeat",
-        _when_active(plain(201), same=True, other_pose=False),
-    ),
-    _mutant(
-        "goal-unwanted-lost",
-        "A goal is answered 202 and forgotten where the client accepts no format of the answer.",
-        "goal-get",
-        instead(unwanted(_PUT), plain(202)),
-    ),
-    _mutant(
-        "goal-conflict-ignored",
-        "The same id with another pose is answered 200.",
-        "goal-conflict",
-        _when_active(plain(204), same=True, other_pose=True),
-    ),
-    _mutant(
-        "goal-first-wins",
-        "Another goal is refused with 409 while one is active.",
-        "goal-preempt",
-        _when_active(problem(409, "a goal is active"), same=False),
-    ),
-    _mutant("goal-delete-ignored", "DELETE is 204 and cancels nothing.", "goal-delete", instead(_DELETE, plain(204))),
-    _mutant(
-        "goal-delete-for-xml",
-        "DELETE by a client that would rather have XML is 204 and cancels nothing.",
-        "goal-delete",
-        instead(lambda request: _DELETE(request) and "xml" in (request.field("Accept") or ""), plain(204)),
-    ),
-    _mutant(
-        "goal-delete-conflict",
-        "DELETE of a goal cancels it, and is 409.",
-        "goal-delete",
-        altered(_DELETE, becomes(409), success),
-    ),
-    _mutant(
-        "goal-delete-none-fine",
-        "DELETE without a goal is 204.",
-        "goal-delete-none",
-        altered(_DELETE, becomes(204), status(404)),
-    ),
-    _mutant(
-        "goal-delete-none-conflict",
-        "DELETE without a goal is 409.",
-        "goal-delete-none-success",
-        lambda: _delete_conflict,
-    ),
-    _mutant("goal-lingers", "A goal that has ended is still shown.", "goal-ended", Lingering),
-    _mutant("goal-id-only-once", "The id of a goal that has ended is refused.", "goal-id-again", OnlyOnce),
-    _mutant("goal-abandoned", "The robot gives up on its way.", "goal-drives", Abandoned),
-    _mutant(
-        "goal-beside",
-        "The robot stops 80 cm beside the goal, and shows the goal that it was given.",
-        "goal-drives",
-        lambda: _beside,
-    ),
-    _mutant(
-        "goal-unreachable-forever",
-        "A goal far outside the map is accepted and stays active.",
-        "goal-unreachable",
-        Unreachable,
-    ),
-    _mutant(
-        "goal-frame-ignored",
-        "A goal's frame is not looked at.",
-        "goal-frame",
-        rewritten(_PUT, inputs(_guarded(_known_frame))),
-    ),
-    _mutant(
-        "goal-quaternion-nearly",
-        "A quaternion that is off by less than a hundredth is made a unit one.",
-        "goal-quaternion",
-        rewritten(_off_by(2e-3, 9.5e-3), inputs(_guarded(_unit))),
-    ),
-    _mutant(
-        "goal-quaternion-exact",
-        "A quaternion that is off by more than a rounding error is refused.",
-        "goal-quaternion-taken",
-        instead(_off_by(1e-5, 1.0), problem(422, "goal.target_pose.pose.orientation: no unit quaternion")),
-    ),
-    _mutant(
-        "goal-quaternion-normalised",
-        "A quaternion of another length is made a unit one.",
-        "goal-quaternion",
-        rewritten(_PUT, inputs(_guarded(_unit))),
-    ),
+_mutant("goal-none-empty", "goal-none", "Without a goal, GET is 200 with null.").altered(
+    _GET, page(200, b"null", JSON), status(404)
 )
+_mutant("goal-none-no-content", "goal-none", "Without a goal, GET is 204.").altered(_GET, becomes(204), status(404))
+_mutant("goal-put-ok", "goal-put", "PUT of a new goal is 200.").altered(_PUT, becomes(200), status(201, 202))
+_mutant("goal-get-frame", "goal-get", "GET gives a goal in another frame.").json(
+    _GET, lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2")
+)
+_mutant("goal-resumed", "goal-drives", "A displaced goal is driven to after the one in its place.").made(Resumed)
+_mutant("goal-get-stale", "goal-preempt", "GET gives the goal before the active one.").made(Previous)
+_mutant("goal-get-other-id", "goal-get", "GET gives the goal under another id.").json(
+    _GET, lambda goal: goal["goal_id"].update(id="goal-1")
+)
+_mutant("goal-without-status", "goal-status", "The active goal has no status.").json(
+    _GET, lambda goal: goal.pop("status") and None
+)
+_mutant("goal-status-succeeded", "goal-status", "The active goal has status 4, succeeded.").json(
+    _GET, lambda goal: goal["status"].update(code=4)
+)
+_mutant("goal-wants-id", "goal-fills-in", "A goal without goal_id is refused.").instead(
+    _without_id, problem(422, "goal_id: missing")
+)
+_mutant("goal-empty-id", "goal-fills-in", "A goal without goal_id gets an empty one.").made(
+    _renamed(lambda id_: "" if len(id_) >= 32 else id_)
+)
+_mutant("goal-id-cut", "goal-id", "Ids are cut after 32 characters.").made(_renamed(lambda id_: id_[:32]))
+_mutant("goal-id-ascii", "goal-id", "Ids come back in lower case.").made(
+    _renamed(lambda id_: id_.lower().encode("ascii", "replace").decode())
+)
+_mutant("goal-repeat-refused", "goal-repeat", "The same goal again is refused with 409.").made(
+    _when_active(problem(409, "goal_id.id: there already"), same=True, other_pose=False)
+)
+_mutant("goal-repeat-created", "goal-repeat", "The same goal again is 201.").made(
+    _when_active(plain(201), same=True, other_pose=False)
+)
+_mutant(
+    "goal-unwanted-lost",
+    "goal-get",
+    "A goal is answered 202 and forgotten where the client accepts no format of the answer.",
+).instead(unwanted(_PUT), plain(202))
+_mutant("goal-conflict-ignored", "goal-conflict", "The same id with another pose is answered 200.").made(
+    _when_active(plain(204), same=True, other_pose=True)
+)
+_mutant("goal-first-wins", "goal-preempt", "Another goal is refused with 409 while one is active.").made(
+    _when_active(problem(409, "a goal is active"), same=False)
+)
+_mutant("goal-delete-ignored", "goal-delete", "DELETE is 204 and cancels nothing.").instead(_DELETE, plain(204))
+_mutant(
+    "goal-delete-for-xml", "goal-delete", "DELETE by a client that would rather have XML is 204 and cancels nothing."
+).instead(lambda request: _DELETE(request) and "xml" in (request.field("Accept") or ""), plain(204))
+_mutant("goal-delete-conflict", "goal-delete", "DELETE of a goal cancels it, and is 409.").altered(
+    _DELETE, becomes(409), success
+)
+_mutant("goal-delete-none-fine", "goal-delete-none", "DELETE without a goal is 204.").altered(
+    _DELETE, becomes(204), status(404)
+)
+_mutant("goal-lingers", "goal-ended", "A goal that has ended is still shown.").made(Lingering)
+_mutant("goal-id-only-once", "goal-id-again", "The id of a goal that has ended is refused.").made(OnlyOnce)
+_mutant("goal-abandoned", "goal-drives", "The robot gives up on its way.").made(Abandoned)
+_mutant(
+    "goal-unreachable-forever", "goal-unreachable", "A goal far outside the map is accepted and stays active."
+).made(Unreachable)
+_mutant("goal-frame-ignored", "goal-frame", "A goal's frame is not looked at.").rewritten(
+    _PUT, inputs(_guarded(_known_frame))
+)
+_mutant(
+    "goal-quaternion-nearly", "goal-quaternion", "A quaternion that is off by less than a hundredth is made a unit one."
+).rewritten(_off_by(2e-3, 9.5e-3), inputs(_guarded(_unit)))
+_mutant(
+    "goal-quaternion-exact",
+    "goal-quaternion-taken",
+    "A quaternion that is off by more than a rounding error is refused.",
+).instead(_off_by(1e-5, 1.0), problem(422, "goal.target_pose.pose.orientation: no unit quaternion"))
+_mutant(
+    "goal-quaternion-normalised", "goal-quaternion", "A quaternion of another length is made a unit one."
+).rewritten(_PUT, inputs(_guarded(_unit)))

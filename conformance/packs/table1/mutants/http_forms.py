@@ -4,10 +4,13 @@ import re
 import threading
 from collections.abc import Callable
 
-from conformance.mutation.changes import altered, anything, becomes, header, instead, plain, problem, rest, rewritten
+from conformance.mutation.changes import anything, becomes, header, plain, problem, rest, rewritten
 from conformance.mutation.messages import Change, Forward, Request, Response, unchanged
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import deliveries
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("http", "rest")
 
 _HEAD = rest("HEAD")
 _CUT = 1024
@@ -65,16 +68,14 @@ def _conditional(name: str) -> Callable[[Request], bool]:
 
 _chunked = _having(lambda request: request.field("Transfer-Encoding") is not None)
 _absolute = _having(lambda request: not request.target.startswith("/"))
-_mutant = of_class("http", "rest")
 
 
 def _shortened(request: Request) -> None:
     request.body = request.body[:_CUT]
 
 
+@_mutant("http-hundred-requests", "many-requests", "On one connection a hundred requests are answered.")
 class _Hundred:
-    """What comes after a hundred requests on one connection, which has a thread of its own, is 400."""
-
     def __init__(self) -> None:
         self._connection = threading.local()
 
@@ -86,8 +87,8 @@ class _Hundred:
         return forward(request)
 
 
+@_mutant("http-stays-open", "close", "Connection: close is not heeded.")
 def _kept(request: Request, forward: Forward) -> Response:
-    """Nobody, the proxy neither, sees that the client asks for the end of the connection."""
     if request.side == "rest":
         request.drop("Connection")
     return forward(request)
@@ -99,153 +100,77 @@ def _in_chunks(response: Response) -> None:
     response.raw = head.encode() + b"%x\r\n%b\r\n0\r\n\r\n" % (len(response.body), response.body)
 
 
-MUTANTS = (
-    _mutant(
-        "http-no-chunk-extensions",
-        "A chunk with an extension is 400.",
-        "chunk-forms",
-        instead(_came(rb"\r\n[0-9a-f]+;[^\r]*\r\n"), problem(400, "no chunk size")),
-    ),
-    _mutant(
-        "http-no-trailers",
-        "Trailer fields are 400.",
-        "chunk-forms",
-        instead(_came(rb"\r\n0\r\n[^\r]"), problem(400, "no end of the chunks")),
-    ),
-    _mutant(
-        "http-expectation-failed",
-        "Expect: 100-continue is 417.",
-        "expect-continue",
-        instead(_came(rb"(?i)\r\nexpect: *100"), problem(417, "no")),
-    ),
-    _mutant(
-        "http-one-segment",
-        "A head that does not come in one piece is 400.",
-        "octet-stream",
-        instead(_having(lambda request: b"\r\n\r\n" not in request.came[0]), problem(400, "no end of the head")),
-    ),
-    _mutant(
-        "http-names-in-lower-case",
-        "A field whose name is not written as usual is not seen.",
-        "field-forms",
-        _forgetting(_came(rb"\r\n(?:accept|ACCEPT|aCCept):"), "Accept"),
-    ),
-    _mutant(
-        "http-one-blank",
-        "A field without one blank behind its colon is not seen.",
-        "field-forms",
-        _forgetting(_came(rb"\r\n[aA][cC]+ept:(?! [^ ])"), "Accept"),
-    ),
-    _mutant(
-        "http-first-line",
-        "Of several Accept lines the first one counts.",
-        "field-lines",
-        rewritten(_having(lambda request: request.field("Accept") is not None), _first_line),
-    ),
-    _mutant(
-        "http-last-line",
-        "Of several Accept lines the last one counts.",
-        "field-lines",
-        rewritten(_having(lambda request: request.field("Accept") is not None), _last_line),
-    ),
-    _mutant(
-        "http-never-modified",
-        "Whoever has any entity tag is told 304.",
-        "preconditions",
-        instead(_conditional("If-None-Match"), plain(304)),
-    ),
-    _mutant(
-        "http-never-modified-since",
-        "Whoever has any date is told 304.",
-        "preconditions",
-        instead(_conditional("If-Modified-Since"), plain(304)),
-    ),
-    _mutant("http-part-of-all", "A part is 206 with all of it.", "range", altered(_conditional("Range"), becomes(206))),
-    _mutant(
-        "http-no-charset-in-accept",
-        "A format with a charset in Accept is 406.",
-        "accept-parameters",
-        instead(
-            _having(lambda request: "charset" in (request.field("Accept") or "").lower()), problem(406, "not that")
-        ),
-    ),
-    _mutant("http-stays-open", "Connection: close is not heeded.", "close", lambda: _kept),
-    _mutant(
-        "http-old-client-chunks",
-        "A client of HTTP/1.0 is answered in chunks.",
-        "old-client",
-        altered(_having(lambda request: request.version == "HTTP/1.0"), _in_chunks),
-    ),
-    _mutant("http-hundred-requests", "On one connection a hundred requests are answered.", "many-requests", _Hundred),
-    _mutant(
-        "http-pipelining-forgotten",
-        "Of requests that were sent at once, the first alone is answered, and the connection stays open.",
-        "pipelining",
-        lambda: unchanged,
-        forgetful=True,
-    ),
-    _mutant(
-        "http-head-of-what-cannot-be-read",
-        "HEAD of a delivery is answered 200, though GET is 405.",
-        "method-not-allowed",
-        instead(_having(lambda request: _HEAD(request) and deliveries(request.copy(method="PUT"))), plain(200)),
-    ),
-    _mutant(
-        "http-no-chunks", "Chunked content is 411.", "chunked", instead(_chunked, problem(411, "a length, please"))
-    ),
-    _mutant("http-few-chunks", "Of chunked content, 1 KiB is read.", "chunked", rewritten(_chunked, _shortened)),
-    _mutant(
-        "http-no-absolute", "A target in absolute form is 400.", "absolute-form", instead(_absolute, problem(400, ""))
-    ),
-    _mutant(
-        "http-absolute-unknown",
-        "A target in absolute form is 404.",
-        "absolute-form",
-        instead(_absolute, problem(404, "")),
-    ),
-    _mutant(
-        "http-type-case",
-        "A media type with a capital letter is 415.",
-        "media-type-case",
-        instead(_upper("Content-Type"), problem(415, "application/json, please")),
-    ),
-    _mutant(
-        "http-accept-case",
-        "A media type with a capital letter is not acceptable.",
-        "media-type-case",
-        instead(_upper("Accept"), problem(406, "application/json is what there is")),
-    ),
-    _mutant(
-        "http-short-targets",
-        "A target over 4 KiB is 414.",
-        "target-length",
-        instead(_having(lambda request: len(request.target) > _MUCH), problem(414, "too long")),
-    ),
-    _mutant(
-        "http-head-empty", "HEAD says Content-Length: 0.", "head-length", altered(_HEAD, header("Content-Length", "0"))
-    ),
-    _mutant(
-        "http-head-length-of-error",
-        "HEAD says a Content-Length of its own.",
-        "head-length",
-        altered(_HEAD, header("Content-Length", "31"), anything),
-    ),
-    _mutant(
-        "json-no-exponents",
-        "A number in JSON with an exponent is 422.",
-        "json-numbers",
-        instead(_written(rb"\d[eE][+-]?\d"), problem(422, "a number, please")),
-    ),
-    _mutant(
-        "json-no-negative-zero",
-        "A zero with a sign is 422.",
-        "json-numbers",
-        instead(_written(rb"-0(?![.\d])"), problem(422, "a number, please")),
-    ),
-    _mutant(
-        "json-small-integers",
-        "Integers of ten digits are 422.",
-        "json-integers",
-        instead(_written(rb"[:\s]-?214748364[78]\b"), problem(422, "sec: too large")),
-    ),
+_mutant("http-no-chunk-extensions", "chunk-forms", "A chunk with an extension is 400.").instead(
+    _came(rb"\r\n[0-9a-f]+;[^\r]*\r\n"), problem(400, "no chunk size")
+)
+_mutant("http-no-trailers", "chunk-forms", "Trailer fields are 400.").instead(
+    _came(rb"\r\n0\r\n[^\r]"), problem(400, "no end of the chunks")
+)
+_mutant("http-expectation-failed", "expect-continue", "Expect: 100-continue is 417.").instead(
+    _came(rb"(?i)\r\nexpect: *100"), problem(417, "no")
+)
+_mutant("http-one-segment", "octet-stream", "A head that does not come in one piece is 400.").instead(
+    _having(lambda request: b"\r\n\r\n" not in request.came[0]), problem(400, "no end of the head")
+)
+_mutant("http-names-in-lower-case", "field-forms", "A field whose name is not written as usual is not seen.").made(
+    _forgetting(_came(rb"\r\n(?:accept|ACCEPT|aCCept):"), "Accept")
+)
+_mutant("http-one-blank", "field-forms", "A field without one blank behind its colon is not seen.").made(
+    _forgetting(_came(rb"\r\n[aA][cC]+ept:(?! [^ ])"), "Accept")
+)
+_mutant("http-first-line", "field-lines", "Of several Accept lines the first one counts.").rewritten(
+    _having(lambda request: request.field("Accept") is not None), _first_line
+)
+_mutant("http-last-line", "field-lines", "Of several Accept lines the last one counts.").rewritten(
+    _having(lambda request: request.field("Accept") is not None), _last_line
+)
+_mutant("http-never-modified", "preconditions", "Whoever has any entity tag is told 304.").instead(
+    _conditional("If-None-Match"), plain(304)
+)
+_mutant("http-never-modified-since", "preconditions", "Whoever has any date is told 304.").instead(
+    _conditional("If-Modified-Since"), plain(304)
+)
+_mutant("http-part-of-all", "range", "A part is 206 with all of it.").altered(_conditional("Range"), becomes(206))
+_mutant("http-no-charset-in-accept", "accept-parameters", "A format with a charset in Accept is 406.").instead(
+    _having(lambda request: "charset" in (request.field("Accept") or "").lower()), problem(406, "not that")
+)
+_mutant("http-old-client-chunks", "old-client", "A client of HTTP/1.0 is answered in chunks.").altered(
+    _having(lambda request: request.version == "HTTP/1.0"), _in_chunks
+)
+_mutant(
+    "http-pipelining-forgotten",
+    "pipelining",
+    "Of requests that were sent at once, the first alone is answered, and the connection stays open.",
+    forgetful=True,
+)(unchanged)
+_mutant(
+    "http-head-of-what-cannot-be-read", "method-not-allowed", "HEAD of a delivery is answered 200, though GET is 405."
+).instead(_having(lambda request: _HEAD(request) and deliveries(request.copy(method="PUT"))), plain(200))
+_mutant("http-no-chunks", "chunked", "Chunked content is 411.").instead(_chunked, problem(411, "a length, please"))
+_mutant("http-few-chunks", "chunked", "Of chunked content, 1 KiB is read.").rewritten(_chunked, _shortened)
+_mutant("http-no-absolute", "absolute-form", "A target in absolute form is 400.").instead(_absolute, problem(400, ""))
+_mutant("http-absolute-unknown", "absolute-form", "A target in absolute form is 404.").instead(
+    _absolute, problem(404, "")
+)
+_mutant("http-type-case", "media-type-case", "A media type with a capital letter is 415.").instead(
+    _upper("Content-Type"), problem(415, "application/json, please")
+)
+_mutant("http-accept-case", "media-type-case", "A media type with a capital letter is not acceptable.").instead(
+    _upper("Accept"), problem(406, "application/json is what there is")
+)
+_mutant("http-short-targets", "target-length", "A target over 4 KiB is 414.").instead(
+    _having(lambda request: len(request.target) > _MUCH), problem(414, "too long")
+)
+_mutant("http-head-empty", "head-length", "HEAD says Content-Length: 0.").altered(_HEAD, header("Content-Length", "0"))
+_mutant("http-head-length-of-error", "head-length", "HEAD says a Content-Length of its own.").altered(
+    _HEAD, header("Content-Length", "31"), anything
+)
+_mutant("json-no-exponents", "json-numbers", "A number in JSON with an exponent is 422.").instead(
+    _written(rb"\d[eE][+-]?\d"), problem(422, "a number, please")
+)
+_mutant("json-no-negative-zero", "json-numbers", "A zero with a sign is 422.").instead(
+    _written(rb"-0(?![.\d])"), problem(422, "a number, please")
+)
+_mutant("json-small-integers", "json-integers", "Integers of ten digits are 422.").instead(
+    _written(rb"[:\s]-?214748364[78]\b"), problem(422, "sec: too large")
 )

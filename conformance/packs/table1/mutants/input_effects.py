@@ -6,9 +6,12 @@ from typing import Any
 
 from conformance.mutation.changes import Make, parsed, problem, rest, success, unwanted
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, POSE, TNS, VELOCITY, deliveries
 from conformance.packs.table1.mutants.soap_responses import enveloped
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("strict-input", "rest")
 
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 _INVALID = {400, 415, 422}
@@ -66,8 +69,10 @@ def _deliver(request: Request, forward: Forward) -> None:
     sent(request, forward, "PUT", path)
 
 
+@_mutant(
+    "http-406-and-delivered", "http/not-acceptable-undone", "A delivery is answered 406, and published.", observer=True
+)
 def _delivered_in_vain(request: Request, forward: Forward) -> Response:
-    """A delivery is made, and its answer is lost because nothing that could be said is acceptable."""
     response = forward(request)
     in_vain = unwanted(deliveries)(request) and success(response)
     return problem(406, "nothing that you would have")(request) if in_vain else response
@@ -84,8 +89,14 @@ def _ordered_by(method: str) -> Make:
     return lambda: change
 
 
+@_mutant(
+    "input-soap-refused-and-made",
+    "delivery-refused",
+    "An invalid SOAP delivery is refused, and published.",
+    observer=True,
+    interface="soap",
+)
 def _soap_refusal(request: Request, forward: Forward) -> Response:
-    """What is refused over SOAP is delivered all the same."""
     response = forward(request)
     if request.side == "soap" and b"Execute" in request.body and b"Fault" in response.body:
         # Only SOAP's side is at hand here: a valid message in place of the refused one.
@@ -98,73 +109,33 @@ def _soap_refusal(request: Request, forward: Forward) -> Response:
     return response
 
 
-_mutant = of_class("strict-input", "rest")
-
-MUTANTS = (
-    _mutant(
-        "input-velocity-refused-and-driven",
-        "An invalid velocity is refused, and the robot drives.",
-        "velocity-refused",
-        after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)),
-    ),
-    _mutant(
-        "http-406-and-driven",
-        "A velocity is answered 406, and the robot drives.",
-        "http/not-acceptable-undone",
-        after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2), {406}),
-    ),
-    _mutant(
-        "http-406-and-goal",
-        "A goal is answered 406, and the robot has a goal.",
-        "http/not-acceptable-undone",
-        after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5), {406}),
-    ),
-    _mutant(
-        "http-406-and-delivered",
-        "A delivery is answered 406, and published.",
-        "http/not-acceptable-undone",
-        lambda: _delivered_in_vain,
-        observer=True,
-    ),
-    _mutant(
-        "input-goal-refused-and-taken",
-        "An invalid goal is refused, and the robot has a goal.",
-        "goal-refused",
-        after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)),
-    ),
-    _mutant(
-        "input-goal-refused-and-ended",
-        "An invalid goal is refused, and the active one is cancelled.",
-        "goal-refused",
-        after_refusal(rest("PUT", GOAL), _give_up),
-    ),
-    _mutant(
-        "input-delivery-refused-and-made",
-        "An invalid delivery is refused, and published.",
-        "delivery-refused",
-        after_refusal(deliveries, _deliver),
-        observer=True,
-    ),
-    _mutant(
-        "input-delivery-by-get",
-        "GET of what PUT orders is 405, and orders it.",
-        "delivery-refused",
-        _ordered_by("GET"),
-        observer=True,
-    ),
-    _mutant(
-        "input-delivery-by-options",
-        "OPTIONS of what PUT orders is answered, and orders it.",
-        "delivery-refused",
-        _ordered_by("OPTIONS"),
-        observer=True,
-    ),
-    _mutant(
-        "input-soap-refused-and-made",
-        "An invalid SOAP delivery is refused, and published.",
-        "delivery-refused",
-        lambda: _soap_refusal,
-        observer=True,
-        interface="soap",
-    ),
+_mutant(
+    "input-velocity-refused-and-driven", "velocity-refused", "An invalid velocity is refused, and the robot drives."
+).made(after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)))
+_mutant("http-406-and-driven", "http/not-acceptable-undone", "A velocity is answered 406, and the robot drives.").made(
+    after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2), {406})
 )
+_mutant("http-406-and-goal", "http/not-acceptable-undone", "A goal is answered 406, and the robot has a goal.").made(
+    after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5), {406})
+)
+_mutant("input-goal-refused-and-taken", "goal-refused", "An invalid goal is refused, and the robot has a goal.").made(
+    after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5))
+)
+_mutant(
+    "input-goal-refused-and-ended", "goal-refused", "An invalid goal is refused, and the active one is cancelled."
+).made(after_refusal(rest("PUT", GOAL), _give_up))
+_mutant(
+    "input-delivery-refused-and-made",
+    "delivery-refused",
+    "An invalid delivery is refused, and published.",
+    observer=True,
+).made(after_refusal(deliveries, _deliver))
+_mutant(
+    "input-delivery-by-get", "delivery-refused", "GET of what PUT orders is 405, and orders it.", observer=True
+).made(_ordered_by("GET"))
+_mutant(
+    "input-delivery-by-options",
+    "delivery-refused",
+    "OPTIONS of what PUT orders is answered, and orders it.",
+    observer=True,
+).made(_ordered_by("OPTIONS"))

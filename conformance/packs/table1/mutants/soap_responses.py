@@ -12,7 +12,7 @@ from lxml import etree
 
 from conformance.mutation.changes import SOAP
 from conformance.mutation.messages import Request, Response
-from conformance.packs.table1.mutants.xml_trees import each, tree
+from conformance.mutation.xml_trees import each, tree
 
 TRACE = (
     "java.lang.NullPointerException\n\tat org.mybot.turtlebot.soap.Publishers.execute(Publishers.java:41)\n"

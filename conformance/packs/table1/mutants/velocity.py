@@ -10,7 +10,6 @@ from conformance.mutation.changes import (
     altered,
     becomes,
     inputs,
-    instead,
     page,
     parsed,
     plain,
@@ -22,8 +21,11 @@ from conformance.mutation.changes import (
     values,
 )
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("rest-resources", "rest")
 
 _GET, _PUT = rest("GET", VELOCITY), rest("PUT", VELOCITY)
 _GET_LINEAR, _PUT_LINEAR = rest("GET", LINEAR), rest("PUT", LINEAR)
@@ -40,6 +42,9 @@ def _times(factor: float) -> Callable[[Any], None]:
     return edit
 
 
+@_mutant(
+    "velocity-swapped", "velocity-converges", "Linear and angular velocity are exchanged in what is read."
+).through(_told)
 def _exchanged(twist: Any) -> None:
     twist["linear"]["x"], twist["angular"]["z"] = twist["angular"]["z"], twist["linear"]["x"]
 
@@ -53,9 +58,12 @@ def _integral(request: Request) -> bool:
         return False
 
 
+@_mutant(
+    "velocity-as-commanded",
+    ("velocity-odometry", "safety/watchdog"),
+    "GET shows the velocity that was commanded, although the robot has long stopped.",
+)
 class _Commanded:
-    """GET shows what was commanded last, whatever the robot does."""
-
     def __init__(self) -> None:
         self._last: Any = _STILL
 
@@ -68,9 +76,8 @@ class _Commanded:
         return response
 
 
+@_mutant("velocity-locked-by-goal", "velocity-goal", "While a goal is active, a velocity is answered 423.")
 class _WhileGoal:
-    """During a goal, a velocity is answered with a status that nobody expects."""
-
     def __call__(self, request: Request, forward: Forward) -> Response:
         if _PUT(request):
             goal = forward(request.copy(method="GET", target=GOAL, body=b""))
@@ -79,8 +86,8 @@ class _WhileGoal:
         return forward(request)
 
 
+@_mutant("linear-stops-turning", "linear-keeps-angular", "PUT of a linear velocity ends the turning.")
 def _whole(request: Request, forward: Forward) -> Response:
-    """PUT of the linear part sets the whole velocity, with no turning."""
     if not _PUT_LINEAR(request):
         return forward(request)
     vector = parsed(request.body)
@@ -91,15 +98,17 @@ def _whole(request: Request, forward: Forward) -> Response:
     return plain(204)(request) if response.status == 200 else response
 
 
+@_mutant(
+    "linear-back-stops-turning", "linear-keeps-angular", "PUT of a linear velocity that leads back ends the turning."
+)
 def _whole_back(request: Request, forward: Forward) -> Response:
-    """PUT of a linear part that leads back sets the whole velocity."""
     vector = parsed(request.body) if _PUT_LINEAR(request) else None
     back = isinstance(vector, dict) and isinstance(vector.get("x"), int | float) and vector["x"] < 0
     return _whole(request, forward) if back else forward(request)
 
 
+@_mutant("linear-lost", "linear-put", "PUT of a linear velocity is accepted and forgotten.")
 def _stuck(request: Request, forward: Forward) -> Response:
-    """Valid linear velocities are accepted and forgotten."""
     if _PUT_LINEAR(request):
         vector = parsed(request.body)
         if isinstance(vector, dict) and vector.get("x"):
@@ -107,6 +116,7 @@ def _stuck(request: Request, forward: Forward) -> Response:
     return forward(request)
 
 
+@_mutant("linear-is-angular", "linear-agrees", "GET of the linear velocity gives the whole Twist's other half.")
 def _other_half(request: Request, forward: Forward) -> Response:
     if not _GET_LINEAR(request):
         return forward(request)
@@ -163,131 +173,58 @@ def _forwards_only(twist: Any) -> None:
     twist["linear"]["x"] = max(0.0, twist["linear"]["x"])
 
 
+@_mutant("velocity-reversed", "velocity-converges", "The robot turns the other way.").through(_driven)
 def _mirrored(twist: Any) -> None:
     twist["angular"]["z"] = -twist["angular"]["z"]
 
 
-_mutant = of_class("rest-resources", "rest")
-
-MUTANTS = (
-    _mutant(
-        "velocity-without-angular",
-        "GET of the velocity has no angular part.",
-        "velocity-type",
-        _told(lambda twist: twist.pop("angular") and None),
-    ),
-    _mutant(
-        "velocity-null",
-        "One velocity in 50 has null for linear.y.",
-        "velocity-type",
-        _told(lambda twist: twist["linear"].update(y=None), nth=50),
-    ),
-    _mutant(
-        "velocity-in-kilometres-per-hour",
-        "The measured velocity is in km/h.",
-        ("velocity-odometry", "velocity-converges"),
-        _told(_times(3.6)),
-    ),
-    _mutant(
-        "velocity-stands-still",
-        "The measured velocity is always zero.",
-        ("velocity-odometry", "velocity-converges"),
-        _told(lambda twist: twist.update(_STILL)),
-    ),
-    _mutant(
-        "velocity-swapped",
-        "Linear and angular velocity are exchanged in what is read.",
-        "velocity-converges",
-        _told(_exchanged),
-    ),
-    _mutant(
-        "velocity-as-commanded",
-        "GET shows the velocity that was commanded, although the robot has long stopped.",
-        ("velocity-odometry", "safety/watchdog"),
-        _Commanded,
-    ),
-    _mutant("velocity-put-created", "PUT of a velocity is 201.", "velocity-put", altered(_PUT, becomes(201))),
-    _mutant(
-        "velocity-put-other",
-        "PUT of a velocity answers 200 with a Twist that was not asked for.",
-        "velocity-put",
-        altered(_PUT, page(200, json.dumps(_CRAWL).encode(), JSON)),
-    ),
-    _mutant(
-        "velocity-lost",
-        "Velocities are accepted and forgotten.",
-        "velocity-converges",
-        _driven(lambda twist: twist.update(_STILL)),
-    ),
-    _mutant(
-        "velocity-unwanted-lost",
-        "A velocity is answered 204 and forgotten where the client accepts no format of the answer.",
-        "velocity-converges",
-        instead(unwanted(_PUT), plain(204)),
-    ),
-    _mutant(
-        "velocity-halved", "The robot drives at half of what it is told.", "velocity-converges", _driven(_times(0.5))
-    ),
-    _mutant(
-        "velocity-refused-near-limits",
-        "Above nine tenths of its limits the robot refuses a velocity.",
-        "velocity-range",
-        instead(_beyond(0.9), problem(422, "linear.x, angular.z: too fast")),
-    ),
-    _mutant(
-        "velocity-short-of-limits",
-        "The robot gets to nine tenths of its limits, and no farther.",
-        "velocity-range",
-        secretly(_beyond(0.9), inputs(_short_of(0.9))),
-    ),
-    _mutant(
-        "velocity-forwards-only",
-        "The robot takes velocities backwards, and stands still.",
-        "velocity-range",
-        secretly(_beyond(0.0), inputs(_forwards_only)),
-    ),
-    _mutant("velocity-reversed", "The robot turns the other way.", "velocity-converges", _driven(_mirrored)),
-    _mutant(
-        "velocity-integers-refused",
-        "A velocity written in integers is refused.",
-        "velocity-integers",
-        instead(_integral, problem(422, "linear.x: an integer is no float")),
-    ),
-    _mutant(
-        "velocity-locked-by-goal", "While a goal is active, a velocity is answered 423.", "velocity-goal", _WhileGoal
-    ),
-    _mutant(
-        "linear-without-z",
-        "GET of the linear velocity has no z.",
-        "linear-type",
-        altered(_GET_LINEAR, values(lambda vector: {axis: vector[axis] for axis in "xy"})),
-    ),
-    _mutant(
-        "linear-is-angular",
-        "GET of the linear velocity gives the whole Twist's other half.",
-        "linear-agrees",
-        lambda: _other_half,
-    ),
-    _mutant("linear-lost", "PUT of a linear velocity is accepted and forgotten.", "linear-put", lambda: _stuck),
-    _mutant(
-        "linear-unwanted-lost",
-        "A linear velocity is answered 204 and forgotten where the client accepts no format of the answer.",
-        "linear-put",
-        instead(unwanted(_PUT_LINEAR), plain(204)),
-    ),
-    _mutant(
-        "linear-put-created",
-        "PUT of a linear velocity is 201.",
-        "linear-put",
-        altered(_PUT_LINEAR, becomes(201), status(200, 204)),
-    ),
-    _mutant(
-        "linear-stops-turning", "PUT of a linear velocity ends the turning.", "linear-keeps-angular", lambda: _whole
-    ),
-    _mutant(
-        "linear-back-stops-turning",
-        "PUT of a linear velocity that leads back ends the turning.",
-        "linear-keeps-angular",
-        lambda: _whole_back,
-    ),
+_mutant("velocity-without-angular", "velocity-type", "GET of the velocity has no angular part.").json(
+    _GET, lambda twist: twist.pop("angular") and None
+)
+_mutant("velocity-null", "velocity-type", "One velocity in 50 has null for linear.y.").json(
+    _GET, lambda twist: twist["linear"].update(y=None), nth=50
+)
+_mutant(
+    "velocity-in-kilometres-per-hour", ("velocity-odometry", "velocity-converges"), "The measured velocity is in km/h."
+).json(_GET, _times(3.6))
+_mutant(
+    "velocity-stands-still", ("velocity-odometry", "velocity-converges"), "The measured velocity is always zero."
+).json(_GET, lambda twist: twist.update(_STILL))
+_mutant("velocity-put-created", "velocity-put", "PUT of a velocity is 201.").altered(_PUT, becomes(201))
+_mutant(
+    "velocity-put-other", "velocity-put", "PUT of a velocity answers 200 with a Twist that was not asked for."
+).altered(_PUT, page(200, json.dumps(_CRAWL).encode(), JSON))
+_mutant("velocity-lost", "velocity-converges", "Velocities are accepted and forgotten.").made(
+    _driven(lambda twist: twist.update(_STILL))
+)
+_mutant(
+    "velocity-unwanted-lost",
+    "velocity-converges",
+    "A velocity is answered 204 and forgotten where the client accepts no format of the answer.",
+).instead(unwanted(_PUT), plain(204))
+_mutant("velocity-halved", "velocity-converges", "The robot drives at half of what it is told.").made(
+    _driven(_times(0.5))
+)
+_mutant(
+    "velocity-refused-near-limits", "velocity-range", "Above nine tenths of its limits the robot refuses a velocity."
+).instead(_beyond(0.9), problem(422, "linear.x, angular.z: too fast"))
+_mutant(
+    "velocity-short-of-limits", "velocity-range", "The robot gets to nine tenths of its limits, and no farther."
+).made(secretly(_beyond(0.9), inputs(_short_of(0.9))))
+_mutant("velocity-forwards-only", "velocity-range", "The robot takes velocities backwards, and stands still.").made(
+    secretly(_beyond(0.0), inputs(_forwards_only))
+)
+_mutant("velocity-integers-refused", "velocity-integers", "A velocity written in integers is refused.").instead(
+    _integral, problem(422, "linear.x: an integer is no float")
+)
+_mutant("linear-without-z", "linear-type", "GET of the linear velocity has no z.").json(
+    _GET_LINEAR, lambda vector: {axis: vector[axis] for axis in "xy"}
+)
+_mutant(
+    "linear-unwanted-lost",
+    "linear-put",
+    "A linear velocity is answered 204 and forgotten where the client accepts no format of the answer.",
+).instead(unwanted(_PUT_LINEAR), plain(204))
+_mutant("linear-put-created", "linear-put", "PUT of a linear velocity is 201.").altered(
+    _PUT_LINEAR, becomes(201), status(200, 204)
 )
