@@ -16,6 +16,11 @@ _mutant = MUTANTS.of_class("describe", "rest")
 _OPENAPI, _WADL = rest("GET", "/openapi.json"), rest("GET", "/application.wadl")
 
 
+def _told(edit: Callable[[Any], Any]) -> Make:
+    """The OpenAPI description is altered."""
+    return altered(_OPENAPI, values(edit))
+
+
 @_mutant("openapi-without-path", "openapi-operations", "/openapi.json lacks a path.").through(_told)
 def _without_path(description: Any) -> None:
     description["paths"].pop(SENSORS, None)
@@ -41,11 +46,6 @@ def _promised(description: Any) -> None:
 def _invalid(description: Any) -> None:
     description.pop("info", None)
     description["paths"] = [*description["paths"]]
-
-
-def _told(edit: Callable[[Any], Any]) -> Make:
-    """The OpenAPI description is altered."""
-    return altered(_OPENAPI, values(edit))
 
 
 def _lost(name: str, attribute: str, pattern: str) -> Make:

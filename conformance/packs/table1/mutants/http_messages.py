@@ -169,14 +169,12 @@ _mutant("http-broken-field", "framing", "An answer has a line that is no field."
 _mutant("http-two-lengths", "framing", "An answer has two different Content-Length fields.").altered(
     _POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1))
 )
-_mutant("http-host-optional", "host-missing", "A request without Host is served.").made(
-    lambda: _hosts(lambda hosts: not hosts)
+_mutant("http-host-optional", "host-missing", "A request without Host is served.")(_hosts(lambda hosts: not hosts))
+_mutant("http-host-twice", "host-twice", "A request with two Host fields is served.")(
+    _hosts(lambda hosts: len(hosts) > 1)
 )
-_mutant("http-host-twice", "host-twice", "A request with two Host fields is served.").made(
-    lambda: _hosts(lambda hosts: len(hosts) > 1)
-)
-_mutant("http-host-repeated", "host-repeated", "A request with the same Host field twice is served.").made(
-    lambda: _hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1)
+_mutant("http-host-repeated", "host-repeated", "A request with the same Host field twice is served.")(
+    _hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1)
 )
 _mutant("http-problem-as-json", "problem-type", "Problems come as application/json.").altered(
     _ANY, header("Content-Type", JSON), _errors

@@ -7,7 +7,6 @@ from typing import Any
 from conformance.mutation.changes import (
     JSON,
     Make,
-    altered,
     becomes,
     inputs,
     page,
@@ -20,6 +19,7 @@ from conformance.mutation.changes import (
     unwanted,
     values,
 )
+from conformance.mutation.fields import each, field, scaled, swapped, without
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
@@ -35,18 +35,7 @@ _CRAWL = {**_STILL, "linear": {"x": 0.123, "y": 0.0, "z": 0.0}}
 
 
 def _times(factor: float) -> Callable[[Any], None]:
-    def edit(twist: Any) -> None:
-        twist["linear"]["x"] *= factor
-        twist["angular"]["z"] *= factor
-
-    return edit
-
-
-@_mutant(
-    "velocity-swapped", "velocity-converges", "Linear and angular velocity are exchanged in what is read."
-).through(_told)
-def _exchanged(twist: Any) -> None:
-    twist["linear"]["x"], twist["angular"]["z"] = twist["angular"]["z"], twist["linear"]["x"]
+    return each(field("linear.x", scaled(factor)), field("angular.z", scaled(factor)))
 
 
 def _integral(request: Request) -> bool:
@@ -135,11 +124,6 @@ def _good(twist: Any) -> bool:
         return False
 
 
-def _told(edit: Callable[[Any], Any], nth: int = 1) -> Make:
-    """The measured velocity is altered on its way to the client."""
-    return altered(_GET, values(edit), nth=nth)
-
-
 def _driven(edit: Callable[[Any], Any]) -> Make:
     """A good velocity is altered on its way to the robot."""
     return secretly(_PUT, inputs(lambda twist: edit(twist) if _good(twist) else None))
@@ -169,20 +153,14 @@ def _short_of(share: float) -> Callable[[Any], None]:
     return edit
 
 
-def _forwards_only(twist: Any) -> None:
-    twist["linear"]["x"] = max(0.0, twist["linear"]["x"])
-
-
-@_mutant("velocity-reversed", "velocity-converges", "The robot turns the other way.").through(_driven)
-def _mirrored(twist: Any) -> None:
-    twist["angular"]["z"] = -twist["angular"]["z"]
-
-
 _mutant("velocity-without-angular", "velocity-type", "GET of the velocity has no angular part.").json(
-    _GET, lambda twist: twist.pop("angular") and None
+    _GET, without("angular")
 )
 _mutant("velocity-null", "velocity-type", "One velocity in 50 has null for linear.y.").json(
-    _GET, lambda twist: twist["linear"].update(y=None), nth=50
+    _GET, field("linear.y", None), nth=50
+)
+_mutant("velocity-swapped", "velocity-converges", "Responses exchange linear.x and angular.z.").json(
+    _GET, swapped("linear.x", "angular.z")
 )
 _mutant(
     "velocity-in-kilometres-per-hour", ("velocity-odometry", "velocity-converges"), "The measured velocity is in km/h."
@@ -205,6 +183,9 @@ _mutant(
 _mutant("velocity-halved", "velocity-converges", "The robot drives at half of what it is told.").made(
     _driven(_times(0.5))
 )
+_mutant("velocity-reversed", "velocity-converges", "The robot turns the other way.").made(
+    _driven(field("angular.z", scaled(-1.0)))
+)
 _mutant(
     "velocity-refused-near-limits", "velocity-range", "Above nine tenths of its limits the robot refuses a velocity."
 ).instead(_beyond(0.9), problem(422, "linear.x, angular.z: too fast"))
@@ -212,14 +193,12 @@ _mutant(
     "velocity-short-of-limits", "velocity-range", "The robot gets to nine tenths of its limits, and no farther."
 ).made(secretly(_beyond(0.9), inputs(_short_of(0.9))))
 _mutant("velocity-forwards-only", "velocity-range", "The robot takes velocities backwards, and stands still.").made(
-    secretly(_beyond(0.0), inputs(_forwards_only))
+    secretly(_beyond(0.0), inputs(field("linear.x", lambda x: max(0.0, x))))
 )
 _mutant("velocity-integers-refused", "velocity-integers", "A velocity written in integers is refused.").instead(
     _integral, problem(422, "linear.x: an integer is no float")
 )
-_mutant("linear-without-z", "linear-type", "GET of the linear velocity has no z.").json(
-    _GET_LINEAR, lambda vector: {axis: vector[axis] for axis in "xy"}
-)
+_mutant("linear-without-z", "linear-type", "GET of the linear velocity has no z.").json(_GET_LINEAR, without("z"))
 _mutant(
     "linear-unwanted-lost",
     "linear-put",
