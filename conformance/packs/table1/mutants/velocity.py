@@ -1,6 +1,7 @@
 """Robots that do not drive as they are told, or do not say how they drive."""
 
 import json
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -184,7 +185,7 @@ _mutant("velocity-halved", "velocity-converges", "The robot drives at half of wh
     _driven(_times(0.5))
 )
 _mutant("velocity-reversed", "velocity-converges", "The robot turns the other way.").made(
-    _driven(field("angular.z", scaled(-1.0)))
+    _driven(field("angular.z", operator.neg))
 )
 _mutant(
     "velocity-refused-near-limits", "velocity-range", "Above nine tenths of its limits the robot refuses a velocity."
