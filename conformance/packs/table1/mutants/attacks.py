@@ -86,7 +86,7 @@ def _quoting(urls: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
     return lambda: change
 
 
-@_mutant("attack-included", "xinclude", "XInclude is processed.").through(_quoting)
+@_mutant("attack-included", "xinclude", "XInclude elements are processed.").through(_quoting)
 def _included(body: bytes) -> list[bytes]:
     return re.findall(rb"href=[\"']([^\"']*)[\"']", body) if b"XInclude" in body else []
 
@@ -122,7 +122,9 @@ def _doctype_urls(body: bytes) -> list[bytes]:
     return [url for url in found if url.startswith(b"http")]
 
 
-@_mutant("attack-reply-elsewhere", "addressing-spoofing", "ReplyTo is called.").through(_calling)
+@_mutant(
+    "attack-reply-elsewhere", "addressing-spoofing", "The robot sends a request to the address in wsa:ReplyTo."
+).through(_calling)
 def _addressing_urls(body: bytes) -> list[bytes]:
     return _URL.findall(body) if b"addressing" in body else []
 
@@ -141,7 +143,7 @@ def _posting(holds: Callable[[bytes], bool]) -> Where:
     return lambda request: posted(request) and holds(request.body)
 
 
-@_mutant("attack-action-chooses", "soapaction-spoofing", "SOAPAction chooses what is run.")
+@_mutant("attack-action-chooses", "soapaction-spoofing", "SOAPAction selects the operation, whatever is in Body.")
 def _spoofed(request: Request, forward: Forward) -> Response:
     action = (request.field("SOAPAction") or "").strip('"')
     for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"):
@@ -155,14 +157,13 @@ def _rest_xml(request: Request) -> bool:
     return request.side == "rest" and request.method == "PUT" and b"<!DOCTYPE" in request.body
 
 
-@_mutant("attack-exhausted", "responsive", "After an attack everything takes 1.6 s.", interface="both")
+@_mutant("attack-exhausted", "responsive", "After an attack, the next responses take 1.6 s.", interface="both")
 class _Exhausted:
     def __init__(self) -> None:
         self._attacks = 6
         self._left = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if self._left:
             self._left -= 1
             time.sleep(1.6)
@@ -172,38 +173,38 @@ class _Exhausted:
         return forward(request)
 
 
-_mutant("attack-doctype-fine", "doctype", "A Document Type Declaration is passed over.").rewritten(
+_mutant("attack-doctype-fine", "doctype", "A document type declaration is ignored.").rewritten(
     _declared, _plain_doctype
 )
 _mutant("attack-entity-expanded", "internal-entity", "Internal entities are expanded.").rewritten(_declared, _expanded)
-_mutant("attack-file-leaked", "external-entity", "An external entity's file appears in the fault.").made(
+_mutant("attack-file-leaked", "external-entity", "The file of an external entity appears in the fault.").made(
     _quoting(lambda body: [url for _, url in _EXTERNAL.findall(body)])
 )
 _mutant("attack-dtd-fetched", "parameter-entity", "An external DTD or parameter entity is fetched.").made(
     _calling(_doctype_urls)
 )
-_mutant(
-    "attack-expansion-fine", "expansion", "Entities that expand exponentially are answered like any others."
-).rewritten(_posting(lambda body: body.count(b"<!ENTITY") > 2), _undeclared)
-_mutant("attack-quadratic-fine", "quadratic", "One long entity many times is answered like any other.").rewritten(
-    _posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared
+_mutant("attack-expansion-fine", "expansion", "Exponentially expanding entities return a normal response.").rewritten(
+    _posting(lambda body: body.count(b"<!ENTITY") > 2), _undeclared
 )
-_mutant("attack-depth-fine", "depth", "XML nested without end is answered 200.").instead(_nested, _DONE)
-_mutant("attack-attributes-fine", "attributes", "Thousands of attributes are passed over.").instead(
+_mutant(
+    "attack-quadratic-fine", "quadratic", "A long entity that is used many times returns a normal response."
+).rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared)
+_mutant("attack-depth-fine", "depth", "Deeply nested XML returns 200.").instead(_nested, _DONE)
+_mutant("attack-attributes-fine", "attributes", "Thousands of attributes return 200.").instead(
     _posting(lambda body: body.count(b'="') > 5000), _DONE
 )
-_mutant("attack-long-name-fine", "long-name", "A name of a million characters is passed over.").instead(
+_mutant("attack-long-name-fine", "long-name", "An element name of a million characters returns 200.").instead(
     _posting(lambda body: bool(re.search(rb"<[\w:.-]{5000,}", body))), _DONE
 )
-_mutant("attack-size-fine", "size", "A message over 10 MiB is answered 200.").instead(
+_mutant("attack-size-fine", "size", "A message over 10 MiB returns 200.").instead(
     _posting(lambda body: len(body) > _LARGE), _DONE
 )
-_mutant("attack-bomb-unpacked", "compressed", "A compressed message is unpacked, however large it becomes.").instead(
+_mutant("attack-bomb-unpacked", "compressed", "A compressed message of any size is unpacked.").instead(
     lambda request: posted(request) and bool(request.field("Content-Encoding")), _DONE
 )
-_mutant("attack-instruction-fine", "processing-instruction", "Processing instructions are passed over.").rewritten(
+_mutant("attack-instruction-fine", "processing-instruction", "Processing instructions are ignored.").rewritten(
     posted, lambda request: setattr(request, "body", _INSTRUCTION.sub(b"", request.body))
 )
-_mutant(
-    "attack-rest-fine", "rest", "A Document Type Declaration in a REST body is passed over.", interface="rest"
-).instead(_rest_xml, plain(204))
+_mutant("attack-rest-fine", "rest", "A document type declaration in a REST body is ignored.", interface="rest").instead(
+    _rest_xml, plain(204)
+)

@@ -44,7 +44,6 @@ class _Mixed:
         self._seen = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if not self._where(request):
             return forward(request)
         with self._crowd.joined() as others:
@@ -86,7 +85,9 @@ def _exchanged(one: Response, two: Response) -> tuple[Response, Response]:
 
 
 @_mutant(
-    "clients-spliced", "concurrent-answers", "An answer ends as another one does that is made at the same moment."
+    "clients-spliced",
+    "concurrent-answers",
+    "Two concurrent responses are spliced: one ends with the second half of the other.",
 ).through(_mixed)
 def _spliced(one: Response, two: Response) -> tuple[Response, Response]:
     half = len(two.body) // 2
@@ -121,7 +122,7 @@ def _created(response: Response) -> Response:
 @_resource(
     "clients-goal-doubled",
     "goal-concurrent",
-    "A goal that two clients put at one moment is two goals: one goes on when the other is cancelled.",
+    "A goal that two clients send concurrently becomes two goals; one continues after the other is cancelled.",
 )
 class _GoalOfTwo:
     def __init__(self) -> None:
@@ -129,7 +130,6 @@ class _GoalOfTwo:
         self._second: Request | None = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if _PUT_GOAL(request):
             with self._crowd.joined() as others:
                 time.sleep(COMPANY_S)
@@ -154,7 +154,6 @@ class _Blended:
         self._last: object = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if not self._where(request):
             return forward(request)
         with self._crowd.joined() as others:
@@ -173,73 +172,61 @@ _EMPTY = plain(204)
 _SOAP_DELIVERY = soap("ExecuteDeliveryRequest")
 _ACCEPTED = enveloped(f'<t:ExecuteDeliveryRequestResponse xmlns:t="{TNS}"/>')
 
-_mutant("clients-crossed", "concurrent-answers", "Two clients that ask at one moment get each other's answers.").made(
+_mutant("clients-crossed", "concurrent-answers", "Two concurrent clients get each other's responses.").made(
     _mixed(_exchanged)
 )
 _mutant(
     "clients-crossed-seldom",
     "concurrent-answers",
-    "One time in fifty, two clients that ask at one moment get each other's answers.",
+    "In one case of fifty, two concurrent clients get each other's responses.",
 ).made(_mixed(_exchanged, 50))
-_mutant("clients-one-buffer", "concurrent-answers", "Answers that are made at one moment have one body.").made(
+_mutant("clients-one-buffer", "concurrent-answers", "Concurrent responses get the same body.").made(
     _mixed(_repeated, 10)
 )
 _mutant(
     "http-pipelining-backwards",
     "pipelining",
-    "Of two requests that were sent at once, the second is answered first.",
+    "Of two pipelined requests, the robot answers the second first.",
     backwards=True,
 )(lambda request, forward: forward(request))
 _message(
-    "clients-delivery-lost",
-    "delivery-concurrent",
-    "A REST delivery that comes while another one is being answered is accepted and forgotten.",
+    "clients-delivery-lost", "delivery-concurrent", "A REST delivery during another one returns 204 and is lost."
 ).made(when_crowded(deliveries, lambda request, _: _EMPTY(request)))
+_message("clients-delivery-lost-seldom", "delivery-concurrent", "Every 50th concurrent REST delivery is lost.").made(
+    when_crowded(deliveries, lambda request, _: _EMPTY(request), 50)
+)
 _message(
-    "clients-delivery-lost-seldom",
-    "delivery-concurrent",
-    "Of the REST deliveries that come while another one is being answered, each 50th is forgotten.",
-).made(when_crowded(deliveries, lambda request, _: _EMPTY(request), 50))
-_message(
-    "clients-delivery-doubled",
-    "delivery-concurrent",
-    "A REST delivery that comes while another one is being answered is published twice.",
+    "clients-delivery-doubled", "delivery-concurrent", "A REST delivery during another one is published twice."
 ).made(when_crowded(deliveries, _twice))
+_message("clients-delivery-shared-field", "delivery-concurrent", "Concurrent deliveries share one source_y.").made(
+    when_crowded(deliveries, _with_another_source)
+)
 _message(
-    "clients-delivery-shared-field", "delivery-concurrent", "Deliveries that come at one moment have one source_y."
-).made(when_crowded(deliveries, _with_another_source))
-_message(
-    "clients-soap-delivery-lost",
-    "delivery-concurrent",
-    "A SOAP delivery that comes while another one is being answered is accepted and forgotten.",
+    "clients-soap-delivery-lost", "delivery-concurrent", "A SOAP delivery during another one succeeds and is lost."
 ).made(when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)))
 _resource(
-    "clients-goal-new-to-all",
-    "goal-concurrent",
-    "Each client that puts the same new goal at one moment is told that it is new.",
+    "clients-goal-new-to-all", "goal-concurrent", "Every client that sends the same new goal concurrently gets 201."
 ).made(when_crowded(_PUT_GOAL, lambda request, forward: _created(forward(request))))
-_resource(
-    "clients-goal-conflict",
-    "goal-concurrent",
-    "A goal that is put while another client puts the same one is a conflict.",
-).made(when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2))
-_resource(
-    "clients-goal-of-two", "concurrent-puts", "Of goals that come at one moment, one has the pose of another."
-).made(lambda: _Blended(_PUT_GOAL, "goal"))
-_resource(
-    "clients-velocity-lost", "concurrent-puts", "Of velocities that come at one moment, none is carried out."
-).made(when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request)))
+_resource("clients-goal-conflict", "goal-concurrent", "Two clients that send the same goal concurrently get 409.").made(
+    when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2)
+)
+_resource("clients-goal-of-two", "concurrent-puts", "Two goals that are sent concurrently get the same pose.").made(
+    lambda: _Blended(_PUT_GOAL, "goal")
+)
+_resource("clients-velocity-lost", "concurrent-puts", "Concurrent velocity commands are lost.").made(
+    when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request))
+)
 _resource(
     "clients-velocity-of-two",
     "concurrent-puts",
-    "Of velocities that come at one moment, the robot turns by one and drives by another.",
+    "Of concurrent velocity commands, the robot uses the linear part of one and the angular part of another.",
 ).made(lambda: _Blended(_PUT_VELOCITY, "angular"))
-_order(
-    "clients-soap-crossed", "concurrent-answers", "Two clients that order at one moment get each other's answers."
-).made(lambda: _Mixed(posted, _exchanged, 1))
+_order("clients-soap-crossed", "concurrent-answers", "Two concurrent SOAP deliveries get each other's responses.").made(
+    lambda: _Mixed(posted, _exchanged, 1)
+)
 _state(
-    "clients-soap-states-crossed", "concurrent-answers", "Two clients that ask at one moment get each other's answers."
+    "clients-soap-states-crossed", "concurrent-answers", "Two concurrent SOAP clients get each other's responses."
 ).made(lambda: _Mixed(posted, _exchanged, 1))
-_order("soap-small-messages", "size", "A message over 32 KiB is 413.").instead(
+_order("soap-small-messages", "size", "A message over 32 KiB returns 413.").instead(
     lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")
 )

@@ -59,7 +59,7 @@ def _written(pattern: str) -> Callable[[Request], bool]:
     return where
 
 
-@_mutant("delivery-only-once", "put-repeated", "The same delivery again is 409.")
+@_mutant("delivery-only-once", "put-repeated", "Sending the same delivery again returns 409.")
 class _OnlyOnce:
     def __init__(self) -> None:
         self._seen: set[str] = set()
@@ -72,33 +72,37 @@ class _OnlyOnce:
         return forward(request)
 
 
-_mutant("delivery-crashes", "put", "A delivery is answered 500.").altered(deliveries, becomes(500))
-_mutant("delivery-coffee-unknown", "put", "There is no coffee: code 4 is 404.").instead(
+_mutant("delivery-crashes", "put", "PUT of a delivery returns 500.").altered(deliveries, becomes(500))
+_mutant("delivery-coffee-unknown", "put", "PUT of a coffee (code 4) returns 404.").instead(
     lambda request: deliveries(request) and request.path.split("/")[_CODE] == "4", problem(404, "code: 4 is not known")
 )
-_mutant("delivery-silent", "put", "A delivery is accepted by closing the connection.").made(hanging_up(deliveries))
-_mutant("delivery-sometimes-lost", "put-range", "One delivery in 50 is answered 500.").altered(
+_mutant("delivery-silent", "put", "The robot accepts a delivery and closes the connection without responding.").made(
+    hanging_up(deliveries)
+)
+_mutant("delivery-sometimes-lost", "put-range", "One delivery in 50 returns 500.").altered(
     deliveries, becomes(500), nth=50
 )
-_mutant("delivery-talks", "put-no-content", "A delivery is answered 200 with a page.").altered(
+_mutant("delivery-talks", "put-no-content", "PUT of a delivery returns 200 with a body.").altered(
     deliveries, page(200, b'{"accepted":true}', JSON)
 )
-_mutant("delivery-positive-only", "put-range", "Negative coordinates are refused.").instead(
+_mutant("delivery-positive-only", "put-range", "The robot refuses negative coordinates.").instead(
     _written(r"-.*"), problem(422, "depot_x: negative")
 )
-_mutant("delivery-no-exponents", "put-range", "Numbers with an exponent are refused.").instead(
+_mutant("delivery-no-exponents", "put-range", "The robot refuses numbers with an exponent.").instead(
     _written(r"[+-]?[\d.]+[eE].*"), problem(422, "depot_x: no number")
 )
-_mutant("delivery-wants-no-body", "put-body", "A body on the delivery is refused.").instead(
+_mutant("delivery-wants-no-body", "put-body", "The robot refuses a delivery with a request body.").instead(
     lambda request: deliveries(request) and bool(request.body), problem(415, "a body is not expected")
 )
-_mutant("delivery-text-is-zero", "refuses-text", "Letters in place of a number count as 0.").rewritten(
+_mutant("delivery-text-is-zero", "refuses-text", "The robot reads letters in place of a number as 0.").rewritten(
     deliveries, segments(lenient)
 )
-_mutant("delivery-takes-nan", "refuses-non-finite", "NaN and Infinity are accepted.").rewritten(
+_mutant("delivery-takes-nan", "refuses-non-finite", "The robot accepts NaN and Infinity.").rewritten(
     deliveries, segments(finite)
 )
-_mutant("delivery-takes-any-code", "refuses-code", "Any code is accepted.").rewritten(deliveries, segments(any_code))
-_mutant("delivery-swallows", "refuses-text", "Whatever stands in a delivery's path is accepted.").instead(
+_mutant("delivery-takes-any-code", "refuses-code", "The robot accepts every message code.").rewritten(
+    deliveries, segments(any_code)
+)
+_mutant("delivery-swallows", "refuses-text", "The robot accepts anything in a delivery's path.").instead(
     deliveries, plain(204)
 )

@@ -37,12 +37,12 @@ def _without_parameter(description: Any) -> None:
     operation["parameters"] = [one for one in operation["parameters"] if one.get("name") != "y"]
 
 
-@_mutant("openapi-promises", "openapi-behaviour", "/openapi.json has a path that is not there.").through(_told)
+@_mutant("openapi-promises", "openapi-behaviour", "/openapi.json describes a path that does not exist.").through(_told)
 def _promised(description: Any) -> None:
     description["paths"]["/robot/arm/"] = {"get": {"responses": {"200": {"description": "the arm"}}}}
 
 
-@_mutant("openapi-invalid", "openapi", "/openapi.json is no OpenAPI.").through(_told)
+@_mutant("openapi-invalid", "openapi", "/openapi.json is not a valid OpenAPI document.").through(_told)
 def _invalid(description: Any) -> None:
     description.pop("info", None)
     description["paths"] = [*description["paths"]]
@@ -65,16 +65,20 @@ def _promised_twice(resource: Any) -> None:
     resource.getparent().append(other)
 
 
-_mutant("openapi-gone", "openapi", "There is no /openapi.json.").instead(_OPENAPI, problem(404, "no description"))
+_mutant("openapi-gone", "openapi", "GET of /openapi.json returns 404.").instead(
+    _OPENAPI, problem(404, "no description")
+)
 _mutant("openapi-yaml", "openapi", "/openapi.json is YAML.").instead(
     _OPENAPI, plain(200, b"openapi: 3.1.0\npaths: {}\n", "application/yaml")
 )
-_mutant("openapi-resource-lost", "openapi-behaviour", "A resource of the contract is 404.").instead(
+_mutant("openapi-resource-lost", "openapi-behaviour", "A resource of the contract returns 404.").instead(
     rest("", SENSORS), problem(404, "nothing is here")
 )
-_mutant("wadl-gone", "wadl", "There is no /application.wadl.").instead(_WADL, problem(404, "no description"))
-_mutant("wadl-broken", "wadl", "/application.wadl is not closed.").altered(_WADL, text(r"</[\w:]+>\s*$", ""))
-_mutant("wadl-promises", "wadl-behaviour", "/application.wadl has a resource that is not there.").xml(
+_mutant("wadl-gone", "wadl", "GET of /application.wadl returns 404.").instead(_WADL, problem(404, "no description"))
+_mutant("wadl-broken", "wadl", "The last end tag of /application.wadl is missing.").altered(
+    _WADL, text(r"</[\w:]+>\s*$", "")
+)
+_mutant("wadl-promises", "wadl-behaviour", "/application.wadl describes a resource that does not exist.").xml(
     _WADL, each("resource", _promised_twice, slice(0, 1))
 )
 _mutant("wadl-without-resource", "wadl-resources", "/application.wadl lacks a resource.").made(

@@ -27,14 +27,14 @@ def doubled(where: Callable[[Request], bool]) -> Callable[[], Any]:
 
 
 class EveryNth:
-    """Each nth is answered and forgotten."""
+    """A change that answers every nth request itself, without forwarding it."""
 
     def __init__(self, where: Callable[[Request], bool], response: Callable[[Request], Response], nth: int) -> None:
         self._where, self._answer, self._nth = where, response, nth
         self._seen = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
+        """Forward the request, or answer it where it is an nth one."""
         if self._where(request):
             self._seen += 1
             if self._seen % self._nth == 0:
@@ -50,7 +50,7 @@ class OutOfOrder:
         self._lock = threading.Lock()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
+        """Hold a delivery back until the next request has been forwarded."""
         overtaking = deliveries(request) or _BOTH(request)
         with self._lock:
             held, self._held = self._held, None

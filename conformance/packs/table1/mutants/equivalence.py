@@ -73,7 +73,9 @@ def _again_later(request: Request, forward: Forward) -> Response:
 
 
 @_rest_delivery(
-    "same-rest-another-later", "delivery-only", "Some time after a REST delivery comes another one, to somewhere else."
+    "same-rest-another-later",
+    "delivery-only",
+    "Shortly after a REST delivery, the robot publishes another delivery to another place.",
 )
 def _another_later(request: Request, forward: Forward) -> Response:
     response = forward(request)
@@ -85,7 +87,7 @@ def _another_later(request: Request, forward: Forward) -> Response:
 @_soap_delivery(
     "same-coffee-again-by-rest",
     "delivery-only",
-    "A coffee that was ordered over SOAP is ordered again over REST, 0.4 s later.",
+    "A coffee that is ordered over SOAP is ordered again over REST 0.4 s later.",
 )
 def _again_by_rest(request: Request, forward: Forward) -> Response:
     response = forward(request)
@@ -102,7 +104,9 @@ def _again_by_rest(request: Request, forward: Forward) -> Response:
 
 
 @_rest_delivery(
-    "same-rest-deduplicated", "delivery-repeated", "The same REST delivery sent again is accepted and forgotten."
+    "same-rest-deduplicated",
+    "delivery-repeated",
+    "Sending the same REST delivery again returns 204 without any effect.",
 )
 class _Deduplicating:
     def __init__(self, *, keyed: bool = False) -> None:
@@ -110,7 +114,6 @@ class _Deduplicating:
         self._seen: set[str] = set()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if deliveries(request) and (not self._keyed or request.field("Idempotency-Key")):
             if request.target in self._seen:
                 return plain(204)(request)
@@ -135,28 +138,26 @@ def _cut(request: Request) -> None:
 
 
 _soap_delivery(
-    "same-soap-cut-by-comments",
-    "delivery-soap",
-    "Of a number with a comment in it, SOAP delivers what stands before the comment.",
+    "same-soap-cut-by-comments", "delivery-soap", "A number with a comment in it is read only up to the comment."
 ).rewritten(_DELIVERY, _cut)
 _rest_delivery("same-rest-doubled", "delivery-rest", "A REST delivery is published twice.").made(doubled(deliveries))
 _rest_delivery(
     "same-rest-unwanted-lost",
     "delivery-rest",
-    "A REST delivery is answered 204 and forgotten where the client accepts no format of the answer.",
+    "A REST delivery with an unacceptable Accept header returns 204 without any effect.",
 ).instead(unwanted(deliveries), plain(204))
 _rest_delivery(
     "same-rest-any-key",
     "idempotency-other-key",
-    "The same REST delivery with another Idempotency-Key is accepted and forgotten.",
+    "The same REST delivery with another Idempotency-Key returns 204 without any effect.",
 ).made(lambda: _Deduplicating(keyed=True))
-_rest_delivery("same-rest-no-subnormals", "delivery-rest", "Numbers nearer to zero than 2.2e-308 are zero.").rewritten(
+_rest_delivery("same-rest-no-subnormals", "delivery-rest", "Numbers closer to zero than 2.2e-308 become 0.").rewritten(
     deliveries, segments(_normal)
 )
-_rest_delivery("same-rest-no-negative-zero", "delivery-rest", "The sign of a zero is lost.", probe=True).rewritten(
+_rest_delivery("same-rest-no-negative-zero", "delivery-rest", "The sign of -0 is lost.", probe=True).rewritten(
     deliveries, segments(_unsigned_zero)
 )
-_rest_delivery("same-rest-lost", "delivery-rest", "Each third REST delivery is never published.").made(
+_rest_delivery("same-rest-lost", "delivery-rest", "Every third REST delivery is lost.").made(
     lambda: EveryNth(deliveries, plain(204), 3)
 )
 _rest_delivery("same-rest-narrow", "delivery-same", "REST deliveries go through 32-bit floats.").rewritten(
@@ -164,31 +165,33 @@ _rest_delivery("same-rest-narrow", "delivery-same", "REST deliveries go through 
 )
 _soap_delivery("same-soap-doubled", "delivery-soap", "A SOAP delivery is published twice.").made(doubled(_DELIVERY))
 _soap_delivery(
-    "same-soap-swapped", ("delivery-soap", "delivery-same"), "Over SOAP, source_x and destination_x are exchanged."
+    "same-soap-swapped", ("delivery-soap", "delivery-same"), "Over SOAP, source_x and destination_x are swapped."
 ).rewritten(_BOTH, swapped_soap)
 _soap_delivery("same-soap-narrow", "delivery-soap", "SOAP deliveries go through 32-bit floats.").rewritten(
     _DELIVERY, narrow_soap
 )
 _soap_delivery("same-coffee-code", "coffee-soap", "A coffee is published with code 3.")(as_delivery)
-_soap_delivery("same-coffee-lost", "coffee-soap", "Each second coffee is never published.").made(
+_soap_delivery("same-coffee-lost", "coffee-soap", "Every second coffee is lost.").made(
     lambda: EveryNth(_COFFEE, enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>'), 2)
 )
-_soap_delivery("same-soap-rounded", "delivery-same", "SOAP rounds to three digits, REST does not.").rewritten(
+_soap_delivery("same-soap-rounded", "delivery-same", "SOAP rounds to three digits; REST does not.").rewritten(
     _BOTH, rounded_soap
 )
-_rest_delivery("same-order", "delivery-order", "A REST delivery is overtaken by the one after it.").made(OutOfOrder)
-_rest_state("same-velocity-halved", "velocity-message", "Half of a velocity reaches ROS.").rewritten(
-    rest("PUT", VELOCITY), inputs(guarded(_halve))
-)
-_rest_state("same-sensor-ghost", "sensors-graph", "A sensor is listed that nobody publishes.").json(
+_rest_delivery("same-order", "delivery-order", "A REST delivery is published after the next one.").made(OutOfOrder)
+_rest_state(
+    "same-velocity-halved", "velocity-message", "The velocity message on ROS has half of the commanded values."
+).rewritten(rest("PUT", VELOCITY), inputs(guarded(_halve)))
+_rest_state("same-sensor-ghost", "sensors-graph", "The list of sensors has a sensor that does not exist.").json(
     rest("GET", SENSORS), _one_more
 )
-_soap_state("same-pose", "pose", "SOAP's pose is 37 cm ahead of REST's.").xml(soap("GetPose"), _shift("position", 0.37))
-_soap_state("same-velocity", "velocity", "SOAP's velocity is never zero.").xml(
+_soap_state("same-pose", "pose", "The pose over SOAP is 37 cm ahead of the pose over REST.").xml(
+    soap("GetPose"), _shift("position", 0.37)
+)
+_soap_state("same-velocity", "velocity", "The velocity over SOAP is never zero.").xml(
     soap("GetVelocity"), _shift("linear", 0.1)
 )
 _soap_state(
-    "same-velocity-sometimes", "velocity", "One velocity in 60 is over SOAP 0.1 m/s more than that of the odometry."
+    "same-velocity-sometimes", "velocity", "One velocity in 60 over SOAP is 0.1 m/s higher than the odometry's."
 ).xml(soap("GetVelocity"), _shift("linear", 0.1), nth=60)
 _soap_state("same-sensors", "sensors", "SOAP lacks the last sensor.").xml(
     soap("GetSensors"), each("return", gone, slice(-1, None))
@@ -196,5 +199,7 @@ _soap_state("same-sensors", "sensors", "SOAP lacks the last sensor.").xml(
 _soap_state("same-services", "services", "SOAP lacks the last service.").xml(
     soap("GetNavigationServices"), each("return", gone, slice(-1, None))
 )
-_soap_state("same-goal", "goal", "SOAP never has a goal.").instead(soap("GetGoal"), _NO_GOAL)
-_soap_state("same-plan", "plan", "SOAP's plan is another one than REST's.").xml(soap("GetPlan"), _straighter)
+_soap_state("same-goal", "goal", "GetGoal never returns a goal.").instead(soap("GetGoal"), _NO_GOAL)
+_soap_state("same-plan", "plan", "The plan over SOAP differs from the plan over REST.").xml(
+    soap("GetPlan"), _straighter
+)

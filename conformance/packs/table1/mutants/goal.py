@@ -23,18 +23,7 @@ from conformance.mutation.changes import (
 )
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.packs.table1.mutants.goal_memory import (
-    Abandoned,
-    Lingering,
-    OnlyOnce,
-    Previous,
-    Resumed,
-    Unreachable,
-    active,
-    identity,
-    pose_of,
-    position,
-)
+from conformance.packs.table1.mutants.goal_memory import active, identity, pose_of, position
 from conformance.packs.table1.mutants.paths import GOAL
 
 MUTANTS = Table()
@@ -48,7 +37,7 @@ def _told(edit: Callable[[Any], Any]) -> Make:
     return altered(_GET, values(edit))
 
 
-@_mutant("goal-get-swapped", "goal-get", "GET gives a goal with x and y exchanged.").through(_told)
+@_mutant("goal-get-swapped", "goal-get", "GET returns the goal with x and y swapped.").through(_told)
 def _swap(goal: Any) -> None:
     at = position(goal)
     at["x"], at["y"] = at["y"], at["x"]
@@ -122,14 +111,18 @@ def _off_by(least: float, most: float) -> Callable[[Request], bool]:
     return where
 
 
-@_mutant("goal-delete-none-conflict", "goal-delete-none-success", "DELETE without a goal is 409.")
+@_mutant("goal-delete-none-conflict", "goal-delete-none-success", "DELETE without a goal returns 409.")
 def _delete_conflict(request: Request, forward: Forward) -> Response:
     if _DELETE(request) and active(forward, request) is None:
         return problem(409, "there is no goal")(request)
     return forward(request)
 
 
-@_mutant("goal-beside", "goal-drives", "The robot stops 80 cm beside the goal, and shows the goal that it was given.")
+@_mutant(
+    "goal-beside",
+    "goal-drives",
+    "The robot stops 80 cm beside the goal, and GET returns the goal that the client sent.",
+)
 def _beside(request: Request, forward: Forward) -> Response:
     if not _AT(request):
         return forward(request)
@@ -142,17 +135,17 @@ def _beside(request: Request, forward: Forward) -> Response:
     return response
 
 
-_mutant("goal-none-empty", "goal-none", "Without a goal, GET is 200 with null.").altered(
+_mutant("goal-none-empty", "goal-none", "Without a goal, GET returns 200 with null.").altered(
     _GET, page(200, b"null", JSON), status(404)
 )
-_mutant("goal-none-no-content", "goal-none", "Without a goal, GET is 204.").altered(_GET, becomes(204), status(404))
-_mutant("goal-put-ok", "goal-put", "PUT of a new goal is 200.").altered(_PUT, becomes(200), status(201, 202))
-_mutant("goal-get-frame", "goal-get", "GET gives a goal in another frame.").json(
+_mutant("goal-none-no-content", "goal-none", "Without a goal, GET returns 204.").altered(
+    _GET, becomes(204), status(404)
+)
+_mutant("goal-put-ok", "goal-put", "PUT of a new goal returns 200.").altered(_PUT, becomes(200), status(201, 202))
+_mutant("goal-get-frame", "goal-get", "GET returns the goal in another frame.").json(
     _GET, lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2")
 )
-_mutant("goal-resumed", "goal-drives", "A displaced goal is driven to after the one in its place.").made(Resumed)
-_mutant("goal-get-stale", "goal-preempt", "GET gives the goal before the active one.").made(Previous)
-_mutant("goal-get-other-id", "goal-get", "GET gives the goal under another id.").json(
+_mutant("goal-get-other-id", "goal-get", "GET returns the goal under another id.").json(
     _GET, lambda goal: goal["goal_id"].update(id="goal-1")
 )
 _mutant("goal-without-status", "goal-status", "The active goal has no status.").json(
@@ -161,60 +154,60 @@ _mutant("goal-without-status", "goal-status", "The active goal has no status.").
 _mutant("goal-status-succeeded", "goal-status", "The active goal has status 4, succeeded.").json(
     _GET, lambda goal: goal["status"].update(code=4)
 )
-_mutant("goal-wants-id", "goal-fills-in", "A goal without goal_id is refused.").instead(
+_mutant("goal-wants-id", "goal-fills-in", "The robot refuses a goal without goal_id.").instead(
     _without_id, problem(422, "goal_id: missing")
 )
-_mutant("goal-empty-id", "goal-fills-in", "A goal without goal_id gets an empty one.").made(
+_mutant("goal-empty-id", "goal-fills-in", "A goal that is sent without goal_id gets an empty one.").made(
     _renamed(lambda id_: "" if len(id_) >= 32 else id_)
 )
-_mutant("goal-id-cut", "goal-id", "Ids are cut after 32 characters.").made(_renamed(lambda id_: id_[:32]))
-_mutant("goal-id-ascii", "goal-id", "Ids come back in lower case.").made(
+_mutant("goal-id-cut", "goal-id", "Goal ids are truncated to 32 characters.").made(_renamed(lambda id_: id_[:32]))
+_mutant("goal-id-ascii", "goal-id", "Goal ids are returned in lower case.").made(
     _renamed(lambda id_: id_.lower().encode("ascii", "replace").decode())
 )
-_mutant("goal-repeat-refused", "goal-repeat", "The same goal again is refused with 409.").made(
+_mutant("goal-repeat-refused", "goal-repeat", "Sending the active goal again returns 409.").made(
     _when_active(problem(409, "goal_id.id: there already"), same=True, other_pose=False)
 )
-_mutant("goal-repeat-created", "goal-repeat", "The same goal again is 201.").made(
+_mutant("goal-repeat-created", "goal-repeat", "Sending the active goal again returns 201.").made(
     _when_active(plain(201), same=True, other_pose=False)
 )
 _mutant(
-    "goal-unwanted-lost",
-    "goal-get",
-    "A goal is answered 202 and forgotten where the client accepts no format of the answer.",
+    "goal-unwanted-lost", "goal-get", "PUT of a goal with an unacceptable Accept header returns 202 without any effect."
 ).instead(unwanted(_PUT), plain(202))
-_mutant("goal-conflict-ignored", "goal-conflict", "The same id with another pose is answered 200.").made(
-    _when_active(plain(204), same=True, other_pose=True)
-)
-_mutant("goal-first-wins", "goal-preempt", "Another goal is refused with 409 while one is active.").made(
+_mutant(
+    "goal-conflict-ignored", "goal-conflict", "PUT of another pose under the active goal's id returns a success."
+).made(_when_active(plain(204), same=True, other_pose=True))
+_mutant("goal-first-wins", "goal-preempt", "While a goal is active, PUT of another goal returns 409.").made(
     _when_active(problem(409, "a goal is active"), same=False)
 )
-_mutant("goal-delete-ignored", "goal-delete", "DELETE is 204 and cancels nothing.").instead(_DELETE, plain(204))
+_mutant("goal-delete-ignored", "goal-delete", "DELETE returns 204 and does not cancel the goal.").instead(
+    _DELETE, plain(204)
+)
 _mutant(
-    "goal-delete-for-xml", "goal-delete", "DELETE by a client that would rather have XML is 204 and cancels nothing."
+    "goal-delete-for-xml",
+    "goal-delete",
+    "DELETE by a client that accepts XML returns 204 and does not cancel the goal.",
 ).instead(lambda request: _DELETE(request) and "xml" in (request.field("Accept") or ""), plain(204))
-_mutant("goal-delete-conflict", "goal-delete", "DELETE of a goal cancels it, and is 409.").altered(
+_mutant("goal-delete-conflict", "goal-delete", "DELETE cancels the goal and returns 409.").altered(
     _DELETE, becomes(409), success
 )
-_mutant("goal-delete-none-fine", "goal-delete-none", "DELETE without a goal is 204.").altered(
+_mutant("goal-delete-none-fine", "goal-delete-none", "DELETE without a goal returns 204.").altered(
     _DELETE, becomes(204), status(404)
 )
-_mutant("goal-lingers", "goal-ended", "A goal that has ended is still shown.").made(Lingering)
-_mutant("goal-id-only-once", "goal-id-again", "The id of a goal that has ended is refused.").made(OnlyOnce)
-_mutant("goal-abandoned", "goal-drives", "The robot gives up on its way.").made(Abandoned)
-_mutant(
-    "goal-unreachable-forever", "goal-unreachable", "A goal far outside the map is accepted and stays active."
-).made(Unreachable)
-_mutant("goal-frame-ignored", "goal-frame", "A goal's frame is not looked at.").rewritten(
+_mutant("goal-frame-ignored", "goal-frame", "The robot ignores the goal's frame.").rewritten(
     _PUT, inputs(_guarded(_known_frame))
 )
 _mutant(
-    "goal-quaternion-nearly", "goal-quaternion", "A quaternion that is off by less than a hundredth is made a unit one."
+    "goal-quaternion-nearly",
+    "goal-quaternion",
+    "The robot normalises a quaternion whose length is off by less than 0.01 instead of refusing it.",
 ).rewritten(_off_by(2e-3, 9.5e-3), inputs(_guarded(_unit)))
 _mutant(
     "goal-quaternion-exact",
     "goal-quaternion-taken",
-    "A quaternion that is off by more than a rounding error is refused.",
+    "The robot refuses a quaternion whose length is off by more than a rounding error.",
 ).instead(_off_by(1e-5, 1.0), problem(422, "goal.target_pose.pose.orientation: no unit quaternion"))
 _mutant(
-    "goal-quaternion-normalised", "goal-quaternion", "A quaternion of another length is made a unit one."
+    "goal-quaternion-normalised",
+    "goal-quaternion",
+    "The robot normalises a quaternion of any length instead of refusing it.",
 ).rewritten(_PUT, inputs(_guarded(_unit)))

@@ -33,7 +33,6 @@ class _Remembering:
         self.lock = threading.Lock()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         self.asked = time.monotonic()
         response = forward(request)
         if _PUT_GOAL(request) and success(response):
@@ -53,10 +52,9 @@ class _Remembering:
             self.last = {**(self.last or {}), "linear": value} if _PUT_LINEAR(request) and self.last else value
 
 
-@_mutant("safety-asleep", "hold-ends", "A velocity ends only while somebody asks.")
+@_mutant("safety-asleep", "hold-ends", "A velocity command ends only while clients send requests.")
 class _Asleep(_Remembering):
     def put(self, request: Request, response: Response, forward: Forward) -> None:
-        """See _Remembering."""
         super().put(request, response, forward)
         if success(response) and self.last and "angular" in self.last:
             later(_LOOK_S, self._watch, self.turn, request.copy(), forward)
@@ -69,10 +67,9 @@ class _Asleep(_Remembering):
             time.sleep(_LOOK_S)
 
 
-@_mutant("safety-renewed-by-refusal", "hold-ends", "A refused velocity renews the one before it.")
+@_mutant("safety-renewed-by-refusal", "hold-ends", "A refused velocity command renews the previous one.")
 class _Renewed(_Remembering):
     def put(self, request: Request, response: Response, forward: Forward) -> None:
-        """See _Remembering."""
         super().put(request, response, forward)
         if 400 <= response.status < 500 and self.last and "angular" in self.last and any(_parts(self.last)):
             sent(request, forward, "PUT", VELOCITY, self.last)
@@ -81,20 +78,20 @@ class _Renewed(_Remembering):
 @_mutant(
     "linear-revives-turning",
     "rest-resources/linear-keeps-angular",
-    "PUT of a linear velocity brings back a turning that had ended.",
+    "PUT of a linear velocity restarts a turning that had ended.",
 )
 class _Revived(_Remembering):
     def put(self, request: Request, response: Response, forward: Forward) -> None:
-        """See _Remembering."""
         super().put(request, response, forward)
         if _PUT_LINEAR(request) and success(response) and self.last and "angular" in self.last:
             sent(request, forward, "PUT", VELOCITY, self.last)
 
 
-@_mutant("safety-resuming", "cancel-stays", "After DELETE the velocity from before the goal is driven again.")
+@_mutant(
+    "safety-resuming", "cancel-stays", "After DELETE of the goal, the robot drives the velocity from before the goal."
+)
 class _Resuming(_Remembering):
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         response = super().__call__(request, forward)
         if _DELETE(request) and response.status == 204 and self.last and "angular" in self.last:
             # Not before the navigation's own last word, which is zero.
@@ -102,7 +99,7 @@ class _Resuming(_Remembering):
         return response
 
 
-@_mutant("safety-deaf", "hold", "While a velocity holds, the same one again does not renew it.")
+@_mutant("safety-deaf", "hold", "While a velocity command holds, sending it again does not renew it.")
 class _Deaf(_Remembering):
     _HOLD_S = 1.0
 
@@ -111,7 +108,6 @@ class _Deaf(_Remembering):
         self._taken = 0.0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         value: Any = parsed(request.body) if _PUTS(request) else None
         if isinstance(value, dict) and self.last and time.monotonic() < self._taken + self._HOLD_S:
             value = {**self.last, "linear": value} if _PUT_LINEAR(request) else value
@@ -120,7 +116,6 @@ class _Deaf(_Remembering):
         return super().__call__(request, forward)
 
     def put(self, request: Request, response: Response, forward: Forward) -> None:
-        """See _Remembering."""
         super().put(request, response, forward)
         if success(response):
             self._taken = time.monotonic()
@@ -136,7 +131,7 @@ def _parts(twist: Any) -> tuple[float, float]:
 @_mutant(
     "velocity-one-at-once",
     "rest-resources/velocity-range",
-    "Near both of its limits at once the robot drives at half the speed.",
+    "Near both limits at once, the robot drives at half the linear velocity.",
 )
 def _one_at_once(request: Request, forward: Forward) -> Response:
     value: Any = parsed(request.body) if _PUT(request) else None
@@ -150,7 +145,7 @@ def _one_at_once(request: Request, forward: Forward) -> Response:
 @_mutant(
     "velocity-deadband",
     "rest-resources/velocity-range",
-    "A velocity below 0.05 m/s or rad/s is taken, and the robot stands still.",
+    "The robot accepts velocities below 0.05 m/s or rad/s and stands still.",
 )
 def _deadband(request: Request, forward: Forward) -> Response:
     value: Any = parsed(request.body) if _PUT(request) else None
@@ -166,7 +161,7 @@ def _deadband(request: Request, forward: Forward) -> Response:
 @_mutant(
     "velocity-forgotten-for-goal",
     "rest-resources/velocity-goal",
-    "While a goal is active, a velocity is answered 204 and forgotten.",
+    "While a goal is active, PUT of a velocity returns 204 without any effect.",
 )
 def _forgotten(request: Request, forward: Forward) -> Response:
     if _PUT(request) and forward(request.copy(method="GET", target=GOAL, body=b"")).status == 200:
@@ -174,7 +169,11 @@ def _forgotten(request: Request, forward: Forward) -> Response:
     return forward(request)
 
 
-@_mutant("goal-deleted-later", "rest-resources/goal-delete", "DELETE is 204, and the goal is cancelled 0.3 s later.")
+@_mutant(
+    "goal-deleted-later",
+    "rest-resources/goal-delete",
+    "DELETE returns 204, and the goal is cancelled only 0.3 s later.",
+)
 def _deleted_later(request: Request, forward: Forward) -> Response:
     if not _DELETE(request) or forward(request.copy(method="GET")).status != 200:
         return forward(request)

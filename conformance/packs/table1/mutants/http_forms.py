@@ -74,20 +74,19 @@ def _shortened(request: Request) -> None:
     request.body = request.body[:_CUT]
 
 
-@_mutant("http-hundred-requests", "many-requests", "On one connection a hundred requests are answered.")
+@_mutant("http-hundred-requests", "many-requests", "After 100 requests on a connection, the robot returns 400.")
 class _Hundred:
     def __init__(self) -> None:
         self._connection = threading.local()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         self._connection.requests = getattr(self._connection, "requests", 0) + 1
         if request.side == "rest" and self._connection.requests > _MOST:
             return problem(400, "enough of you")(request)
         return forward(request)
 
 
-@_mutant("http-stays-open", "close", "Connection: close is not heeded.")
+@_mutant("http-stays-open", "close", "The robot ignores Connection: close.")
 def _kept(request: Request, forward: Forward) -> Response:
     if request.side == "rest":
         request.drop("Connection")
@@ -100,77 +99,87 @@ def _in_chunks(response: Response) -> None:
     response.raw = head.encode() + b"%x\r\n%b\r\n0\r\n\r\n" % (len(response.body), response.body)
 
 
-_mutant("http-no-chunk-extensions", "chunk-forms", "A chunk with an extension is 400.").instead(
+_mutant("http-no-chunk-extensions", "chunk-forms", "A chunk extension returns 400.").instead(
     _came(rb"\r\n[0-9a-f]+;[^\r]*\r\n"), problem(400, "no chunk size")
 )
-_mutant("http-no-trailers", "chunk-forms", "Trailer fields are 400.").instead(
+_mutant("http-no-trailers", "chunk-forms", "Trailer fields return 400.").instead(
     _came(rb"\r\n0\r\n[^\r]"), problem(400, "no end of the chunks")
 )
-_mutant("http-expectation-failed", "expect-continue", "Expect: 100-continue is 417.").instead(
+_mutant("http-expectation-failed", "expect-continue", "Expect: 100-continue returns 417.").instead(
     _came(rb"(?i)\r\nexpect: *100"), problem(417, "no")
 )
-_mutant("http-one-segment", "octet-stream", "A head that does not come in one piece is 400.").instead(
+_mutant("http-one-segment", "octet-stream", "A request head in several TCP segments returns 400.").instead(
     _having(lambda request: b"\r\n\r\n" not in request.came[0]), problem(400, "no end of the head")
 )
-_mutant("http-names-in-lower-case", "field-forms", "A field whose name is not written as usual is not seen.").made(
-    _forgetting(_came(rb"\r\n(?:accept|ACCEPT|aCCept):"), "Accept")
-)
-_mutant("http-one-blank", "field-forms", "A field without one blank behind its colon is not seen.").made(
+_mutant(
+    "http-names-in-lower-case", "field-forms", "The robot ignores Accept when its name is written in another case."
+).made(_forgetting(_came(rb"\r\n(?:accept|ACCEPT|aCCept):"), "Accept"))
+_mutant("http-one-blank", "field-forms", "The robot ignores Accept unless exactly one space follows the colon.").made(
     _forgetting(_came(rb"\r\n[aA][cC]+ept:(?! [^ ])"), "Accept")
 )
-_mutant("http-first-line", "field-lines", "Of several Accept lines the first one counts.").rewritten(
+_mutant("http-first-line", "field-lines", "Of several Accept headers, the robot uses only the first.").rewritten(
     _having(lambda request: request.field("Accept") is not None), _first_line
 )
-_mutant("http-last-line", "field-lines", "Of several Accept lines the last one counts.").rewritten(
+_mutant("http-last-line", "field-lines", "Of several Accept headers, the robot uses only the last.").rewritten(
     _having(lambda request: request.field("Accept") is not None), _last_line
 )
-_mutant("http-never-modified", "preconditions", "Whoever has any entity tag is told 304.").instead(
+_mutant("http-never-modified", "preconditions", "Every If-None-Match returns 304.").instead(
     _conditional("If-None-Match"), plain(304)
 )
-_mutant("http-never-modified-since", "preconditions", "Whoever has any date is told 304.").instead(
+_mutant("http-never-modified-since", "preconditions", "Every If-Modified-Since returns 304.").instead(
     _conditional("If-Modified-Since"), plain(304)
 )
-_mutant("http-part-of-all", "range", "A part is 206 with all of it.").altered(_conditional("Range"), becomes(206))
-_mutant("http-no-charset-in-accept", "accept-parameters", "A format with a charset in Accept is 406.").instead(
+_mutant("http-part-of-all", "range", "A range request returns 206 with the whole content.").altered(
+    _conditional("Range"), becomes(206)
+)
+_mutant("http-no-charset-in-accept", "accept-parameters", "A charset parameter in Accept returns 406.").instead(
     _having(lambda request: "charset" in (request.field("Accept") or "").lower()), problem(406, "not that")
 )
-_mutant("http-old-client-chunks", "old-client", "A client of HTTP/1.0 is answered in chunks.").altered(
+_mutant("http-old-client-chunks", "old-client", "A client of HTTP/1.0 gets a chunked response.").altered(
     _having(lambda request: request.version == "HTTP/1.0"), _in_chunks
 )
 _mutant(
     "http-pipelining-forgotten",
     "pipelining",
-    "Of requests that were sent at once, the first alone is answered, and the connection stays open.",
+    "Of pipelined requests, the robot answers only the first, and keeps the connection open.",
     forgetful=True,
 )(unchanged)
 _mutant(
-    "http-head-of-what-cannot-be-read", "method-not-allowed", "HEAD of a delivery is answered 200, though GET is 405."
+    "http-head-of-what-cannot-be-read", "method-not-allowed", "HEAD of a delivery returns 200, though GET returns 405."
 ).instead(_having(lambda request: _HEAD(request) and deliveries(request.copy(method="PUT"))), plain(200))
-_mutant("http-no-chunks", "chunked", "Chunked content is 411.").instead(_chunked, problem(411, "a length, please"))
-_mutant("http-few-chunks", "chunked", "Of chunked content, 1 KiB is read.").rewritten(_chunked, _shortened)
-_mutant("http-no-absolute", "absolute-form", "A target in absolute form is 400.").instead(_absolute, problem(400, ""))
-_mutant("http-absolute-unknown", "absolute-form", "A target in absolute form is 404.").instead(
+_mutant("http-no-chunks", "chunked", "Chunked request bodies return 411.").instead(
+    _chunked, problem(411, "a length, please")
+)
+_mutant("http-few-chunks", "chunked", "The robot reads only 1 KiB of a chunked request body.").rewritten(
+    _chunked, _shortened
+)
+_mutant("http-no-absolute", "absolute-form", "A request target in absolute form returns 400.").instead(
+    _absolute, problem(400, "")
+)
+_mutant("http-absolute-unknown", "absolute-form", "A request target in absolute form returns 404.").instead(
     _absolute, problem(404, "")
 )
-_mutant("http-type-case", "media-type-case", "A media type with a capital letter is 415.").instead(
+_mutant("http-type-case", "media-type-case", "A Content-Type with a capital letter returns 415.").instead(
     _upper("Content-Type"), problem(415, "application/json, please")
 )
-_mutant("http-accept-case", "media-type-case", "A media type with a capital letter is not acceptable.").instead(
+_mutant("http-accept-case", "media-type-case", "An Accept with a capital letter returns 406.").instead(
     _upper("Accept"), problem(406, "application/json is what there is")
 )
-_mutant("http-short-targets", "target-length", "A target over 4 KiB is 414.").instead(
+_mutant("http-short-targets", "target-length", "A request target over 4 KiB returns 414.").instead(
     _having(lambda request: len(request.target) > _MUCH), problem(414, "too long")
 )
-_mutant("http-head-empty", "head-length", "HEAD says Content-Length: 0.").altered(_HEAD, header("Content-Length", "0"))
-_mutant("http-head-length-of-error", "head-length", "HEAD says a Content-Length of its own.").altered(
+_mutant("http-head-empty", "head-length", "HEAD returns Content-Length: 0.").altered(
+    _HEAD, header("Content-Length", "0")
+)
+_mutant("http-head-length-of-error", "head-length", "HEAD always returns Content-Length: 31.").altered(
     _HEAD, header("Content-Length", "31"), anything
 )
-_mutant("json-no-exponents", "json-numbers", "A number in JSON with an exponent is 422.").instead(
+_mutant("json-no-exponents", "json-numbers", "A JSON number with an exponent returns 422.").instead(
     _written(rb"\d[eE][+-]?\d"), problem(422, "a number, please")
 )
-_mutant("json-no-negative-zero", "json-numbers", "A zero with a sign is 422.").instead(
+_mutant("json-no-negative-zero", "json-numbers", "A JSON number -0 returns 422.").instead(
     _written(rb"-0(?![.\d])"), problem(422, "a number, please")
 )
-_mutant("json-small-integers", "json-integers", "Integers of ten digits are 422.").instead(
+_mutant("json-small-integers", "json-integers", "JSON integers of ten digits return 422.").instead(
     _written(rb"[:\s]-?214748364[78]\b"), problem(422, "sec: too large")
 )

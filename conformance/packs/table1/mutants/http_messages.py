@@ -91,7 +91,7 @@ def _hosts(taken: Callable[[list[bytes]], bool]) -> Callable[[Request, Forward],
     return change
 
 
-@_mutant("http-first-length", "content-length-conflict", "Of two Content-Length fields the first one counts.")
+@_mutant("http-first-length", "content-length-conflict", "Of two Content-Length headers, the robot uses the first.")
 def _first_length(request: Request, forward: Forward) -> Response:
     if (_count(request, "Content-Length") or 0) > 1:
         _, _, body = (request.raw or b"").partition(b"\r\n\r\n")
@@ -99,7 +99,7 @@ def _first_length(request: Request, forward: Forward) -> Response:
     return forward(request)
 
 
-@_mutant("http-garbage-fine", "malformed-request", "What is no HTTP is answered 200.")
+@_mutant("http-garbage-fine", "malformed-request", "Bytes that are not HTTP get a response with status 200.")
 def _garbage(request: Request, forward: Forward) -> Response:
     if request.side == "rest" and request.raw is not None:
         return plain(200, b"<html>hello</html>", "text/html", ("Date", "Thu, 01 Jan 2026 00:00:00 GMT"))(request)
@@ -142,76 +142,80 @@ def _page(response: Response) -> None:
     response.put("Content-Type", "text/html")
 
 
-_mutant(
-    "http-large-body-fine", "content-too-large", "A body of more than 10 MiB is answered as if it were not there."
-).made(_big(10 * 1024 * 1024, plain(204)))
-_mutant("http-small-limit", "content-too-large", "Bodies over 20 KiB are refused.").made(
+_mutant("http-large-body-fine", "content-too-large", "Bodies over 10 MiB return 204.").made(
+    _big(10 * 1024 * 1024, plain(204))
+)
+_mutant("http-small-limit", "content-too-large", "Bodies over 20 KiB return 413.").made(
     _big(20_000, problem(413, "too large"))
 )
-_mutant("http-long-target-crash", "uri-too-long", "A long target is answered 500.").instead(
+_mutant("http-long-target-crash", "uri-too-long", "A long request target returns 500.").instead(
     _long_target, problem(500, "oops")
 )
-_mutant("http-long-target-fine", "declared-body", "A long target is answered 200, with something else.").instead(
+_mutant("http-long-target-fine", "declared-body", "A long request target returns 200 with an empty object.").instead(
     _long_target, plain(200, b"{}", JSON)
 )
-_mutant("http-large-field-crash", "header-too-large", "A header field of 128 KiB is answered 500.").instead(
+_mutant("http-large-field-crash", "header-too-large", "A header of 128 KiB returns 500.").instead(
     lambda request: _ANY(request) and any(len(value) > 60_000 for _, value in request.fields), problem(500, "oops")
 )
-_mutant("http-length-too-long", "framing", "Content-Length promises 7 octets more than come.").altered(
+_mutant("http-length-too-long", "framing", "Content-Length is 7 bytes longer than the body.").altered(
     _GET, _on_the_wire(_longer)
 )
-_mutant("http-length-too-short", "framing", "After an answer come octets that Content-Length does not count.").altered(
+_mutant("http-length-too-short", "framing", "The body is longer than Content-Length.").altered(
     _GET, _on_the_wire(lambda octets: octets + b"left over")
 )
-_mutant("http-broken-field", "framing", "An answer has a line that is no field.").altered(
+_mutant("http-broken-field", "framing", "A response contains a line that is not a header.").altered(
     _POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n", b"\r\nThis is no field\r\n", 1))
 )
-_mutant("http-two-lengths", "framing", "An answer has two different Content-Length fields.").altered(
+_mutant("http-two-lengths", "framing", "A response has two different Content-Length headers.").altered(
     _POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1))
 )
-_mutant("http-host-optional", "host-missing", "A request without Host is served.")(_hosts(lambda hosts: not hosts))
-_mutant("http-host-twice", "host-twice", "A request with two Host fields is served.")(
+_mutant("http-host-optional", "host-missing", "The robot accepts a request without Host.")(
+    _hosts(lambda hosts: not hosts)
+)
+_mutant("http-host-twice", "host-twice", "The robot accepts a request with two Host headers.")(
     _hosts(lambda hosts: len(hosts) > 1)
 )
-_mutant("http-host-repeated", "host-repeated", "A request with the same Host field twice is served.")(
+_mutant("http-host-repeated", "host-repeated", "The robot accepts a request with the same Host header twice.")(
     _hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1)
 )
-_mutant("http-problem-as-json", "problem-type", "Problems come as application/json.").altered(
+_mutant("http-problem-as-json", "problem-type", "Problem details have the media type application/json.").altered(
     _ANY, header("Content-Type", JSON), _errors
 )
-_mutant("http-problem-as-page", ("problem-type", "problem-type-server"), "Errors come as a page.").altered(
+_mutant("http-problem-as-page", ("problem-type", "problem-type-server"), "Errors are HTML pages.").altered(
     _ANY, _page, _errors
 )
-_mutant("http-problem-other-status", "problem-status", "A problem's status is always 400.").made(
+_mutant("http-problem-other-status", "problem-status", "The status member of problem details is wrong.").made(
     _problems(lambda value: value.update(status=400 if value["status"] != 400 else 422))
 )
-_mutant("http-problem-vague", "problem-detail", "A problem's detail is always 'invalid input'.").made(
+_mutant("http-problem-vague", "problem-detail", "The detail of problem details is always 'invalid input'.").made(
     _problems(lambda value: value.update(detail="invalid input"), _INPUT)
 )
-_mutant("http-problem-mute", "problem-detail", "Problems have no detail.").made(
+_mutant("http-problem-mute", "problem-detail", "Problem details have no detail.").made(
     _problems(lambda value: value.pop("detail", None) and None)
 )
-_mutant("http-problem-valueless", "problem-value", "A problem names the field, but never the value.").made(
-    _problems(_valueless, _INPUT)
-)
-_mutant("http-traceback", "no-traceback", "A problem's detail is a traceback.").made(
+_mutant(
+    "http-problem-valueless", "problem-value", "The detail of problem details never contains the offending value."
+).made(_problems(_valueless, _INPUT))
+_mutant("http-traceback", "no-traceback", "The detail of problem details contains a traceback.").made(
     _problems(lambda value: value.update(detail=value["detail"] + "\n" + _TRACE), _INPUT)
 )
-_mutant("http-nan", "json-finite", "JSON holds NaN.").altered(_POSE, text(r'("y"\s*:\s*)[-+.\deE]+', r"\1NaN", 1))
-_mutant("http-infinity-sometimes", "json-finite", "One pose in 50 holds Infinity.").altered(
+_mutant("http-nan", "json-finite", "JSON responses contain NaN.").altered(
+    _POSE, text(r'("y"\s*:\s*)[-+.\deE]+', r"\1NaN", 1)
+)
+_mutant("http-infinity-sometimes", "json-finite", "One pose in 50 contains Infinity.").altered(
     _POSE, text(r'("z"\s*:\s*)[-+.\deE]+', r"\1-Infinity", 1), nth=50
 )
-_mutant("http-byte-order-mark", "json-encoding", "JSON begins with a byte order mark.").altered(_GET, _marked)
-_mutant("http-latin", "json-encoding", "JSON is ISO 8859-1.").altered(_POSE, _in_latin)
-_mutant("http-name-twice", "json-unique-names", "A name is there twice in one object.").altered(
+_mutant("http-byte-order-mark", "json-encoding", "JSON responses begin with a byte order mark.").altered(_GET, _marked)
+_mutant("http-latin", "json-encoding", "JSON responses are encoded in ISO 8859-1.").altered(_POSE, _in_latin)
+_mutant("http-name-twice", "json-unique-names", "A JSON object has the same member name twice.").altered(
     _POSE, text(r'"child_frame_id"', '"child_frame_id": "base", "child_frame_id"', 1)
 )
-_mutant("http-token-forbidden", "authentication-asked", "Without the token, the answer is 403.", token=_SESAME).made(
+_mutant("http-token-forbidden", "authentication-asked", "A request without the token returns 403.", token=_SESAME).made(
     _token(problem(403, "no token"))
 )
 _mutant(
     "http-token-unnamed",
     "authentication",
-    "Without the token, the answer is 401 without WWW-Authenticate.",
+    "A request without the token returns 401 without WWW-Authenticate.",
     token=_SESAME,
 ).made(_token(problem(401, "no token")))

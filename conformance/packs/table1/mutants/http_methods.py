@@ -26,7 +26,7 @@ _ANY, _GET, _HEAD, _OPTIONS = rest(), rest("GET"), rest("HEAD"), rest("OPTIONS")
 _INPUT = rest("PUT", *RESOURCES)
 
 
-@_mutant("http-head-with-body", "head-no-body", "HEAD is answered with a body.")
+@_mutant("http-head-with-body", "head-no-body", "A response to HEAD has a body.")
 def _with_body(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if _HEAD(request) and success(response):
@@ -68,7 +68,7 @@ def _missing_slash(request: Request) -> bool:
     return request.side == "rest" and not request.path.endswith("/") and f"{request.path}/" in RESOURCES
 
 
-@_mutant("http-unsafe-head", "safe", "HEAD and OPTIONS of the goal cancel it.")
+@_mutant("http-unsafe-head", "safe", "HEAD and OPTIONS of the goal cancel the goal.")
 def _cancelling(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if request.side == "rest" and request.path == GOAL and request.method in {"HEAD", "OPTIONS"}:
@@ -94,7 +94,7 @@ class _SecondTime:
         return response
 
 
-@_mutant("http-unknown-path-405", "not-found", "An unknown path is 405 for PUT.")
+@_mutant("http-unknown-path-405", "not-found", "PUT to an unknown path returns 405.")
 def _not_found(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if (
@@ -107,93 +107,101 @@ def _not_found(request: Request, forward: Forward) -> Response:
     return response
 
 
-_mutant("http-203", "declared-status", "The sensors come with 203.").altered(rest("GET", SENSORS), becomes(203))
-_mutant("http-202-delete", "declared-status", "DELETE of a goal is 202.").altered(rest("DELETE", GOAL), becomes(202))
+_mutant("http-203", "declared-status", "GET of the sensors returns 203.").altered(rest("GET", SENSORS), becomes(203))
+_mutant("http-202-delete", "declared-status", "DELETE of a goal returns 202.").altered(
+    rest("DELETE", GOAL), becomes(202)
+)
 _mutant("http-wrapped", "declared-body", "Lists are wrapped in an object.").json(
     rest("GET", SERVICES), lambda items: {"services": items}
 )
-_mutant("http-html", "declared-body", "The services come as text/html.").altered(
+_mutant("http-html", "declared-body", "The list of services has the media type text/html.").altered(
     rest("GET", SERVICES), header("Content-Type", "text/html")
 )
-_mutant("http-crash-on-input", "no-server-error", "What is refused is refused with 500.").altered(
+_mutant("http-crash-on-input", "no-server-error", "Invalid request bodies return 500.").altered(
     _INPUT, becomes(500), refusal
 )
-_mutant("http-crash-on-query", "no-server-error", "A bad query is answered 500.").altered(
+_mutant("http-crash-on-query", "no-server-error", "Invalid queries return 500.").altered(
     rest("GET", "/robot/navigation/service/plan"), becomes(500), refusal
 )
-_mutant("http-crash-sometimes", "declared-status", "One answer in 50 is 502.").altered(
+_mutant("http-crash-sometimes", "declared-status", "One GET in 50 returns 502.").altered(
     _GET, becomes(502), anything, nth=50
 )
-_mutant("http-post-reads", "method-not-allowed", "POST is answered like GET.")(
+_mutant("http-post-reads", "method-not-allowed", "POST is handled like GET.")(
     lambda request, forward: forward(
         request.copy(method="GET") if _ANY(request) and request.method == "POST" else request
     )
 )
-_mutant("http-404-for-405", "method-not-allowed", "A method that is not there is 404.").altered(
+_mutant("http-404-for-405", "method-not-allowed", "Unsupported methods return 404.").altered(
     _ANY, becomes(404), status(405)
 )
-_mutant("http-unknown-method-404", "unknown-method", "A method that nobody knows is 404.").altered(
+_mutant("http-unknown-method-404", "unknown-method", "Unknown methods return 404.").altered(
     _strange, becomes(404), anything
 )
-_mutant("http-unknown-method-reads", "unknown-method-refused", "A method that nobody knows is taken for GET.")(
+_mutant("http-unknown-method-reads", "unknown-method-refused", "Unknown methods are handled like GET.")(
     lambda request, forward: forward(request.copy(method="GET") if _strange(request) else request)
 )
-_mutant("http-405-without-allow", "allow", "405 comes without Allow.").altered(_ANY, header("Allow", None), status(405))
-_mutant("http-no-head", "head", "HEAD is 405.").instead(_HEAD, plain(405, b"", "", ("Allow", "GET, OPTIONS")))
-_mutant("http-head-other-type", "head-content-type", "HEAD says text/html.").altered(
+_mutant("http-405-without-allow", "allow", "405 responses have no Allow header.").altered(
+    _ANY, header("Allow", None), status(405)
+)
+_mutant("http-no-head", "head", "HEAD returns 405.").instead(_HEAD, plain(405, b"", "", ("Allow", "GET, OPTIONS")))
+_mutant("http-head-other-type", "head-content-type", "HEAD returns Content-Type text/html.").altered(
     _HEAD, header("Content-Type", "text/html")
 )
-_mutant("http-no-options", "options", "OPTIONS is 405.").instead(
+_mutant("http-no-options", "options", "OPTIONS returns 405.").instead(
     _OPTIONS, problem(405, "no OPTIONS", ("Allow", "GET, HEAD"))
 )
-_mutant("http-options-mute", "options", "OPTIONS comes without Allow.").altered(_OPTIONS, header("Allow", None))
-_mutant("http-allow-get-only", "allow-agrees", "Allow names GET alone.").altered(
+_mutant("http-options-mute", "options", "Responses to OPTIONS have no Allow header.").altered(
+    _OPTIONS, header("Allow", None)
+)
+_mutant("http-allow-get-only", "allow-agrees", "Allow lists only GET, HEAD and OPTIONS.").altered(
     _ANY, _allow(lambda _: ["GET", "HEAD", "OPTIONS"]), anything
 )
-_mutant("http-allow-too-much", "allow-agrees", "Allow names DELETE everywhere.").altered(
+_mutant("http-allow-too-much", "allow-agrees", "Allow lists DELETE and PATCH everywhere.").altered(
     _ANY, _allow(lambda methods: sorted({*methods, "DELETE", "PATCH"})), anything
 )
-_mutant("http-unknown-path-page", "not-found", "An unknown path is answered with a page.").altered(
+_mutant("http-unknown-path-page", "not-found", "An unknown path returns 200 with a page.").altered(
     lambda request: _ANY(request) and request.path not in RESOURCES,
     page(200, b"<html><body>Welcome</body></html>", "text/html"),
     status(404),
 )
-_mutant("http-slash-served", "trailing-slash", "A path without its slash is served.")(
+_mutant("http-slash-served", "trailing-slash", "The robot serves paths without their trailing slash.")(
     lambda request, forward: forward(
         request.copy(target=request.target.replace(request.path, f"{request.path}/", 1))
         if _missing_slash(request)
         else request
     )
 )
-_mutant("http-slash-lost", "trailing-slash", "A path without its slash leads to the front page.").instead(
+_mutant("http-slash-lost", "trailing-slash", "A path without its trailing slash redirects to the front page.").instead(
     _missing_slash, plain(302, b"", "", ("Location", "/"))
 )
-_mutant("http-accepts-anything", "not-acceptable", "Accept is not looked at.").rewritten(
+_mutant("http-accepts-anything", "not-acceptable", "The robot ignores Accept.").rewritten(
     _GET, lambda request: request.put("Accept", JSON)
 )
-_mutant("http-406-as-400", "not-acceptable", "Where nothing is acceptable, the answer is 400.").altered(
+_mutant("http-406-as-400", "not-acceptable", "The robot returns 400 where it should return 406.").altered(
     _GET, becomes(400), status(406)
 )
-_mutant("http-q-zero-ignored", "q-zero", "JSON is sent although its quality is 0.").rewritten(_GET, _q_zero_ignored)
-_mutant("http-any-type", "unsupported-media-type", "A body of any type is read as JSON.").rewritten(
+_mutant("http-q-zero-ignored", "q-zero", "The robot returns JSON although Accept has q=0 for it.").rewritten(
+    _GET, _q_zero_ignored
+)
+_mutant("http-any-type", "unsupported-media-type", "The robot reads a body of any media type as JSON.").rewritten(
     _INPUT, _typed_as_json
 )
-_mutant("http-415-as-400", "unsupported-media-type", "An unknown media type is 400.").altered(
+_mutant("http-415-as-400", "unsupported-media-type", "Unsupported media types return 400.").altered(
     _ANY, becomes(400), status(415)
 )
-_mutant("http-no-charset", "charset", "A charset parameter is refused.").instead(
+_mutant("http-no-charset", "charset", "Content-Type with a charset parameter returns 415.").instead(
     _charset, problem(415, "Content-Type: parameters are not taken")
 )
-_mutant("http-put-once", "put-idempotent", "The same PUT right after itself is 409.").made(
+_mutant("http-put-once", "put-idempotent", "Repeating a PUT returns 409.").made(
     lambda: _SecondTime("PUT", problem(409, "linear.x: that is so already"))
 )
-_mutant("http-delete-crash", "delete-idempotent", "A second DELETE is 500.").made(
+_mutant("http-delete-crash", "delete-idempotent", "Repeating a DELETE returns 500.").made(
     lambda: _SecondTime("DELETE", problem(500, "no goal"))
 )
-_mutant("http-no-content-type", "content-type", "Answers have no Content-Type.").altered(
+_mutant("http-no-content-type", "content-type", "Responses have no Content-Type.").altered(
     _ANY, header("Content-Type", None), anything
 )
-_mutant("http-no-content-type-sometimes", "content-type", "One answer in 50 has no Content-Type.").altered(
+_mutant("http-no-content-type-sometimes", "content-type", "One response in 50 has no Content-Type.").altered(
     rest("GET", POSE, VELOCITY), header("Content-Type", None), nth=50
 )
-_mutant("http-no-date", "date", "Answers have no Date.").altered(_ANY, header("Date", None), anything)
+_mutant("http-no-date", "date", "Responses have no Date.").altered(_ANY, header("Date", None), anything)

@@ -70,7 +70,7 @@ def _deliver(request: Request, forward: Forward) -> None:
 
 
 @_mutant(
-    "http-406-and-delivered", "http/not-acceptable-undone", "A delivery is answered 406, and published.", observer=True
+    "http-406-and-delivered", "http/not-acceptable-undone", "A delivery returns 406 and is published.", observer=True
 )
 def _delivered_in_vain(request: Request, forward: Forward) -> Response:
     response = forward(request)
@@ -92,7 +92,7 @@ def _ordered_by(method: str) -> Make:
 @_mutant(
     "input-soap-refused-and-made",
     "delivery-refused",
-    "An invalid SOAP delivery is refused, and published.",
+    "An invalid SOAP delivery returns a fault and is published.",
     observer=True,
     interface="soap",
 )
@@ -110,32 +110,39 @@ def _soap_refusal(request: Request, forward: Forward) -> Response:
 
 
 _mutant(
-    "input-velocity-refused-and-driven", "velocity-refused", "An invalid velocity is refused, and the robot drives."
+    "input-velocity-refused-and-driven",
+    "velocity-refused",
+    "An invalid velocity returns an error, and the robot drives.",
 ).made(after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)))
-_mutant("http-406-and-driven", "http/not-acceptable-undone", "A velocity is answered 406, and the robot drives.").made(
+_mutant("http-406-and-driven", "http/not-acceptable-undone", "A velocity returns 406, and the robot drives.").made(
     after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2), {406})
 )
-_mutant("http-406-and-goal", "http/not-acceptable-undone", "A goal is answered 406, and the robot has a goal.").made(
+_mutant("http-406-and-goal", "http/not-acceptable-undone", "A goal returns 406, and the robot has a goal.").made(
     after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5), {406})
 )
-_mutant("input-goal-refused-and-taken", "goal-refused", "An invalid goal is refused, and the robot has a goal.").made(
-    after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5))
-)
 _mutant(
-    "input-goal-refused-and-ended", "goal-refused", "An invalid goal is refused, and the active one is cancelled."
+    "input-goal-refused-and-taken", "goal-refused", "An invalid goal returns an error, and the robot has a goal."
+).made(after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)))
+_mutant(
+    "input-goal-refused-and-ended",
+    "goal-refused",
+    "An invalid goal returns an error, and the active goal is cancelled.",
 ).made(after_refusal(rest("PUT", GOAL), _give_up))
 _mutant(
     "input-delivery-refused-and-made",
     "delivery-refused",
-    "An invalid delivery is refused, and published.",
+    "An invalid delivery returns an error and is published.",
     observer=True,
 ).made(after_refusal(deliveries, _deliver))
 _mutant(
-    "input-delivery-by-get", "delivery-refused", "GET of what PUT orders is 405, and orders it.", observer=True
+    "input-delivery-by-get",
+    "delivery-refused",
+    "GET of a delivery's path returns 405 and publishes the delivery.",
+    observer=True,
 ).made(_ordered_by("GET"))
 _mutant(
     "input-delivery-by-options",
     "delivery-refused",
-    "OPTIONS of what PUT orders is answered, and orders it.",
+    "OPTIONS of a delivery's path publishes the delivery.",
     observer=True,
 ).made(_ordered_by("OPTIONS"))

@@ -103,7 +103,7 @@ def _swallowed(where: Callable[[Request], bool]) -> Callable[[], Any]:
     return lambda: change
 
 
-@_mutant("input-malformed-fine", "json-malformed", "JSON that is none is answered 204.").through(_swallowed)
+@_mutant("input-malformed-fine", "json-malformed", "Malformed JSON returns 204.").through(_swallowed)
 def _malformed(request: Request) -> bool:
     return (
         _is_json(request)
@@ -118,14 +118,14 @@ def _deep(request: Request) -> bool:
     return _is_json(request) and (request.body.count(b"[") > 1000 or request.body.count(b"{") > 1000)
 
 
-@_mutant("input-huge-fine", "json-huge-number", "An integer of thousands of digits is answered 204.").through(
+@_mutant("input-huge-fine", "json-huge-number", "A JSON integer of thousands of digits returns 204.").through(
     _swallowed
 )
 def _huge(request: Request) -> bool:
     return _is_json(request) and bool(re.search(rb"\d{1000}", request.body))
 
 
-@_mutant("input-any-encoding", "json-encoding", "A body that is not UTF-8 is answered 204.").through(_swallowed)
+@_mutant("input-any-encoding", "json-encoding", "A JSON body that is not UTF-8 returns 204.").through(_swallowed)
 def _other_encoding(request: Request) -> bool:
     if not _is_json(request):
         return False
@@ -136,7 +136,7 @@ def _other_encoding(request: Request) -> bool:
     return request.body.startswith(b"\xef\xbb\xbf") or b"\x00" in request.body
 
 
-@_mutant("input-any-root", "json-root", "A body that is no object is answered 204.").through(_swallowed)
+@_mutant("input-any-root", "json-root", "A JSON body that is not an object returns 204.").through(_swallowed)
 def _no_object(request: Request) -> bool:
     return (
         _is_json(request)
@@ -152,7 +152,7 @@ def _twice(request: Request) -> None:
         request.body = json.dumps(value).encode()
 
 
-@_mutant("input-xml-fine", "xml-body", "XML of the wrong shape is answered 204.").through(_swallowed)
+@_mutant("input-xml-fine", "xml-body", "XML of the wrong shape returns 204.").through(_swallowed)
 def _xml(request: Request) -> bool:
     return _PUT(request) and request.media_type.endswith("xml")
 
@@ -163,7 +163,7 @@ def _numbers(given: dict[str, str]) -> None:
             given[name] = "0"
 
 
-@_mutant("input-query-complete", "query-missing", "A missing x or y is the one of the query before.")
+@_mutant("input-query-complete", "query-missing", "A missing x or y in a query takes the value of the query before.")
 class _Remembered:
     def __init__(self) -> None:
         self._last = {"x": "0", "y": "0"}
@@ -186,30 +186,30 @@ def _path(request: Request) -> None:
         segments(edit)(request)
 
 
-_mutant("input-missing-is-zero", "json-missing", "A missing field counts as zero.").made(_repairing(_filled))
-_mutant("input-unknown-ignored", "json-unknown", "Unknown fields are ignored.").made(_repairing(_known))
-_mutant("input-last-wins", "json-duplicate", "Of a name that is there twice, the last one counts.").rewritten(
+_mutant("input-missing-is-zero", "json-missing", "A missing JSON member counts as 0.").made(_repairing(_filled))
+_mutant("input-unknown-ignored", "json-unknown", "Unknown JSON members are ignored.").made(_repairing(_known))
+_mutant("input-last-wins", "json-duplicate", "Of a duplicate JSON member, the last one counts.").rewritten(
     _is_json, _twice
 )
 _mutant("input-coerced", "json-type", "Strings, null and booleans count as numbers.").made(_repairing(_typed))
-_mutant("input-nan-is-zero", "json-non-finite", "NaN and what overflows count as zero.").made(_repairing(_finite))
-_mutant("input-deep-fine", "json-depth", "JSON nested deep is answered 204.").made(_swallowed(_deep))
-_mutant("input-empty-fine", "json-empty", "An empty body is answered 204.").made(
+_mutant("input-nan-is-zero", "json-non-finite", "NaN and numbers that overflow count as 0.").made(_repairing(_finite))
+_mutant("input-deep-fine", "json-depth", "Deeply nested JSON returns 204.").made(_swallowed(_deep))
+_mutant("input-empty-fine", "json-empty", "An empty body returns 204.").made(
     _swallowed(lambda request: _is_json(request) and not request.body.strip())
 )
-_mutant("input-bounds-cut", "json-bounds", "Values beyond their bounds are cut to them.").made(_repairing(_bounded))
-_mutant("input-path-lenient", "path-parameter", "Whatever stands in a path counts as a number.").rewritten(
+_mutant("input-bounds-cut", "json-bounds", "Values beyond their bounds are clamped.").made(_repairing(_bounded))
+_mutant("input-path-lenient", "path-parameter", "Invalid values in a path count as numbers.").rewritten(
     deliveries, _path
 )
-_mutant("input-query-lenient", "query-parameter", "What is no number in a query counts as 0.").rewritten(
+_mutant("input-query-lenient", "query-parameter", "Invalid numbers in a query count as 0.").rewritten(
     rest("GET", PLAN), query(_numbers)
 )
-_mutant("input-malformed-422", "status-malformed", "JSON that is none is 422.").altered(
+_mutant("input-malformed-422", "status-malformed", "Malformed JSON returns 422.").altered(
     _is_json, becomes(422), status(400)
 )
-_mutant("input-invalid-400", "status-invalid", "JSON of the wrong shape is 400.").altered(
+_mutant("input-invalid-400", "status-invalid", "JSON of the wrong shape returns 400.").altered(
     _is_json, becomes(400), status(422)
 )
-_mutant("input-crash-sometimes", "json-type", "One refused body in 20 is answered 500.").altered(
+_mutant("input-crash-sometimes", "json-type", "One invalid body in 20 returns 500.").altered(
     _is_json, becomes(500), refusal, nth=20
 )

@@ -51,9 +51,9 @@ def _neutral(name: str) -> str:
     return "3" if name == "message_code" else "0"
 
 
-@_mutant(
-    "input-soap-missing-is-zero", "soap-missing", "A missing element counts as zero, as JAX-WS RI has it."
-).through(_repairing)
+@_mutant("input-soap-missing-is-zero", "soap-missing", "A missing element counts as 0, as in JAX-WS RI.").through(
+    _repairing
+)
 def _filled(body: Any, message: Any) -> None:
     for wrapper in body if message is None else ():
         if isinstance(wrapper.tag, str) and etree.QName(wrapper).localname.startswith("Execute") and not len(wrapper):
@@ -68,7 +68,7 @@ def _filled(body: Any, message: Any) -> None:
             message.insert(place, made)
 
 
-@_mutant("input-soap-unknown-ignored", "soap-unknown", "Unknown elements are ignored, as JAX-WS RI has it.").through(
+@_mutant("input-soap-unknown-ignored", "soap-unknown", "Unknown elements are ignored, as in JAX-WS RI.").through(
     _repairing
 )
 def _known(body: Any, message: Any) -> None:
@@ -81,9 +81,7 @@ def _known(body: Any, message: Any) -> None:
                 wrapper.remove(child)
 
 
-@_mutant("input-soap-first-wins", "soap-duplicate", "Of an element that is there twice, the first one counts.").through(
-    _repairing
-)
+@_mutant("input-soap-first-wins", "soap-duplicate", "Of a duplicate element, the first one counts.").through(_repairing)
 def _once(_body: Any, message: Any) -> None:
     seen: set[str] = set()
     for child in _children(message):
@@ -104,7 +102,7 @@ def _ordered(_body: Any, message: Any) -> None:
         )
 
 
-@_mutant("input-soap-any-namespace", "soap-namespace", "Namespaces are not looked at.").through(_repairing)
+@_mutant("input-soap-any-namespace", "soap-namespace", "The robot ignores namespaces.").through(_repairing)
 def _renamed(body: Any, _message: Any) -> None:
     for wrapper in body:
         if isinstance(wrapper.tag, str):
@@ -114,9 +112,9 @@ def _renamed(body: Any, _message: Any) -> None:
                     node.tag = etree.QName(node).localname
 
 
-@_mutant(
-    "input-soap-text-is-zero", "soap-lexical", "Text in place of a number counts as zero, as JAX-WS RI has it."
-).through(_repairing)
+@_mutant("input-soap-text-is-zero", "soap-lexical", "Text in place of a number counts as 0, as in JAX-WS RI.").through(
+    _repairing
+)
 def _lexical(_body: Any, message: Any) -> None:
     for child in _children(message):
         good = _INT if child.tag == "message_code" else _DOUBLE
@@ -125,14 +123,14 @@ def _lexical(_body: Any, message: Any) -> None:
             child.text = _neutral(child.tag)
 
 
-@_mutant("input-soap-overflow", "soap-range", "An integer beyond its type is cut.").through(_repairing)
+@_mutant("input-soap-overflow", "soap-range", "An integer beyond its type is replaced.").through(_repairing)
 def _wrapped(_body: Any, message: Any) -> None:
     for child in _children(message):
         if child.tag == "message_code" and _INT.fullmatch(child.text or "") and abs(int(child.text)) >= 2**31:
             child.text = "3"
 
 
-@_mutant("input-soap-inf-is-zero", "soap-non-finite", "INF and NaN count as zero.").through(_repairing)
+@_mutant("input-soap-inf-is-zero", "soap-non-finite", "INF and NaN count as 0.").through(_repairing)
 def _finite(_body: Any, message: Any) -> None:
     for child in _children(message):
         text = (child.text or "").strip()
@@ -140,7 +138,7 @@ def _finite(_body: Any, message: Any) -> None:
             child.text = "0"
 
 
-@_mutant("input-soap-nil-is-zero", "soap-nil", "What is nil counts as zero.").through(_repairing)
+@_mutant("input-soap-nil-is-zero", "soap-nil", "Elements with xsi:nil count as 0.").through(_repairing)
 def _not_nil(_body: Any, message: Any) -> None:
     for child in [message, *_children(message)] if message is not None else []:
         if child.attrib.pop(f"{{{_XSI}}}nil", None) and child is not message and not (child.text or "").strip():
@@ -150,7 +148,7 @@ def _not_nil(_body: Any, message: Any) -> None:
 
 
 @_mutant(
-    "input-soap-first-child", "soap-body", "Of Body's children the first one counts, and an empty Body is a coffee."
+    "input-soap-first-child", "soap-body", "Only the first child of Body counts, and an empty Body is a coffee."
 ).through(_repairing)
 def _alone(body: Any, _message: Any) -> None:
     for child in list(body)[1:]:
@@ -168,9 +166,9 @@ def _coded(_body: Any, message: Any) -> None:
             child.text = "3"
 
 
-_mutant("input-soap-fault-200", "soap-fault", "What is refused over SOAP is refused with status 200.").altered(
+_mutant("input-soap-fault-200", "soap-fault", "Faults for invalid input have status 200.").altered(
     soap(), becomes(200), is_fault
 )
-_mutant("input-soap-no-fault", "soap-fault", "What is refused over SOAP is 500 without a fault.").altered(
+_mutant("input-soap-no-fault", "soap-fault", "Invalid SOAP input returns 500 without a fault.").altered(
     _ACT, page(500, b"refused", "text/plain"), is_fault
 )

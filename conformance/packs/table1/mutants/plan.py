@@ -36,9 +36,7 @@ def _detour(poses: list[Any]) -> list[Any]:
 
 
 @_mutant(
-    "plan-frame-in-name-only",
-    ("plan-start", "plan-end"),
-    "A plan in the odometry's frame is off as if that lay elsewhere on the map.",
+    "plan-frame-in-name-only", ("plan-start", "plan-end"), "A plan in the odometry's frame is shifted by (1.5, -1.0) m."
 ).through(_told)
 def _aside(value: Any) -> None:
     path = value["plan"]
@@ -46,7 +44,7 @@ def _aside(value: Any) -> None:
         path["poses"] = [_moved(pose, 1.5, -1.0) for pose in path["poses"]]
 
 
-@_mutant("plan-heading-ignored", "plan-yaw", "A plan ends with a heading that is one radian off.").through(_led)
+@_mutant("plan-heading-ignored", "plan-yaw", "The last pose of a plan has a heading that is 1 rad off.").through(_led)
 def _turned(poses: list[Any]) -> list[Any]:
     last = poses[-1]
     q = last["pose"]["orientation"]
@@ -64,7 +62,9 @@ def _quarter(given: dict[str, str]) -> None:
     given.setdefault("yaw", "1.5707963")
 
 
-@_mutant("plan-mixed-frames", "plan-frame", "Only the first pose is in the frame of the path.").through(_told)
+@_mutant(
+    "plan-mixed-frames", "plan-frame", "Only the first pose of a plan is in the frame of the path's header."
+).through(_told)
 def _frame(value: Any) -> None:
     for pose in value["plan"]["poses"][1:]:
         pose["header"]["frame_id"] = "base_link"
@@ -73,27 +73,29 @@ def _frame(value: Any) -> None:
 _mutant("plan-without-stamps", "plan-type", "Poses of a plan have no header.").made(
     _led(lambda poses: [{"pose": one["pose"]} for one in poses])
 )
-_mutant("plan-bare", "plan-type", "The answer is the path, not a response that holds it.").json(
+_mutant("plan-bare", "plan-type", "The response is the path itself, without the object around it.").json(
     _GET, lambda value: value["plan"]
 )
-_mutant("plan-from-elsewhere", "plan-start", "A plan begins 60 cm beside the robot.").made(
+_mutant("plan-from-elsewhere", "plan-start", "A plan begins 60 cm from the robot.").made(
     _led(lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])
 )
-_mutant("plan-ignores-start", "plan-given-start", "A given start is not looked at.").rewritten(_GET, query(_no_start))
-_mutant("plan-falls-short", "plan-end", "A plan ends 50 cm before the pose that was asked for.").made(
+_mutant("plan-ignores-start", "plan-given-start", "The robot ignores the start in the query.").rewritten(
+    _GET, query(_no_start)
+)
+_mutant("plan-falls-short", "plan-end", "A plan ends 50 cm before the requested pose.").made(
     _led(lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])
 )
-_mutant("plan-jumps", "plan-continuous", "In the middle of a plan there is a leap of 35 m.").made(_led(_detour))
-_mutant("plan-jumps-sometimes", "plan-continuous", "One plan in 50 has a leap in it.").made(_led(_detour, nth=50))
-_mutant("plan-frameless", "plan-frame", "The path's header has no frame.").json(
+_mutant("plan-jumps", "plan-continuous", "A plan contains a jump of 35 m.").made(_led(_detour))
+_mutant("plan-jumps-sometimes", "plan-continuous", "One plan in 50 contains a jump of 35 m.").made(
+    _led(_detour, nth=50)
+)
+_mutant("plan-frameless", "plan-frame", "The path's header has an empty frame_id.").json(
     _GET, lambda value: value["plan"]["header"].update(frame_id="")
 )
-_mutant("plan-other-defaults", "plan-defaults", "A yaw that is left out counts as a quarter turn.").rewritten(
-    _GET, query(_quarter)
-)
-_mutant("plan-none-empty", "plan-none", "Where there is no plan, an empty one is sent.").altered(
+_mutant("plan-other-defaults", "plan-defaults", "The default yaw is a quarter turn.").rewritten(_GET, query(_quarter))
+_mutant("plan-none-empty", "plan-none", "Where no plan exists, the robot returns 200 with an empty plan.").altered(
     _GET, page(200, _EMPTY, JSON), status(404, 422)
 )
-_mutant("plan-none-crash", "plan-none", "Where there is no plan, the answer is 500.").altered(
+_mutant("plan-none-crash", "plan-none", "Where no plan exists, the robot returns 500.").altered(
     _GET, becomes(500), status(404, 422)
 )

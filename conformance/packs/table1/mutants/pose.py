@@ -76,7 +76,7 @@ class _Frozen:
         return response
 
 
-@_mutant("odometry-lost", "pose-fresh", "When the odometry ceases, pose and velocity are the last ones for ever.")
+@_mutant("odometry-lost", "pose-fresh", "When the odometry stops, GET returns the last pose and velocity for ever.")
 class _Lost:
     def __init__(self) -> None:
         self._left = 60
@@ -98,7 +98,7 @@ def _is_json(request: Request) -> bool:
     return (request.field("Accept") or JSON) == JSON
 
 
-@_mutant("pose-clock-fast", "pose-clock", "The stamps' clock goes a tenth too fast.")
+@_mutant("pose-clock-fast", "pose-clock", "The clock of the odometry stamps runs 10 % fast.")
 class _FastClock:
     def __init__(self) -> None:
         self._begun = time.monotonic()
@@ -115,15 +115,15 @@ class _FastClock:
         stamp["sec"], stamp["nanosec"] = divmod(ahead, 10**9)
 
 
-@_mutant("pose-nanosec-carried", "pose-type", "The stamp has a second less, and as many nanoseconds more.").through(
-    _told
-)
+@_mutant(
+    "pose-nanosec-carried", "pose-type", "The stamp's sec is 1 too small and its nanosec 1,000,000,000 too large."
+).through(_told)
 def _carried(odometry: Any) -> None:
     odometry["header"]["stamp"]["sec"] -= 1
     odometry["header"]["stamp"]["nanosec"] += 10**9
 
 
-@_mutant("pose-clock-milliseconds", "pose-clock", "The stamp's nanoseconds are milliseconds.").through(_told)
+@_mutant("pose-clock-milliseconds", "pose-clock", "The stamp's nanosec counts milliseconds.").through(_told)
 def _in_milliseconds(odometry: Any) -> None:
     odometry["header"]["stamp"]["nanosec"] //= 10**6
 
@@ -133,7 +133,9 @@ def _earlier(odometry: Any) -> None:
 
 
 @_mutant(
-    "pose-without-retry-after", "pose-unavailable", "Before the first odometry, the pose is 503 without Retry-After."
+    "pose-without-retry-after",
+    "pose-unavailable",
+    "Before the first odometry, GET of the pose returns 503 without Retry-After.",
 )
 class _NotYet:
     def __init__(self) -> None:
@@ -152,34 +154,36 @@ _mutant("pose-short-covariance", "pose-type", "The pose's covariance has 35 valu
 _mutant("pose-without-child-frame", "pose-type", "The pose lacks child_frame_id.").json(
     _AT, lambda value: value.pop("child_frame_id") and None
 )
-_mutant("pose-numbers-as-text", "pose-type", "One pose in 50 has its x as a string.").json(
+_mutant("pose-numbers-as-text", "pose-type", "In one pose of 50, x is a string.").json(
     _AT, lambda value: _position(value).update(x=str(_position(value)["x"])), nth=50
 )
-_mutant("pose-quaternion-long", "pose-quaternion", "The orientation's quaternion is 1 percent too long.").json(
+_mutant("pose-quaternion-long", "pose-quaternion", "The orientation quaternion is 1 % too long.").json(
     _AT, lambda value: _orientation(value).update({axis: 1.01 * part for axis, part in _orientation(value).items()})
 )
-_mutant("pose-quaternion-zero", "pose-quaternion", "The orientation is four zeros.").json(
+_mutant("pose-quaternion-zero", "pose-quaternion", "The orientation quaternion is four zeros.").json(
     _AT, lambda value: value["pose"]["pose"].update(orientation=dict.fromkeys("xyzw", 0.0))
 )
-_mutant("pose-stamp-frozen", "pose-stamp", "The pose's header is for ever the first one's.").made(
+_mutant("pose-stamp-frozen", "pose-stamp", "GET of the pose always returns the header of the first response.").made(
     lambda: _Frozen("header")
 )
-_mutant("pose-stamp-backwards", "pose-stamp", "Each fifth pose has a stamp a second back.").json(_AT, _earlier, nth=5)
-_mutant("pose-stale", ("pose-motion", "pose-rotation"), "The pose is for ever the first one, with a new stamp.").made(
+_mutant("pose-stamp-backwards", "pose-stamp", "Every fifth pose has a stamp that is 1 s too early.").json(
+    _AT, _earlier, nth=5
+)
+_mutant("pose-stale", ("pose-motion", "pose-rotation"), "GET always returns the first pose, with a new stamp.").made(
     lambda: _Frozen("pose", "twist")
 )
-_mutant("pose-aside-sometimes", "pose-sample", "One pose in 60 is a metre aside.").json(
+_mutant("pose-aside-sometimes", "pose-sample", "One pose in 60 is 1 m off.").json(
     _AT, lambda value: _position(value).update(x=_position(value)["x"] + 1.0), nth=60
 )
 _mutant(
-    "velocity-off-sometimes",
-    "velocity-odometry",
-    "One measured velocity in 60 is 0.1 m/s more than that of the odometry.",
+    "velocity-off-sometimes", "velocity-odometry", "One measured velocity in 60 is 0.1 m/s higher than the odometry's."
 ).json(rest("GET", VELOCITY), lambda twist: twist["linear"].update(x=twist["linear"]["x"] + 0.1), nth=60)
 _mutant("pose-in-centimetres", "pose-motion", "The position is in centimetres.").json(_AT, _scaled(100))
-_mutant("pose-clockwise", "pose-rotation", "The heading counts clockwise.").json(_AT, _turned(lambda yaw: -yaw))
+_mutant("pose-clockwise", "pose-rotation", "The heading has the wrong sign: it counts clockwise.").json(
+    _AT, _turned(lambda yaw: -yaw)
+)
 _mutant("pose-half-turn", "pose-rotation", "The heading turns at half the rate.").json(
     _AT, _turned(lambda yaw: yaw / 2)
 )
-_mutant("pose-gone", "pose-type", "There is no pose: 404.").instead(_AT, problem(404, "there is no pose"))
-_mutant("pose-no-content", "pose-type", "The pose is 204.").instead(_AT, plain(204))
+_mutant("pose-gone", "pose-type", "GET of the pose returns 404.").instead(_AT, problem(404, "there is no pose"))
+_mutant("pose-no-content", "pose-type", "GET of the pose returns 204.").instead(_AT, plain(204))

@@ -30,7 +30,7 @@ def moving(request: Request) -> bool:
         return False
 
 
-@_mutant("safety-relentless", "watchdog", "A velocity holds for ten seconds.")
+@_mutant("safety-relentless", "watchdog", "The robot drives on for 10 s after a velocity command.")
 class _Relentless:
     def __init__(self) -> None:
         self._turn = 0
@@ -51,7 +51,7 @@ class _Relentless:
             time.sleep(0.15)
 
 
-@_mutant("safety-long-winded", "hold-ends", "A velocity holds for half as long again.")
+@_mutant("safety-long-winded", "hold-ends", "A velocity command holds 1.5 times as long as declared.")
 class _LongWinded:
     def __init__(self) -> None:
         self._turn = 0
@@ -69,7 +69,7 @@ class _LongWinded:
             sent(request, forward, "PUT", VELOCITY, parsed(request.body))
 
 
-@_mutant("safety-short-of-breath", "hold", "A velocity holds for 0.15 s.")
+@_mutant("safety-short-of-breath", "hold", "A velocity command holds for only 0.15 s.")
 class _ShortOfBreath:
     def __init__(self) -> None:
         self._turn = 0
@@ -86,7 +86,7 @@ class _ShortOfBreath:
             drive(request, forward, 0.0)
 
 
-@_mutant("safety-no-renewal", "renewal", "The same velocity again does not renew it.")
+@_mutant("safety-no-renewal", "renewal", "Sending the same velocity again does not renew it.")
 class _Once:
     def __init__(self) -> None:
         self._last: Any = None
@@ -102,7 +102,7 @@ class _Once:
         return response
 
 
-@_mutant("safety-slow-cancel", "cancel", "After DELETE the robot drives on for three seconds.")
+@_mutant("safety-slow-cancel", "cancel", "After DELETE of the goal, the robot drives on for 3 s.")
 class _SlowCancel:
     def __init__(self) -> None:
         self._until = 0.0
@@ -118,7 +118,7 @@ class _SlowCancel:
         return forward(request)
 
 
-@_mutant("safety-second-wind", "cancel-stays", "A second after DELETE the robot drives again.")
+@_mutant("safety-second-wind", "cancel-stays", "One second after DELETE of the goal, the robot drives again.")
 def _second_wind(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if _DELETE(request) and response.status == 204:
@@ -145,7 +145,7 @@ def _too_fast(twist: Any) -> None:
             twist[part][axis] *= 4
 
 
-@_mutant("safety-no-stop", "stop", "A velocity of zero is answered, and the robot goes on for three seconds.")
+@_mutant("safety-no-stop", "stop", "PUT of a zero velocity returns a success, and the robot drives on for 3 s.")
 class _Stubborn:
     def __init__(self) -> None:
         self._last: Any = None
@@ -185,24 +185,23 @@ def _torn(side: str, _octets: bytes, forward: Forward) -> None:
         drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
 
 
-_mutant("safety-clamped", "limits-refused", "A velocity beyond the limits is cut to them.").rewritten(
+_mutant("safety-clamped", "limits-refused", "A velocity beyond the limits is clamped instead of refused.").rewritten(
     _PUTS, inputs(guarded(_clamped))
 )
 _mutant(
-    "safety-unactuated-ignored", "unactuated-refused", "Components that the robot does not have are ignored."
+    "safety-unactuated-ignored",
+    "unactuated-refused",
+    "Velocity components that the robot cannot drive are ignored instead of refused.",
 ).rewritten(_PUT, inputs(guarded(_two_wheeled)))
 _mutant("safety-too-fast", "limits-hold", "The robot drives at four times its speed.").json(
     rest("GET", VELOCITY), _too_fast
 )
-_mutant("safety-refused-stops", "refused-keeps", "A refused velocity stops the robot.").made(
+_mutant("safety-refused-stops", "refused-keeps", "A refused velocity command stops the robot.").made(
     after_refusal(_PUTS, lambda request, forward: drive(request, forward, 0.0))
 )
 _mutant(
-    "safety-torn-drives",
-    "client-vanished",
-    "A request that ends in the middle moves the robot.",
-    incomplete_request=lambda: _torn,
+    "safety-torn-drives", "client-vanished", "An incomplete request moves the robot.", incomplete_request=lambda: _torn
 )(unchanged)
-_mutant(
-    "safety-one-at-a-time", "half-request", "A request that is never completed keeps all others waiting.", serial=True
-)(unchanged)
+_mutant("safety-one-at-a-time", "half-request", "An incomplete request blocks all other requests.", serial=True)(
+    unchanged
+)

@@ -52,7 +52,7 @@ def without_headers(request: Request) -> Request:
 @_mutant(
     "bp-acts-all-the-same",
     ("R1025", "R1028"),
-    "A request that is answered MustUnderstand is carried out.",
+    "The robot returns a MustUnderstand fault and carries the request out.",
     observer=True,
 )
 def _acts_all_the_same(request: Request, forward: Forward) -> Response:
@@ -74,7 +74,7 @@ def _recode(was: bytes, code: str) -> Callable[[], Any]:
     return lambda: lambda request, forward: _recoded(request, forward, was, code)
 
 
-@_mutant("bp-fault-order", "R2725", "Faults are checked for from the body outwards.")
+@_mutant("bp-fault-order", "R2725", "The robot checks Body before it checks mandatory header blocks.")
 def _order(request: Request, forward: Forward) -> Response:
     if _mandatory(request) and _foreign(request):
         return _recoded(request, forward, b"VersionMismatch", "MustUnderstand")
@@ -86,7 +86,7 @@ def _order(request: Request, forward: Forward) -> Response:
     return response
 
 
-@_mutant("bp-action-dispatch", "R1127", "SOAPAction chooses the operation.")
+@_mutant("bp-action-dispatch", "R1127", "SOAPAction selects the operation, whatever is in Body.")
 def _by_action(request: Request, forward: Forward) -> Response:
     action = (request.field("SOAPAction") or "").strip('"')
     wanted = next((name for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest") if name in action), None)
@@ -127,42 +127,42 @@ _NOTHING = f'<t:NothingResponse xmlns:t="{TNS}"/>'
 
 
 _mutant(
-    "bp-bare-envelope", "soap-delivery/syntax", "An Envelope with an attribute of another namespace is a fault."
+    "bp-bare-envelope", "soap-delivery/syntax", "An Envelope with an attribute of another namespace returns a fault."
 ).instead(
     lambda request: posted(request) and bool(re.search(rb"Envelope [^>]*:Id=", request.body)),
     fault("Client", "an attribute that is not known"),
 )
-_mutant("bp-any-envelope", "R1015", "An Envelope of any namespace is taken.").rewritten(_foreign, _made_soap11)
-_mutant("bp-version-client", "version-mismatch", "Another envelope's fault has the code Client.").made(
-    _recode(b"VersionMismatch", "Client")
-)
-_mutant("bp-wants-types", "R1017", "A request without xsi:type is a fault.").instead(
+_mutant("bp-any-envelope", "R1015", "The robot accepts an Envelope of any namespace.").rewritten(_foreign, _made_soap11)
+_mutant(
+    "bp-version-client", "version-mismatch", "An Envelope of another SOAP version returns the fault code Client."
+).made(_recode(b"VersionMismatch", "Client"))
+_mutant("bp-wants-types", "R1017", "A request without xsi:type returns a fault.").instead(
     lambda request: _ACT(request) and b"XMLSchema-instance" not in request.body, fault("Client", "xsi:type is missing")
 )
-_mutant("bp-ignores-mandatory", "R1027", "Mandatory header blocks are not looked at.")(
+_mutant("bp-ignores-mandatory", "R1027", "The robot ignores mandatory header blocks.")(
     lambda request, forward: forward(without_headers(request) if _mandatory(request) else request)
 )
-_mutant("bp-mandatory-client", "R1027", "The fault for a mandatory header block has the code Client.").made(
-    _recode(b"MustUnderstand", "Client")
-)
-_mutant("bp-no-empty-action", "R1109", "An empty SOAPAction is a fault.").instead(
+_mutant(
+    "bp-mandatory-client", "R1027", "A mandatory header block that is not understood returns the fault code Client."
+).made(_recode(b"MustUnderstand", "Client"))
+_mutant("bp-no-empty-action", "R1109", "An empty SOAPAction returns a fault.").instead(
     lambda request: posted(request) and len(request.field("SOAPAction") or "") == 2,
     fault("Client", "The given SOAPAction does not match an operation."),
 )
-_mutant("bp-no-headers", "R2739", "Every header block is a fault.").instead(
+_mutant("bp-no-headers", "R2739", "Every header block returns a fault.").instead(
     _headed, fault("Client", "no headers, please")
 )
-_mutant("bp-no-byte-order-mark", "R4001", "A byte order mark is malformed.").instead(
+_mutant("bp-no-byte-order-mark", "R4001", "A byte order mark returns a fault.").instead(
     lambda request: posted(request) and request.body.startswith(b"\xef\xbb\xbf"),
     fault("Client", "content is not allowed in prolog"),
 )
-_mutant("bp-no-utf-16", "utf-16", "UTF-16 is malformed.").instead(
+_mutant("bp-no-utf-16", "utf-16", "A message in UTF-16 returns a fault.").instead(
     lambda request: posted(request) and request.body[:2] in {b"\xff\xfe", b"\xfe\xff"}, fault("Client", "not UTF-8")
 )
 _mutant("bp-unknown-fine", "unknown-operation", "An unknown operation succeeds.").instead(_unknown, enveloped(_NOTHING))
 _mutant(
-    "bp-mandatory-for-others", "mustunderstand-actor", "A mandatory header block for another actor is a fault."
+    "bp-mandatory-for-others", "mustunderstand-actor", "A mandatory header block for another actor returns a fault."
 ).instead(_for_others, fault("MustUnderstand", "not understood"))
-_mutant("bp-sometimes-a-page", "content-type", "One answer in 50 is a page with 200.").altered(
+_mutant("bp-sometimes-a-page", "content-type", "One response in 50 is a page with status 200.").altered(
     posted, page(200, b"<html><body>OK</body></html>", "text/html"), anything, nth=50
 )

@@ -37,7 +37,7 @@ def _code_three(request: Request) -> None:
     request.body = re.sub(rb"(message_code>\s*)[+-]?(?!0*[34]\s*<)\d{1,9}(\s*<)", rb"\g<1>3\2", request.body)
 
 
-@_reading("soap-plan-none-empty", "plan-none", "Where there is no plan, GetPlan gives an empty one.")
+@_reading("soap-plan-none-empty", "plan-none", "Where no plan exists, GetPlan returns an empty one.")
 def _empty_plan(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if soap("GetPlan")(request) and b"Fault" in response.body:
@@ -48,7 +48,7 @@ def _empty_plan(request: Request, forward: Forward) -> Response:
     return response
 
 
-@_reading("soap-no-goal-page", "goal", "Without a goal, GetGoal is a page.")
+@_reading("soap-no-goal-page", "goal", "Without a goal, GetGoal returns 404 with a page.")
 def _no_goal_page(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if soap("GetGoal")(request) and (not success(response) or b"return" not in response.body):
@@ -60,71 +60,81 @@ def _no_goal_page(request: Request, forward: Forward) -> Response:
 _QUALIFIED = altered(wsdls, text(r"(<(?:\w+:)?schema\b)(?=[^>]*targetNamespace)", r'\1 elementFormDefault="qualified"'))
 
 
-_acting("soap-delivery-refused", "delivery", "ExecuteDeliveryRequest is always a fault.").instead(
+_acting("soap-delivery-refused", "delivery", "ExecuteDeliveryRequest always returns a fault.").instead(
     _DELIVERY, fault("Server", "no deliveries today")
 )
 _acting(
-    "soap-delivery-cross-answer", "delivery", "ExecuteDeliveryRequest is answered with the coffee's response."
+    "soap-delivery-cross-answer",
+    "delivery",
+    "ExecuteDeliveryRequest returns the response element of the coffee operation.",
 ).altered(_DELIVERY, text("ExecuteDeliveryRequestResponse", "ExecuteCoffeeRequestResponse"))
-_acting("soap-coffee-unknown", "coffee", "ExecuteCoffeeRequest is not known.").instead(
+_acting("soap-coffee-unknown", "coffee", "ExecuteCoffeeRequest returns a fault: unknown operation.").instead(
     _COFFEE, fault("Client", "Cannot find dispatch method")
 )
-_acting("soap-coffee-sometimes-503", "coffee", "One coffee in ten is refused with 503.").altered(
-    _COFFEE, page(503), nth=10
-)
-_acting("soap-response-full", "response-valid", "The response wrapper holds a value.").altered(
+_acting("soap-coffee-sometimes-503", "coffee", "One coffee in ten returns 503.").altered(_COFFEE, page(503), nth=10)
+_acting("soap-response-full", "response-valid", "The response wrapper contains an element.").altered(
     _ACT, in_body(with_content)
 )
-_acting("soap-response-namespace", "response-valid", "The response is in the second listing's namespace.").altered(
+_acting("soap-response-namespace", "response-valid", "The response wrapper is in another namespace.").altered(
     _ACT, in_body(other_namespace)
 )
 _acting("soap-response-soap12", "response-valid", "The response is a SOAP 1.2 envelope.").altered(
     _ACT, text(re.escape(SOAP), "http://www.w3.org/2003/05/soap-envelope")
 )
-_acting("soap-no-exponents", "range", "Doubles with an exponent are a fault.").made(
+_acting("soap-no-exponents", "range", "Doubles with an exponent return a fault.").made(
     _refused(rb">\s*[+-]?[\d.]+[eE][+-]?\d+\s*<", "no number")
 )
-_acting("soap-no-types", "typed-values", "A value that says its type is a fault.").made(
+_acting("soap-no-types", "typed-values", "A value with xsi:type returns a fault.").made(
     _refused(rb":type=", "an attribute")
 )
-_acting("soap-no-entities", "syntax", "A message with a predefined entity is a fault.").made(
+_acting("soap-no-entities", "syntax", "A message with a predefined entity returns a fault.").made(
     _refused(rb"&(?:amp|lt|gt|quot|apos);", "entities are dangerous")
 )
-_acting("soap-no-plus", "range", "Numbers with a plus sign are a fault.").made(_refused(rb">\s*\+[\d.]", "plus sign"))
-_acting("soap-no-negatives", "range", "Negative doubles are a fault.").made(_refused(rb">\s*-[\d.]", "negative"))
-_acting("soap-no-white-space", "range", "White space around a number is a fault.").made(
+_acting("soap-no-plus", "range", "Numbers with a plus sign return a fault.").made(
+    _refused(rb">\s*\+[\d.]", "plus sign")
+)
+_acting("soap-no-negatives", "range", "Negative doubles return a fault.").made(_refused(rb">\s*-[\d.]", "negative"))
+_acting("soap-no-white-space", "range", "White space around a number returns a fault.").made(
     _refused(rb"<(?:\w+:)?(?:depot|source|destination)_[xy]>\s+[\d.+-]", "white space")
 )
-_acting("soap-wants-prefixes", "syntax", "A default namespace is a fault.").made(
+_acting("soap-wants-prefixes", "syntax", "A default namespace declaration returns a fault.").made(
     _refused(rb"\sxmlns=[\"']http", "default namespace")
 )
-_acting("soap-one-prefix", "syntax", "An Envelope of another prefix than soapenv is a fault.").made(
+_acting("soap-one-prefix", "syntax", "An Envelope with a prefix other than soapenv returns a fault.").made(
     _refused(rb"<(?!soapenv:)(?:[\w.-]+:)?Envelope", "no soapenv:Envelope")
 )
-_acting("soap-no-cdata", "syntax", "CDATA is a fault.").made(_refused(rb"<!\[CDATA\[", "CDATA"))
-_acting("soap-no-comments", "syntax", "A comment is a fault.").made(_refused(rb"<!--", "comment"))
-_acting("soap-description-misleads", "interop", "The WSDL says that elements are qualified, and they are not.").made(
-    _QUALIFIED
-)
-_acting("soap-no-addressing", "addressing", "WS-Addressing headers are a MustUnderstand fault.").instead(
+_acting("soap-no-cdata", "syntax", "A CDATA section returns a fault.").made(_refused(rb"<!\[CDATA\[", "CDATA"))
+_acting("soap-no-comments", "syntax", "A comment returns a fault.").made(_refused(rb"<!--", "comment"))
+_acting(
+    "soap-description-misleads",
+    "interop",
+    'The WSDL declares elementFormDefault="qualified", but the service expects unqualified elements.',
+).made(_QUALIFIED)
+_acting("soap-no-addressing", "addressing", "WS-Addressing headers return a MustUnderstand fault.").instead(
     _written(rb"www\.w3\.org/2005/08/addressing"), fault("MustUnderstand", "addressing")
 )
-_acting("soap-any-code", "refuses-code", "Any code is accepted over SOAP.").rewritten(_ACT, _code_three)
-_reading("soap-pose-short", "pose", "GetPose has 35 covariances.").made(_lacking("GetPose", "covariance"))
-_reading("soap-velocity-half", "velocity", "GetVelocity has no angular part.").made(_lacking("GetVelocity", "angular"))
-_reading("soap-sensors-untyped", "sensors", "GetSensors has no types.").made(_lacking("GetSensors", "type"))
-_reading("soap-services-fault", "services", "GetNavigationServices is a fault.").instead(
+_acting("soap-any-code", "refuses-code", "The robot accepts every message code over SOAP.").rewritten(_ACT, _code_three)
+_reading("soap-pose-short", "pose", "GetPose returns 35 covariance values.").made(_lacking("GetPose", "covariance"))
+_reading("soap-velocity-half", "velocity", "GetVelocity returns no angular part.").made(
+    _lacking("GetVelocity", "angular")
+)
+_reading("soap-sensors-untyped", "sensors", "GetSensors returns sensors without a type.").made(
+    _lacking("GetSensors", "type")
+)
+_reading("soap-services-fault", "services", "GetNavigationServices returns a fault.").instead(
     soap("GetNavigationServices"), fault("Server", "not today")
 )
-_reading("soap-services-unnamed", "services", "GetNavigationServices lacks a name.").made(
+_reading("soap-services-unnamed", "services", "GetNavigationServices returns a service without a name.").made(
     _lacking("GetNavigationServices", "name")
 )
 _reading(
     "soap-read-namespace", "response-valid", "Responses of the subscribers service are in another namespace."
 ).altered(_READ, in_body(other_namespace))
 _reading(
-    "soap-read-extra", "response-valid", "Responses of the subscribers service hold an element of the robot's own."
+    "soap-read-extra", "response-valid", "Responses of the subscribers service contain an undeclared element."
 ).altered(_READ, in_body(with_content))
 _reading(
-    "soap-read-description-misleads", "interop", "The WSDL says that elements are qualified, and they are not."
+    "soap-read-description-misleads",
+    "interop",
+    'The WSDL declares elementFormDefault="qualified", but the service expects unqualified elements.',
 ).made(_QUALIFIED)

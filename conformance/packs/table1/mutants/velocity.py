@@ -51,7 +51,7 @@ def _integral(request: Request) -> bool:
 @_mutant(
     "velocity-as-commanded",
     ("velocity-odometry", "safety/watchdog"),
-    "GET shows the velocity that was commanded, although the robot has long stopped.",
+    "GET returns the last commanded velocity, even after the robot has stopped.",
 )
 class _Commanded:
     def __init__(self) -> None:
@@ -66,7 +66,7 @@ class _Commanded:
         return response
 
 
-@_mutant("velocity-locked-by-goal", "velocity-goal", "While a goal is active, a velocity is answered 423.")
+@_mutant("velocity-locked-by-goal", "velocity-goal", "PUT of a velocity returns 423 while a goal is active.")
 class _WhileGoal:
     def __call__(self, request: Request, forward: Forward) -> Response:
         if _PUT(request):
@@ -76,7 +76,7 @@ class _WhileGoal:
         return forward(request)
 
 
-@_mutant("linear-stops-turning", "linear-keeps-angular", "PUT of a linear velocity ends the turning.")
+@_mutant("linear-stops-turning", "linear-keeps-angular", "PUT of a linear velocity stops the turning.")
 def _whole(request: Request, forward: Forward) -> Response:
     if not _PUT_LINEAR(request):
         return forward(request)
@@ -88,16 +88,14 @@ def _whole(request: Request, forward: Forward) -> Response:
     return plain(204)(request) if response.status == 200 else response
 
 
-@_mutant(
-    "linear-back-stops-turning", "linear-keeps-angular", "PUT of a linear velocity that leads back ends the turning."
-)
+@_mutant("linear-back-stops-turning", "linear-keeps-angular", "PUT of a backward linear velocity stops the turning.")
 def _whole_back(request: Request, forward: Forward) -> Response:
     vector = parsed(request.body) if _PUT_LINEAR(request) else None
     back = isinstance(vector, dict) and isinstance(vector.get("x"), int | float) and vector["x"] < 0
     return _whole(request, forward) if back else forward(request)
 
 
-@_mutant("linear-lost", "linear-put", "PUT of a linear velocity is accepted and forgotten.")
+@_mutant("linear-lost", "linear-put", "PUT of a linear velocity returns 204 without any effect.")
 def _stuck(request: Request, forward: Forward) -> Response:
     if _PUT_LINEAR(request):
         vector = parsed(request.body)
@@ -106,7 +104,7 @@ def _stuck(request: Request, forward: Forward) -> Response:
     return forward(request)
 
 
-@_mutant("linear-is-angular", "linear-agrees", "GET of the linear velocity gives the whole Twist's other half.")
+@_mutant("linear-is-angular", "linear-agrees", "GET of the linear velocity returns the angular part.")
 def _other_half(request: Request, forward: Forward) -> Response:
     if not _GET_LINEAR(request):
         return forward(request)
@@ -160,7 +158,7 @@ _mutant("velocity-without-angular", "velocity-type", "GET of the velocity has no
 _mutant("velocity-null", "velocity-type", "One velocity in 50 has null for linear.y.").json(
     _GET, field("linear.y", None), nth=50
 )
-_mutant("velocity-swapped", "velocity-converges", "Responses exchange linear.x and angular.z.").json(
+_mutant("velocity-swapped", "velocity-converges", "GET of the velocity returns linear.x and angular.z swapped.").json(
     _GET, swapped("linear.x", "angular.z")
 )
 _mutant(
@@ -169,42 +167,42 @@ _mutant(
 _mutant(
     "velocity-stands-still", ("velocity-odometry", "velocity-converges"), "The measured velocity is always zero."
 ).json(_GET, lambda twist: twist.update(_STILL))
-_mutant("velocity-put-created", "velocity-put", "PUT of a velocity is 201.").altered(_PUT, becomes(201))
+_mutant("velocity-put-created", "velocity-put", "PUT of a velocity returns 201.").altered(_PUT, becomes(201))
 _mutant(
-    "velocity-put-other", "velocity-put", "PUT of a velocity answers 200 with a Twist that was not asked for."
+    "velocity-put-other", "velocity-put", "PUT of a velocity returns 200 with a Twist that the client did not send."
 ).altered(_PUT, page(200, json.dumps(_CRAWL).encode(), JSON))
-_mutant("velocity-lost", "velocity-converges", "Velocities are accepted and forgotten.").made(
+_mutant("velocity-lost", "velocity-converges", "PUT of a velocity returns a success without any effect.").made(
     _driven(lambda twist: twist.update(_STILL))
 )
 _mutant(
     "velocity-unwanted-lost",
     "velocity-converges",
-    "A velocity is answered 204 and forgotten where the client accepts no format of the answer.",
+    "PUT of a velocity with an unacceptable Accept header returns 204 without any effect.",
 ).instead(unwanted(_PUT), plain(204))
-_mutant("velocity-halved", "velocity-converges", "The robot drives at half of what it is told.").made(
+_mutant("velocity-halved", "velocity-converges", "The robot drives at half of the commanded velocity.").made(
     _driven(_times(0.5))
 )
-_mutant("velocity-reversed", "velocity-converges", "The robot turns the other way.").made(
+_mutant("velocity-reversed", "velocity-converges", "The robot turns in the opposite direction.").made(
     _driven(field("angular.z", operator.neg))
 )
 _mutant(
-    "velocity-refused-near-limits", "velocity-range", "Above nine tenths of its limits the robot refuses a velocity."
+    "velocity-refused-near-limits", "velocity-range", "The robot refuses velocities above 90 % of its limits."
 ).instead(_beyond(0.9), problem(422, "linear.x, angular.z: too fast"))
-_mutant(
-    "velocity-short-of-limits", "velocity-range", "The robot gets to nine tenths of its limits, and no farther."
-).made(secretly(_beyond(0.9), inputs(_short_of(0.9))))
-_mutant("velocity-forwards-only", "velocity-range", "The robot takes velocities backwards, and stands still.").made(
+_mutant("velocity-short-of-limits", "velocity-range", "The robot never drives faster than 90 % of its limits.").made(
+    secretly(_beyond(0.9), inputs(_short_of(0.9)))
+)
+_mutant("velocity-forwards-only", "velocity-range", "The robot accepts backward velocities and stands still.").made(
     secretly(_beyond(0.0), inputs(field("linear.x", lambda x: max(0.0, x))))
 )
-_mutant("velocity-integers-refused", "velocity-integers", "A velocity written in integers is refused.").instead(
-    _integral, problem(422, "linear.x: an integer is no float")
-)
+_mutant(
+    "velocity-integers-refused", "velocity-integers", "The robot refuses a velocity that is written with integers."
+).instead(_integral, problem(422, "linear.x: an integer is no float"))
 _mutant("linear-without-z", "linear-type", "GET of the linear velocity has no z.").json(_GET_LINEAR, without("z"))
 _mutant(
     "linear-unwanted-lost",
     "linear-put",
-    "A linear velocity is answered 204 and forgotten where the client accepts no format of the answer.",
+    "PUT of a linear velocity with an unacceptable Accept header returns 204 without any effect.",
 ).instead(unwanted(_PUT_LINEAR), plain(204))
-_mutant("linear-put-created", "linear-put", "PUT of a linear velocity is 201.").altered(
+_mutant("linear-put-created", "linear-put", "PUT of a linear velocity returns 201.").altered(
     _PUT_LINEAR, becomes(201), status(200, 204)
 )

@@ -64,7 +64,7 @@ def _twice(node: Any) -> None:
     node.addnext(etree.fromstring(etree.tostring(node)))
 
 
-@_mutant("wsdl-import-gone", "wsdl", "What the WSDL imports is not there.")
+@_mutant("wsdl-import-gone", "wsdl", "A document that the WSDL imports returns 404.")
 def _broken_import(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if _description(request):
@@ -91,7 +91,7 @@ def _prefix(node: Any) -> str:
     return next((key for key, value in node.nsmap.items() if key and "soap.turtlebot" in value), "tns")
 
 
-@_mutant("wsdl-import-in-types", "wsdl-R2003", "xsd:import stands in wsdl:types itself.").through(_edited)
+@_mutant("wsdl-import-in-types", "wsdl-R2003", "xsd:import is a direct child of wsdl:types.").through(_edited)
 def _import_in_types(root: Any) -> None:
     types = root.find(f"{_W}types")
     made = etree.Element(f"{_X}import")
@@ -99,19 +99,21 @@ def _import_in_types(root: Any) -> None:
     types.insert(0, made)
 
 
-@_mutant("wsdl-strange-element", "wsdl-R2028", "The WSDL has an element that WSDL does not know.").through(_edited)
+@_mutant("wsdl-strange-element", "wsdl-R2028", "The WSDL has an element that WSDL 1.1 does not define.").through(
+    _edited
+)
 def _strange(root: Any) -> None:
     etree.SubElement(root, f"{_W}robot").set("name", "turtlebot")
 
 
-@_mutant("wsdl-same-signature", "wsdl-R2710", "Two operations have the same element.").through(_edited)
+@_mutant("wsdl-same-signature", "wsdl-R2710", "Two operations have the same input element.").through(_edited)
 def _same_element(root: Any) -> None:
     parts = [part for part in root.iter(f"{_W}part") if not part.get("element", "").endswith("Response")]
     if len(parts) > 1:
         parts[1].set("element", parts[0].get("element"))
 
 
-@_mutant("wsdl-two-parts", "wsdl-R2201", "A body names two parts.").through(_edited)
+@_mutant("wsdl-two-parts", "wsdl-R2201", "A soap:body lists two parts.").through(_edited)
 def _two_parts(root: Any) -> None:
     for message in root.findall(f"{_W}message")[:1]:
         second = etree.SubElement(message, f"{_W}part")
@@ -121,7 +123,7 @@ def _two_parts(root: Any) -> None:
         body.set("parts", "parameters more")
 
 
-@_mutant("wsdl-float", "wsdl-types", "A double is a float in the schema.").through(_typed)
+@_mutant("wsdl-float", "wsdl-types", "The schema declares a double as float.").through(_typed)
 def _float(schema: Any) -> None:
     for node in [node for node in schema.iter(f"{_X}element") if node.get("type", "").endswith("double")][:1]:
         node.set("type", node.get("type").replace("double", "float"))
@@ -149,63 +151,65 @@ _OPERATION = f"{_W}portType/{_W}operation"
 _BINDING = f"{_W}binding"
 _TRANSPORT = f"{_BINDING}/{_S}binding"
 
-_mutant("wsdl-gone", "wsdl", "There is no WSDL: 404.").instead(wsdls, plain(404))
-_mutant("wsdl-silent", "wsdl", "Asked for its WSDL, the robot hangs up.").made(hanging_up(wsdls))
-_mutant("wsdl-broken", "wsdl", "The WSDL is not closed.").altered(_description, text(r"</[\w:]+>\s*$", ""))
+_mutant("wsdl-gone", "wsdl", "GET of the WSDL returns 404.").instead(wsdls, plain(404))
+_mutant("wsdl-silent", "wsdl", "The robot closes the connection on a request for the WSDL.").made(hanging_up(wsdls))
+_mutant("wsdl-broken", "wsdl", "The last end tag of the WSDL is missing.").altered(
+    _description, text(r"</[\w:]+>\s*$", "")
+)
 _mutant("wsdl-service-name", "wsdl-names", "The service has another name.").made(
     _all(f"{_W}service", _set("name", "TurtlebotOfficeService"))
 )
 _mutant("wsdl-port-name", "wsdl-names", "The port has another name.").made(
     _all(f"{_W}service/{_W}port", _set("name", "Port"))
 )
-_mutant("wsdl-namespace", "wsdl-names", "The target namespace is the second listing's.").made(
+_mutant("wsdl-namespace", "wsdl-names", "The target namespace is a wrong one.").made(
     _edited(_set("targetNamespace", "http://ros-ws.org"))
 )
 _mutant("wsdl-part-name", "wsdl-operations", "A message's part has another name.").made(
     _all(f"{_W}message/{_W}part", _set("name", "body"))
 )
-_mutant("wsdl-order", "wsdl-types", "The schema has its elements in another order.").made(
+_mutant("wsdl-order", "wsdl-types", "The schema has the elements of a sequence in another order.").made(
     _long_sequence(lambda sequence: sequence.append(sequence[0]))
 )
-_mutant("wsdl-optional", "wsdl-types", "An element is optional in the schema.").made(
+_mutant("wsdl-optional", "wsdl-types", "A required element is optional in the schema.").made(
     _long_sequence(lambda sequence: sequence[0].set("minOccurs", "0"))
 )
-_mutant("wsdl-action", "wsdl-action", "wsam:Action is something else.").altered(
+_mutant("wsdl-action", "wsdl-action", "wsam:Action has another value.").altered(
     _description, text(r'(:Action=["\'])[^"\']*', r"\1urn:drive")
 )
-_mutant("wsdl-address", "wsdl-address", "The address in the WSDL leads nowhere.").altered(
+_mutant("wsdl-address", "wsdl-address", "The address in the WSDL is wrong.").altered(
     _description, text(r'location="http://[^"]*"', 'location="http://127.0.0.1:9/turtlesim"')
 )
 _mutant("wsdl-no-target", "wsdl-R2105", "A schema has no targetNamespace.").xml(_description, _inline_no_target)
-_mutant("wsdl-type-part", "wsdl-R2204", "A part has a type in place of an element.").made(
+_mutant("wsdl-type-part", "wsdl-R2204", "A message part has a type instead of an element.").made(
     _first(f"{_W}message/{_W}part", _typed_part)
 )
-_mutant("wsdl-part-of-nothing", "wsdl-R2206", "A part refers to an element that does not exist.").made(
+_mutant("wsdl-part-of-nothing", "wsdl-R2206", "A message part refers to an element that does not exist.").made(
     _first(f"{_W}message/{_W}part", lambda node: node.set("element", f"{_prefix(node)}:NothingAtAll"))
 )
 _mutant("wsdl-operation-twice", "wsdl-R2304", "A port type has an operation twice.").made(_first(_OPERATION, _twice))
-_mutant("wsdl-soap12", "wsdl-R2401", "The binding is one of SOAP 1.2.").altered(
+_mutant("wsdl-soap12", "wsdl-R2401", "The binding is a SOAP 1.2 binding.").altered(
     _description, text(re.escape(_SOAP), "http://schemas.xmlsoap.org/wsdl/soap12/")
 )
-_mutant("wsdl-no-transport", "wsdl-R2701", "The binding names no transport.").made(
+_mutant("wsdl-no-transport", "wsdl-R2701", "The binding has no transport.").made(
     _all(_TRANSPORT, lambda node: node.attrib.pop("transport", None))
 )
-_mutant("wsdl-smtp", "wsdl-R2702", "The transport is SMTP.").made(
+_mutant("wsdl-smtp", "wsdl-R2702", "The binding's transport is SMTP.").made(
     _all(_TRANSPORT, _set("transport", "http://schemas.xmlsoap.org/soap/smtp"))
 )
-_mutant("wsdl-mixed-styles", "wsdl-R2705", "One operation is of style rpc.").made(
+_mutant("wsdl-mixed-styles", "wsdl-R2705", "One operation has the style rpc.").made(
     _first(f"{_BINDING}/{_W}operation/{_S}operation", _set("style", "rpc"))
 )
-_mutant("wsdl-encoded", "wsdl-R2706", "A body is encoded.").made(
+_mutant("wsdl-encoded", "wsdl-R2706", 'A soap:body has use="encoded".').made(
     _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("use", "encoded"))
 )
-_mutant("wsdl-body-namespace", "wsdl-R2716", "A body has a namespace attribute.").made(
+_mutant("wsdl-body-namespace", "wsdl-R2716", "A soap:body has a namespace attribute.").made(
     _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("namespace", TNS))
 )
 _mutant("wsdl-binding-short", "wsdl-R2718", "The binding lacks an operation of its port type.").made(
     _first(f"{_BINDING}/{_W}operation", gone)
 )
-_mutant("wsdl-old-schema", "wsdl-R2801", "Types are described in XML Schema of 1999.").altered(
+_mutant("wsdl-old-schema", "wsdl-R2801", "The types use the XML Schema namespace of 1999.").altered(
     wsdls, text(re.escape(_XSD), "http://www.w3.org/1999/XMLSchema")
 )
-_mutant("wsdl-latin", "wsdl-R4003", "The WSDL is ISO 8859-1.").altered(_description, latin)
+_mutant("wsdl-latin", "wsdl-R4003", "The WSDL is encoded in ISO 8859-1.").altered(_description, latin)
