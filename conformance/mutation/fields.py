@@ -1,7 +1,7 @@
-"""Edits of one field of a JSON value, for ``Row.json``, ``values`` and ``inputs``; a field is named by its path.
+"""Edits of one member of a JSON value, which is named by its path, as ``pose.pose.position.x`` or ``0.type``.
 
-The names in a path are separated by dots: ``pose.pose.position.x``, ``0.type``. An edit of a field that is not there
-raises KeyError, IndexError or TypeError: ``guarded`` is for values that a client sends.
+They are for ``Row.json``, ``changes.values`` and ``changes.inputs``. An edit of a member that does not exist raises
+KeyError, IndexError or TypeError; ``changes.guarded`` catches them for values that a client sends.
 """
 
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from typing import Any
 
 
 def _holder(value: Any, path: str) -> tuple[Any, Any]:
-    """Return the object or list that holds a field, and the field's name or index in it."""
+    """Return the object or list that holds the member, and the member's name or index in it."""
     *parents, last = path.split(".")
     for name in parents:
         value = value[int(name) if isinstance(value, list) else name]
@@ -17,13 +17,13 @@ def _holder(value: Any, path: str) -> tuple[Any, Any]:
 
 
 def found(value: Any, path: str) -> Any:
-    """Return the field's value."""
+    """Return the member's value."""
     holder, name = _holder(value, path)
     return holder[name]
 
 
 def field(path: str, by: Any) -> Callable[[Any], None]:
-    """Give the field another value, or the one that ``by`` returns for the value that it has."""
+    """Return an edit that sets the member to ``by``, or to ``by(value)`` if that is a function."""
 
     def edit(value: Any) -> None:
         holder, name = _holder(value, path)
@@ -33,7 +33,7 @@ def field(path: str, by: Any) -> Callable[[Any], None]:
 
 
 def without(path: str) -> Callable[[Any], None]:
-    """Remove the field."""
+    """Return an edit that removes the member."""
 
     def edit(value: Any) -> None:
         holder, name = _holder(value, path)
@@ -43,7 +43,7 @@ def without(path: str) -> Callable[[Any], None]:
 
 
 def swapped(one: str, other: str) -> Callable[[Any], None]:
-    """Exchange the values of two fields."""
+    """Return an edit that swaps the values of two members."""
 
     def edit(value: Any) -> None:
         first, second = found(value, one), found(value, other)
@@ -54,7 +54,7 @@ def swapped(one: str, other: str) -> Callable[[Any], None]:
 
 
 def each(*edits: Callable[[Any], Any]) -> Callable[[Any], None]:
-    """Make several edits, one after the other."""
+    """Return an edit that makes several edits one after another."""
 
     def edit(value: Any) -> None:
         for one in edits:
@@ -64,10 +64,10 @@ def each(*edits: Callable[[Any], Any]) -> Callable[[Any], None]:
 
 
 def scaled(factor: float) -> Callable[[float], float]:
-    """Return a change of a number: so many times as great."""
+    """Return a function that multiplies a number by ``factor``."""
     return lambda number: number * factor
 
 
 def plus(by: float) -> Callable[[float], float]:
-    """Return a change of a number: so much greater."""
+    """Return a function that adds ``by`` to a number."""
     return lambda number: number + by

@@ -1,13 +1,13 @@
-"""A table of mutants: each row says what is wrong, which requirement kills it, and what is changed.
+"""A table of mutants: each row names a mutant, the requirement that kills it, its fault, and the change that makes it.
 
-A row is short where an operator makes the change, and decorates the change where it is a function or a class::
+A row ends with an operator that makes the change, or decorates the change if that is a function or a class::
 
     MUTANTS = Table()
     _mutant = MUTANTS.of_class("rest-resources", "rest")
 
-    _mutant("goal-none-empty", "goal-none", "Without a goal, GET is 204.").altered(GET, becomes(204), status(404))
+    _mutant("goal-none-empty", "goal-none", "Without a goal, GET returns 204.").altered(GET, becomes(204), status(404))
 
-    @_mutant("goal-lingers", "goal-ended", "A goal that has ended is still shown.")
+    @_mutant("goal-lingers", "goal-ended", "GET goes on returning a goal that has ended.")
     class _Lingering: ...
 """
 
@@ -25,16 +25,17 @@ _Decorated = TypeVar("_Decorated", bound=Callable[..., Any])
 
 
 class Table:
-    """The mutants of a module, in the order of their rows."""
+    """The mutants of one module, in the order of their rows."""
 
     def __init__(self) -> None:
         self._rows: list[Row] = []
 
     def of_class(self, class_: str, interface: str, **common: Any) -> Callable[..., Row]:
-        """Return a maker of rows: ``row(name, requirements, says, **settings)``.
+        """Return a function that adds a row: ``row(name, requirements, says, **settings)``.
 
-        The requirements are one or several, by their names in the class; one of another class is named with its class.
-        ``common`` are settings (attributes of Mutant) of all these rows.
+        Requirements are one or several ids without the class; one of another class has its class before it. ``common``
+        are
+        attributes of Mutant that all these rows share.
         """
 
         def row(name: str, requirements: str | tuple[str, ...], says: str, **settings: Any) -> Row:
@@ -56,7 +57,7 @@ class Table:
 
 
 class Row:
-    """One row, complete when one of its methods is given the change."""
+    """One row. Calling one of its methods gives it the change."""
 
     def __init__(self, name: str, says: str, kills: tuple[str, ...], settings: dict[str, Any]) -> None:
         self._parts = {"name": name, "says": says, "catches": kills, **settings}
@@ -72,16 +73,16 @@ class Row:
         return Mutant(**self._parts)
 
     def made(self, make: Make) -> None:
-        """Take what makes the change for each run."""
+        """Use ``make``, which returns the change for a run."""
         self._parts["make"] = make
 
     def __call__(self, change: _Decorated) -> _Decorated:
-        """Decorate the change: a function without memory, or a class of which each run gets an instance."""
+        """Decorate the change: a stateless function, or a class that is instantiated for each run."""
         self.made(change if isinstance(change, type) else lambda: change)
         return change
 
     def through(self, maker: Callable[[Any], Make]) -> Callable[[_Decorated], _Decorated]:
-        """Decorate an edit, of which ``maker`` makes the change."""
+        """Decorate an edit; ``maker`` turns it into the change."""
 
         def decorate(edit: _Decorated) -> _Decorated:
             self.made(maker(edit))
@@ -90,21 +91,21 @@ class Row:
         return decorate
 
     def altered(self, where: Where, edit: Callable[[Response], object], when: When = success, *, nth: int = 1) -> None:
-        """Alter responses: see changes.altered."""
+        """Edit every nth response to ``where`` that fulfils ``when``."""
         self.made(altered(where, edit, when, nth=nth))
 
     def json(self, where: Where, edit: Callable[[Any], Any], when: When = success, *, nth: int = 1) -> None:
-        """Alter the value of JSON responses."""
+        """Edit the JSON value of every nth response to ``where`` that fulfils ``when``."""
         self.altered(where, values(edit), when, nth=nth)
 
     def xml(self, where: Where, edit: Callable[[Any], object], when: When = success, *, nth: int = 1) -> None:
-        """Alter the tree of XML responses, SOAP's among them."""
+        """Edit the XML tree of every nth response to ``where`` that fulfils ``when``."""
         self.altered(where, tree(edit), when, nth=nth)
 
     def rewritten(self, where: Where, edit: Callable[[Request], object]) -> None:
-        """Alter requests: see changes.rewritten."""
+        """Edit requests before they reach the device."""
         self.made(rewritten(where, edit))
 
     def instead(self, where: Where, response: Callable[[Request], Response]) -> None:
-        """Respond in place of the robot."""
+        """Answer requests in place of the device."""
         self.made(instead(where, response))

@@ -1,4 +1,4 @@
-"""Every mutant, by subject."""
+"""All mutants of this pack, collected from one table per subject."""
 
 from conformance.mutation.mutant import Mutant
 from conformance.packs.table1.mutants import (

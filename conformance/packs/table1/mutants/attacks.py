@@ -1,4 +1,4 @@
-"""Robots that fall for attacks by XML."""
+"""Mutants that are vulnerable to XML attacks: entities, deep nesting, XInclude, SOAPAction spoofing."""
 
 import re
 import socket
@@ -46,7 +46,7 @@ def _plain_doctype(request: Request) -> None:
 
 
 def _expanded(request: Request) -> None:
-    """Internal entities, a few of them and not nested, are put in their places."""
+    """Expand up to a few internal entities that are not nested."""
     entities = dict(_INTERNAL.findall(request.body))
     if not entities or len(request.body) > 20_000 or any(b"&" in value for value in entities.values()):
         return
@@ -74,7 +74,7 @@ def _leaked(text: str) -> Callable[[Request], Response]:
 
 
 def _quoting(urls: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
-    """The first file that a message refers to, and that can be read, is quoted in the fault."""
+    """Return a change that quotes the first readable file named by a message in a fault; ``urls`` finds the names."""
 
     def change(request: Request, forward: Forward) -> Response:
         for url in urls(request.body) if posted(request) else ():
@@ -92,7 +92,7 @@ def _included(body: bytes) -> list[bytes]:
 
 
 def _call(url: bytes) -> None:
-    """Open a connection to an address that a message names."""
+    """Open a connection to the address in a URL."""
     parts = urlsplit(url.decode("utf-8", "replace"))
     try:
         with socket.create_connection((parts.hostname or "127.0.0.1", parts.port or 80), timeout=1) as sock:
@@ -139,7 +139,7 @@ def _nested(request: Request) -> bool:
 
 
 def _posting(holds: Callable[[bytes], bool]) -> Where:
-    """SOAP requests of whose body something holds."""
+    """Return a condition for SOAP requests whose body fulfils ``holds``."""
     return lambda request: posted(request) and holds(request.body)
 
 

@@ -1,4 +1,4 @@
-"""Robots that are right as long as one client asks one thing at a time."""
+"""Mutants that are wrong only while several clients send requests concurrently."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _MEETS_S: Final = 0.05
 
 
 class _Mixed:
-    """Two answers that are made at one moment are mixed up, each nth time.
+    """A change that mixes up two concurrent responses, every ``nth`` time.
 
     Args:
-        where: which requests' answers.
-        mix: makes of the first and the second answer what the first client gets, and then the second one.
+        where: chooses the requests whose responses are mixed up.
+        mix: takes the first and the second response, and returns what the first and the second client get.
         nth: how often.
     """
 
@@ -65,7 +65,7 @@ class _Mixed:
             return mine[-1]
 
     def _meet(self, response: Response) -> Response:
-        """Give the one who waits what becomes of its answer."""
+        """Mix this response with the one that is waiting, release the waiting client, and return this client's part."""
         first, second = self._mix(self._first[0].copy(), response.copy())
         self._first.append(first)
         self._first = []
@@ -96,7 +96,7 @@ def _spliced(one: Response, two: Response) -> tuple[Response, Response]:
 
 
 def _repeated(one: Response, two: Response) -> tuple[Response, Response]:
-    """Both get the first one's body."""
+    """Give both clients the body of the first response."""
     two.body = one.body
     return one, two
 
@@ -107,7 +107,7 @@ def _twice(request: Request, forward: Forward) -> Response:
 
 
 def _with_another_source(request: Request, forward: Forward) -> Response:
-    """A coordinate is another client's, as from a field that all share."""
+    """Forward a delivery with another client's source_y, as if all clients shared a variable."""
     head, _, _ = request.target.rpartition("/")
     return forward(request.copy(target=f"{head}/1.5"))
 
@@ -146,7 +146,7 @@ class _GoalOfTwo:
 
 
 class _Blended:
-    """Requests that come at one moment have one field in common: the one that came first."""
+    """A change that gives concurrent requests the same value of one JSON member: that of the first request."""
 
     def __init__(self, where: Where, field: str) -> None:
         self._where, self._field = where, field

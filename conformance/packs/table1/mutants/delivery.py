@@ -1,4 +1,4 @@
-"""Robots that mistreat the delivery PUT."""
+"""Mutants that mishandle PUT of a delivery."""
 
 import re
 from collections.abc import Callable
@@ -18,7 +18,7 @@ _CODE, _VALUES = 4, range(6, 17, 2)
 
 
 def segments(edit: Callable[[int, str], str]) -> Callable[[Request], None]:
-    """Alter the values in a delivery's path; ``edit`` gets a value's place and its text."""
+    """Return an edit of the values in a delivery's path; ``edit(index, text)`` returns the new text."""
 
     def apply(request: Request) -> None:
         parts = request.path.split("/")
@@ -31,19 +31,19 @@ def segments(edit: Callable[[int, str], str]) -> Callable[[Request], None]:
 
 
 def lenient(place: int, text: str) -> str:
-    """A value that is no number becomes 0, or code 3."""
+    """Return a valid value in place of one that is not a number: 0, or 3 for the message code."""
     if _NUMBER.fullmatch(text) or _NON_FINITE.fullmatch(text):
         return text
     return "3" if place == _CODE else "0"
 
 
 def finite(place: int, text: str) -> str:
-    """A value that is not finite becomes 0."""
+    """Return 0 in place of NaN or Infinity."""
     return "0" if _NON_FINITE.fullmatch(text) and place != _CODE else text
 
 
 def any_code(place: int, text: str) -> str:
-    """Every code becomes one that there is."""
+    """Return 3 in place of a message code that does not exist."""
     return (
         "3" if place == _CODE and re.fullmatch(r"[+-]?\d{1,40}", text) and text.lstrip("+0") not in {"3", "4"} else text
     )

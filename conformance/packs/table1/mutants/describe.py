@@ -1,4 +1,4 @@
-"""Robots whose REST descriptions do not agree with what they do."""
+"""Mutants whose OpenAPI or WADL description differs from their behaviour."""
 
 import re
 from collections.abc import Callable
@@ -17,7 +17,7 @@ _OPENAPI, _WADL = rest("GET", "/openapi.json"), rest("GET", "/application.wadl")
 
 
 def _told(edit: Callable[[Any], Any]) -> Make:
-    """The OpenAPI description is altered."""
+    """Return a change that applies ``edit`` to the OpenAPI document."""
     return altered(_OPENAPI, values(edit))
 
 
@@ -49,7 +49,7 @@ def _invalid(description: Any) -> None:
 
 
 def _lost(name: str, attribute: str, pattern: str) -> Make:
-    """The WADL lacks the elements of which an attribute is written so."""
+    """Return a change that removes the WADL's elements ``name`` whose attribute matches the pattern."""
 
     def edit(node: Any) -> None:
         if re.search(pattern, node.get(attribute, "")):
@@ -59,7 +59,7 @@ def _lost(name: str, attribute: str, pattern: str) -> Make:
 
 
 def _promised_twice(resource: Any) -> None:
-    """Beside a resource the WADL has another one, which is not there."""
+    """Add a copy of a WADL resource with a path that does not exist."""
     other = deepcopy(resource)
     other.set("path", "/robot/arm/")
     resource.getparent().append(other)

@@ -1,4 +1,4 @@
-"""Robots whose interfaces tell different stories, of what was asked for and of what is."""
+"""Mutants whose REST and SOAP interfaces disagree, or whose ROS messages differ from the requests."""
 
 import re
 import sys
@@ -133,7 +133,7 @@ _NO_GOAL = enveloped(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
 
 
 def _cut(request: Request) -> None:
-    """A number ends where a comment stands in it, as for who reads the first text node alone."""
+    """Cut a number in a SOAP request at the comment inside it, like a parser that reads only the first text node."""
     request.body = re.sub(rb"(>[^<>]+)<!--[^>]*-->[^<>]+<", rb"\1<", request.body)
 
 

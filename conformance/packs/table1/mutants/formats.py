@@ -1,4 +1,4 @@
-"""Robots whose formats do not agree, or are not what was asked for."""
+"""Mutants with faults in content negotiation, XML, plain text or problem details."""
 
 import re
 from collections.abc import Callable
@@ -40,12 +40,12 @@ def _any_is_xml(request: Request) -> None:
 
 
 def _told(edit: Callable[[Response], object], when: When = success) -> Make:
-    """Answers to GET are altered."""
+    """Return a change that applies ``edit`` to responses to GET."""
     return altered(_GET, edit, when)
 
 
 def _shortened(root: Any) -> None:
-    """Leave one of several items out."""
+    """Remove the last item of a list in an XML response."""
     for name in ("covariance", "sensor", "item", "service"):
         found = named(root, name)
         if len(found) > 1:

@@ -1,4 +1,4 @@
-"""Robots that mistreat a goal."""
+"""Mutants that mishandle a navigation goal."""
 
 import math
 from collections.abc import Callable
@@ -33,7 +33,7 @@ _AT, _GET, _PUT, _DELETE = rest("", GOAL), rest("GET", GOAL), rest("PUT", GOAL),
 
 
 def _told(edit: Callable[[Any], Any]) -> Make:
-    """The goal is altered on its way to the client."""
+    """Return a change that applies ``edit`` to the goal in responses to GET."""
     return altered(_GET, values(edit))
 
 
@@ -61,7 +61,7 @@ def _renamed(edit: Callable[[str], str]) -> Make:
 def _when_active(
     answer_: Callable[[Request], Response], *, same: bool, other_pose: bool | None = None
 ) -> Callable[[], Any]:
-    """PUT during a goal, with the same id or another one, is answered otherwise."""
+    """Return a change that answers PUT itself while a goal with the same or another id and pose is active."""
 
     def change(request: Request, forward: Forward) -> Response:
         if _PUT(request):
@@ -89,7 +89,7 @@ def _unit(goal: Any) -> None:
 
 
 def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
-    """Leaves inputs of another shape as they are, to be refused."""
+    """Return an edit that leaves invalid goals unchanged, so that the robot refuses them."""
 
     def apply(goal: Any) -> None:
         if pose_of(goal) is not None:
@@ -99,7 +99,7 @@ def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
 
 
 def _off_by(least: float, most: float) -> Callable[[Request], bool]:
-    """PUTs of a goal whose quaternion's length is off by so much."""
+    """Return a condition for goals whose quaternion's length differs from 1 by ``least`` to ``most``."""
 
     def where(request: Request) -> bool:
         try:

@@ -1,4 +1,4 @@
-"""What goals look like to a proxy, and robots that remember the wrong thing of them."""
+"""Mutants that remember goals wrongly, and functions that read goals from requests and from the robot."""
 
 import json
 import math
@@ -17,12 +17,12 @@ _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 
 
 def position(goal: Any) -> Any:
-    """The position in a MoveBaseActionGoal."""
+    """Return the position in a MoveBaseActionGoal."""
     return goal["goal"]["target_pose"]["pose"]["position"]
 
 
 def identity(request: Request) -> str | None:
-    """The id in a PUT goal."""
+    """Return the goal id in the request, or None."""
     value = parsed(request.body)
     try:
         return str(value["goal_id"]["id"])
@@ -31,7 +31,7 @@ def identity(request: Request) -> str | None:
 
 
 def active(forward: Forward, request: Request) -> Any:
-    """The robot's goal, or None."""
+    """Request the robot's active goal; return None without one."""
     response = forward(
         request.copy(
             method="GET", target=GOAL, body=b"", fields=[("Host", "localhost"), ("Accept", "application/json")]
@@ -41,7 +41,7 @@ def active(forward: Forward, request: Request) -> Any:
 
 
 def pose_of(goal: Any) -> Any:
-    """The pose in a MoveBaseActionGoal, in floats; None where there is none."""
+    """Return the pose in a MoveBaseActionGoal as floats, or None if it has none."""
     try:
         pose = goal["goal"]["target_pose"]["pose"]
         return {part: {axis: float(pose[part][axis]) for axis in pose[part]} for part in ("position", "orientation")}

@@ -1,4 +1,4 @@
-"""Robots whose velocities begin or end by something else than time, or come back after they have ended."""
+"""Mutants whose velocity commands end or restart for a wrong reason."""
 
 import json
 import threading
@@ -24,7 +24,7 @@ _SMALL = 0.05
 
 
 class _Remembering:
-    """Knows the last velocity that was accepted, and how many requests have come."""
+    """A change that remembers the last accepted velocity, counts commands, and knows when the last request came."""
 
     def __init__(self) -> None:
         self.last: Any = None
@@ -43,7 +43,7 @@ class _Remembering:
         return response
 
     def put(self, request: Request, response: Response, _forward: Forward) -> None:
-        """What comes of a PUT of a velocity."""
+        """Remember the velocity of a successful PUT."""
         value = parsed(request.body)
         if not success(response) or not isinstance(value, dict):
             return

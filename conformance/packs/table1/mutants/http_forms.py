@@ -1,4 +1,4 @@
-"""Robots that take a request in one form and not in another that says the same, or one that nobody has."""
+"""Mutants that reject a valid form of a request, such as chunked content, or accept an invalid one."""
 
 import re
 import threading
@@ -19,29 +19,29 @@ _MOST = 100
 
 
 def _having(test: Callable[[Request], bool]) -> Callable[[Request], bool]:
-    """REST requests of which something is so."""
+    """Return a condition for well-formed REST requests that fulfil ``test``."""
     return lambda request: request.side == "rest" and request.raw is None and test(request)
 
 
 def _written(pattern: bytes) -> Callable[[Request], bool]:
-    """PUTs of JSON in whose text something stands."""
+    """Return a condition for PUT requests whose body matches the pattern."""
     compiled = re.compile(pattern)
     return _having(lambda request: request.method == "PUT" and bool(compiled.search(request.body)))
 
 
 def _upper(name: str) -> Callable[[Request], bool]:
-    """Requests with a field that has capital letters."""
+    """Return a condition for requests whose header ``name`` has a value with capital letters."""
     return _having(lambda request: (request.field(name) or "").lower() != (request.field(name) or ""))
 
 
 def _came(pattern: bytes) -> Callable[[Request], bool]:
-    """Requests in whose octets, as they came, something stands."""
+    """Return a condition for requests whose bytes, as received, match the pattern."""
     compiled = re.compile(pattern)
     return _having(lambda request: bool(compiled.search(b"".join(request.came))))
 
 
 def _forgetting(where: Callable[[Request], bool], *names: str) -> Callable[[], Change]:
-    """Requests without some of their fields."""
+    """Return a change that removes headers from requests."""
 
     def forget(request: Request) -> None:
         for name in names:
@@ -62,7 +62,7 @@ def _last_line(request: Request) -> None:
 
 
 def _conditional(name: str) -> Callable[[Request], bool]:
-    """GET with a field that asks for less than all."""
+    """Return a condition for GET requests with the header ``name``."""
     return _having(lambda request: request.method == "GET" and request.field(name) is not None)
 
 
@@ -94,7 +94,7 @@ def _kept(request: Request, forward: Forward) -> Response:
 
 
 def _in_chunks(response: Response) -> None:
-    """An answer in one chunk, whoever asked."""
+    """Write the response as one chunk, even for an HTTP/1.0 client."""
     head = f"HTTP/1.1 {response.status} OK\r\nContent-Type: {response.media_type}\r\nTransfer-Encoding: chunked\r\n\r\n"
     response.raw = head.encode() + b"%x\r\n%b\r\n0\r\n\r\n" % (len(response.body), response.body)
 

@@ -1,4 +1,4 @@
-"""Robots whose HTTP messages, problems and JSON are not well made, and which mistake those of others."""
+"""Mutants with faulty HTTP framing, problem details or JSON, and mutants that accept malformed requests."""
 
 import json
 import re
@@ -40,7 +40,7 @@ def _errors(response: Response) -> bool:
 
 
 def _problems(edit: Callable[[Any], Any], where: Where = _ANY) -> Make:
-    """Problems are altered."""
+    """Return a change that applies ``edit`` to problem details."""
     return altered(
         where, values(edit), lambda response: _errors(response) and response.media_type.endswith("problem+json")
     )
@@ -56,7 +56,7 @@ def _valueless(value: Any) -> None:
 
 
 def _on_the_wire(edit: Callable[[bytes], bytes]) -> Callable[[Response], None]:
-    """Alter an answer's octets."""
+    """Return an edit of the bytes of a response."""
     return lambda response: setattr(response, "raw", edit(response.octets()))
 
 
@@ -65,7 +65,7 @@ def _longer(octets: bytes) -> bytes:
 
 
 def _with_field(request: Request, name: str, value: str) -> Request:
-    """A request that is no HTTP, with one field of this name in place of all of them."""
+    """Return a malformed request in which one header ``name`` replaces all headers of that name."""
     head, _, body = (request.raw or b"").partition(b"\r\n\r\n")
     line, *fields = head.split(b"\r\n")
     others = [field for field in fields if not field.lower().startswith(f"{name.lower()}:".encode())]
@@ -73,14 +73,14 @@ def _with_field(request: Request, name: str, value: str) -> Request:
 
 
 def _count(request: Request, name: str) -> int | None:
-    """How many fields of a request of REST that is no HTTP have this name, or None where it is HTTP, or of SOAP."""
+    """Return how many headers ``name`` a malformed REST request has; None for other requests."""
     if request.side != "rest" or request.raw is None:
         return None
     return len(re.findall(rb"(?i)\r\n%s:" % name.encode(), request.raw))
 
 
 def _hosts(taken: Callable[[list[bytes]], bool]) -> Callable[[Request, Forward], Response]:
-    """Requests of REST that are no HTTP, with Host fields such as these, are taken like others."""
+    """Return a change that accepts malformed requests whose list of Host values fulfils ``taken``."""
 
     def change(request: Request, forward: Forward) -> Response:
         if request.side != "rest" or request.raw is None:
@@ -122,7 +122,7 @@ def _in_latin(response: Response) -> None:
 
 
 def _token(refused: Callable[[Request], Response]) -> Callable[[], Any]:
-    """A robot that wants a token, and refuses in its own way where it is missing or wrong."""
+    """Return a change that requires a bearer token, and lets ``refused`` answer requests without it."""
 
     def change(request: Request, forward: Forward) -> Response:
         if request.side == "rest" and request.raw is None and request.field("Authorization") != f"Bearer {_SESAME}":

@@ -1,4 +1,4 @@
-"""Robots that break HTTP's rules of methods, negotiation and statuses."""
+"""Mutants that break HTTP's rules for methods, content negotiation and status codes."""
 
 from collections.abc import Callable
 
@@ -77,7 +77,7 @@ def _cancelling(request: Request, forward: Forward) -> Response:
 
 
 class _SecondTime:
-    """The same request right after itself is answered otherwise."""
+    """A change that answers a request itself when it repeats the previous one."""
 
     def __init__(self, method: str, response: Callable[[Request], Response]) -> None:
         self._method, self._answer = method, response

@@ -1,4 +1,4 @@
-"""Robots that refuse what is invalid, and do it all the same."""
+"""Mutants that return an error and carry the request out nevertheless."""
 
 import json
 from collections.abc import Callable, Container
@@ -18,7 +18,7 @@ _INVALID = {400, 415, 422}
 
 
 def sent(request: Request, forward: Forward, method: str, target: str, value: Any = None) -> Response:
-    """A request of the proxy's own to the robot."""
+    """Send a request of the mutant's own to the robot."""
     fields = [("Host", "localhost"), ("Accept", "application/json")]
     body = b"" if value is None else json.dumps(value).encode()
     if body:
@@ -29,12 +29,12 @@ def sent(request: Request, forward: Forward, method: str, target: str, value: An
 
 
 def drive(request: Request, forward: Forward, speed: float) -> None:
-    """Set the robot in motion, or stop it."""
+    """Send the robot a velocity of ``speed``, m/s; 0 stops it."""
     sent(request, forward, "PUT", VELOCITY, {"linear": {**_ZERO, "x": speed}, "angular": _ZERO})
 
 
 def goal_ahead(request: Request, forward: Forward, distance: float) -> None:
-    """Send a goal beside where the robot stands, in the odometry's frame, on the side on which it takes one."""
+    """Send a goal ``distance`` m beside the robot, in the odometry's frame, where the robot accepts one."""
     odometry = parsed(sent(request, forward, "GET", POSE).body)
     at = odometry["pose"]["pose"]["position"]
     for away in (distance, -distance):
@@ -53,7 +53,7 @@ def after_refusal(
     act: Callable[[Request, Forward], None],
     statuses: Container[int] = frozenset(_INVALID),
 ) -> Make:
-    """A request is refused, as invalid or with one of other statuses, and something is done."""
+    """Return a change that calls ``act`` after the robot has refused a request with one of the statuses."""
 
     def change(request: Request, forward: Forward) -> Response:
         response = forward(request)
@@ -79,7 +79,7 @@ def _delivered_in_vain(request: Request, forward: Forward) -> Response:
 
 
 def _ordered_by(method: str) -> Make:
-    """A delivery by a method that the resource does not have is answered as ever, and made."""
+    """Return a change that publishes a delivery when its path is requested with ``method``."""
 
     def change(request: Request, forward: Forward) -> Response:
         if deliveries(request.copy(method="PUT")) and request.method == method:

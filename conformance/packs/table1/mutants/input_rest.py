@@ -1,4 +1,4 @@
-"""Robots that take garbage over REST: what is invalid is repaired before it is looked at."""
+"""Mutants that repair or accept invalid REST input instead of refusing it."""
 
 import json
 import math
@@ -34,7 +34,7 @@ def _is_json(request: Request) -> bool:
 
 
 def _repairing(repair: Callable[[Any, Any], Any]) -> Callable[[], Any]:
-    """JSON that is well-formed is made to fit by ``repair(value, pattern)``."""
+    """Return a change that replaces a JSON request body by ``repair(value, pattern)``."""
 
     def edit(request: Request) -> None:
         value = parsed(request.body)
@@ -45,14 +45,14 @@ def _repairing(repair: Callable[[Any, Any], Any]) -> Callable[[], Any]:
 
 
 def _filled(value: Any, pattern: Any) -> Any:
-    """Missing fields become zero."""
+    """Fill in missing members with those of the pattern."""
     if not isinstance(pattern, dict) or not isinstance(value, dict):
         return value
     return {**value, **{key: _filled(value.get(key, pattern[key]), pattern[key]) for key in pattern}}
 
 
 def _known(value: Any, pattern: Any) -> Any:
-    """Unknown fields are left out."""
+    """Remove members that the pattern does not have."""
     if not isinstance(pattern, dict) or not isinstance(value, dict):
         return value
     parts = {**_OPTIONAL, **pattern} if "goal" in pattern or "frame_id" in pattern or "id" in pattern else pattern
@@ -60,7 +60,7 @@ def _known(value: Any, pattern: Any) -> Any:
 
 
 def _typed(value: Any, pattern: Any) -> Any:
-    """Values of another type are made numbers, as a lenient language does."""
+    """Convert values of another type to numbers, as a loosely typed language does."""
     if isinstance(pattern, dict):
         given = value if isinstance(value, dict) else pattern
         return {key: _typed(part, pattern[key]) if key in pattern else part for key, part in given.items()}
@@ -74,14 +74,14 @@ def _typed(value: Any, pattern: Any) -> Any:
 
 
 def _finite(value: Any, pattern: Any) -> Any:
-    """Numbers that are not finite become zero."""
+    """Replace NaN and infinite numbers by 0."""
     if isinstance(value, dict):
         return {key: _finite(part, pattern) for key, part in value.items()}
     return 0.0 if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _bounded(value: Any, pattern: Any) -> Any:
-    """Values beyond the contract's bounds are cut to them."""
+    """Clamp values to the contract's bounds."""
     if isinstance(value, dict):
         made = {key: _bounded(part, pattern) for key, part in value.items()}
         if isinstance(made.get("id"), str):
@@ -94,7 +94,7 @@ def _bounded(value: Any, pattern: Any) -> Any:
 
 
 def _swallowed(where: Callable[[Request], bool]) -> Callable[[], Any]:
-    """What is refused there is answered as if it were fine."""
+    """Return a change that answers 204 where the robot refuses a request of ``where``."""
 
     def change(request: Request, forward: Forward) -> Response:
         response = forward(request)

@@ -1,4 +1,4 @@
-"""Robots that take garbage over SOAP: each repairs one kind of it before it is looked at."""
+"""Mutants that repair or accept invalid SOAP input instead of refusing it."""
 
 import re
 from collections.abc import Callable
@@ -23,7 +23,7 @@ _INT = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
 
 
 def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Request], None]:
-    """``edit`` gets the Body and the deliveryRequestMessage (or None)."""
+    """Return an edit of requests; ``edit`` takes the Body element and the deliveryRequestMessage, or None."""
 
     def apply(request: Request) -> None:
         root = xml(request.body)

@@ -1,4 +1,4 @@
-"""Robots whose lists of sensors and services are not what they should be."""
+"""Mutants with faults in the lists of sensors and services."""
 
 import re
 

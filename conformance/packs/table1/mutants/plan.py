@@ -1,4 +1,4 @@
-"""Robots whose plans lead elsewhere."""
+"""Mutants that return wrong plans."""
 
 import math
 from collections.abc import Callable
@@ -16,12 +16,12 @@ _GET = rest("GET", PLAN)
 
 
 def _told(edit: Callable[[Any], Any]) -> Make:
-    """The plan is altered on its way to the client."""
+    """Return a change that applies ``edit`` to plans."""
     return altered(_GET, values(edit))
 
 
 def _led(edit: Callable[[list[Any]], list[Any]], nth: int = 1) -> Make:
-    """The plan has other poses."""
+    """Return a change that applies ``edit`` to the list of poses of every nth plan."""
     return altered(_GET, values(lambda value: value["plan"].update(poses=edit(value["plan"]["poses"]))), nth=nth)
 
 

@@ -1,4 +1,4 @@
-"""Robots that do not know, or do not say, where they are."""
+"""Mutants that return a wrong pose, stamp or odometry."""
 
 import copy
 import math
@@ -26,7 +26,7 @@ def _orientation(odometry: Any) -> Any:
 
 
 def _told(edit: Callable[[Any], Any], nth: int = 1) -> Make:
-    """The odometry is altered on its way to the client."""
+    """Return a change that applies ``edit`` to every nth odometry."""
     return altered(_AT, values(edit), nth=nth)
 
 
@@ -61,7 +61,7 @@ def _in_degrees(odometry: Any) -> None:
 
 
 class _Frozen:
-    """Keeps parts of the first pose for ever."""
+    """A change that returns some parts of the first odometry for ever."""
 
     def __init__(self, *parts: str) -> None:
         self._parts = parts

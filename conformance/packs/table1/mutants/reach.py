@@ -1,4 +1,4 @@
-"""Robots of which an interface is not there."""
+"""Mutants without one of their interfaces."""
 
 from conformance.mutation.changes import Make, hanging_up, instead, plain, rest
 from conformance.mutation.messages import Forward, HangUpError, Request, Response
@@ -10,7 +10,7 @@ _OTHER_SERVER = plain(404, b"<html><body>It works!</body></html>", "text/html")
 
 
 def _elsewhere(service: str) -> Make:
-    """Another web server responds in place of a service, or of all services when empty."""
+    """Return a change that makes a SOAP service (empty: all of them) respond like another web server."""
     return instead(lambda request: request.side == "soap" and service in request.path, _OTHER_SERVER)
 
 

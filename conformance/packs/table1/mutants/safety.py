@@ -1,4 +1,4 @@
-"""Robots that are dangerous: they go on, go too fast, or start by themselves."""
+"""Mutants that are dangerous: they drive on, drive too fast, or start by themselves."""
 
 import time
 from typing import Any
@@ -22,7 +22,7 @@ _AXES = (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y"))
 
 
 def moving(request: Request) -> bool:
-    """Whether a velocity is asked for that is not zero."""
+    """Return whether a request commands a velocity other than zero."""
     value = parsed(request.body)
     try:
         return bool(value["linear"]["x"] or value["angular"]["z"])
@@ -139,7 +139,7 @@ def _two_wheeled(twist: Any) -> None:
 
 
 def _too_fast(twist: Any) -> None:
-    """What is measured is four times what is driven, above a crawl."""
+    """Multiply measured velocities above 0.15 by four."""
     for part, axis in (("linear", "x"), ("angular", "z")):
         if abs(twist[part][axis]) > 0.15:
             twist[part][axis] *= 4
@@ -180,7 +180,7 @@ def _zero(value: Any) -> bool:
 
 
 def _torn(side: str, _octets: bytes, forward: Forward) -> None:
-    """What had come of a request is carried out."""
+    """Carry out an incomplete request."""
     if side == "rest":
         drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
 

@@ -1,4 +1,4 @@
-"""Robots that process envelopes, headers and encodings as SOAP 1.1 does not have it."""
+"""Mutants that process envelopes, header blocks or encodings against SOAP 1.1."""
 
 import re
 from collections.abc import Callable
@@ -39,7 +39,7 @@ def _mandatory(request: Request) -> bool:
 
 
 def without_headers(request: Request) -> Request:
-    """A request without its header blocks."""
+    """Return a copy of a request without its SOAP header blocks."""
     root = xml(request.body)
     made = request.copy()
     if root is not None:
@@ -96,7 +96,7 @@ def _by_action(request: Request, forward: Forward) -> Response:
 
 
 def _headed(request: Request) -> bool:
-    """Requests with a header block that is not mandatory and not of WS-Addressing."""
+    """Return whether a request has header blocks, none of them mandatory or of WS-Addressing."""
     root = xml(request.body) if posted(request) else None
     header = root.find(f"{{{SOAP}}}Header") if root is not None else None
     return (

@@ -1,4 +1,4 @@
-"""Robots that break WS-I Basic Profile 1.1 and SOAP 1.1 in their messages and faults."""
+"""Mutants whose messages and faults break WS-I Basic Profile 1.1 or SOAP 1.1."""
 
 from collections.abc import Callable
 
@@ -48,12 +48,12 @@ _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 
 
 def _answers(edit: Callable[[Response], object]) -> Make:
-    """Every answer to an operation is altered, faults too."""
+    """Return a change that applies ``edit`` to every response of an operation, faults too."""
     return altered(_ANY, edit, anything)
 
 
 def _faults(edit: Callable[[Response], object]) -> Make:
-    """Faults are altered."""
+    """Return a change that applies ``edit`` to faults."""
     return altered(posted, edit, is_fault)
 
 
@@ -93,7 +93,7 @@ def _in_chunks(request: Request) -> bool:
 
 
 def _first_part(request: Request) -> None:
-    """Of what comes in chunks, as much as a buffer holds."""
+    """Cut the body of a chunked request to 8 KiB."""
     request.body = request.body[:8192]
 
 

@@ -1,4 +1,4 @@
-"""Robots whose subscribers service gives wrong values, wrong plans, or values in a wrong form."""
+"""Mutants whose subscribers service returns wrong values, plans or elements."""
 
 import re
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Robots whose SOAP services answer something else than they were asked."""
+"""Mutants whose SOAP operations return wrong responses or refuse valid messages."""
 
 import re
 from collections.abc import Callable
@@ -24,12 +24,12 @@ def _written(pattern: bytes) -> Callable[[Request], bool]:
 
 
 def _refused(pattern: bytes, why: str) -> Make:
-    """Requests in which something is written so are Client faults."""
+    """Return a change that answers requests whose body matches the pattern with a Client fault."""
     return instead(_written(pattern), fault("Client", why))
 
 
 def _lacking(operation: str, name: str) -> Make:
-    """The first element with a name is not in the response."""
+    """Return a change that removes the first element ``name`` from an operation's response."""
     return altered(soap(operation), tree(each(name, gone, slice(1))))
 
 

@@ -1,4 +1,4 @@
-"""Robots that do not drive as they are told, or do not say how they drive."""
+"""Mutants that drive at another velocity than commanded, or return a wrong velocity."""
 
 import json
 import operator
@@ -40,7 +40,7 @@ def _times(factor: float) -> Callable[[Any], None]:
 
 
 def _integral(request: Request) -> bool:
-    """Whether a velocity is written with an integer for the part that moves the robot."""
+    """Return whether a PUT writes linear.x and angular.z as integers."""
     value: Any = parsed(request.body) if _PUT(request) else None
     try:
         return isinstance(value["linear"]["x"], int) and isinstance(value["angular"]["z"], int)
@@ -114,7 +114,7 @@ def _other_half(request: Request, forward: Forward) -> Response:
 
 
 def _good(twist: Any) -> bool:
-    """Whether a Twist is one that a robot would take; others stay as they are, to be refused."""
+    """Return whether a Twist is valid and slow; the robot is to refuse others itself."""
     try:
         numbers = [twist[part][axis] for part in ("linear", "angular") for axis in "xyz"]
         slow = abs(twist["linear"]["x"]) < 0.5 and abs(twist["angular"]["z"]) < 1.6
@@ -124,12 +124,12 @@ def _good(twist: Any) -> bool:
 
 
 def _driven(edit: Callable[[Any], Any]) -> Make:
-    """A good velocity is altered on its way to the robot."""
+    """Return a change that applies ``edit`` to valid velocity commands and answers 204."""
     return secretly(_PUT, inputs(lambda twist: edit(twist) if _good(twist) else None))
 
 
 def _beyond(share: float) -> Callable[[Request], bool]:
-    """PUTs of a velocity beyond a share of the limits, which is within them."""
+    """Return a condition for velocity commands between ``share`` of the limits and the limits."""
 
     def where(request: Request) -> bool:
         twist: Any = parsed(request.body) if _PUT(request) else None
@@ -143,7 +143,7 @@ def _beyond(share: float) -> Callable[[Request], bool]:
 
 
 def _short_of(share: float) -> Callable[[Any], None]:
-    """The robot does not quite get to its limits."""
+    """Return an edit that clamps a Twist to ``share`` of the limits."""
 
     def edit(twist: Any) -> None:
         for part, axis, limit in (("linear", "x", _LIMITS[0]), ("angular", "z", _LIMITS[1])):

@@ -1,4 +1,4 @@
-"""Robots whose WSDL is not the contract's, or breaks WS-I Basic Profile 1.1."""
+"""Mutants whose WSDL differs from the contract's or breaks WS-I Basic Profile 1.1."""
 
 import re
 from collections.abc import Callable
@@ -27,12 +27,12 @@ def _description(request: Request) -> bool:
 
 
 def _edited(edit: Callable[[Any], object]) -> Make:
-    """Alter the WSDL; ``edit`` gets its root."""
+    """Return a change that applies ``edit`` to the WSDL's root element."""
     return altered(_description, tree(edit))
 
 
 def _typed(edit: Callable[[Any], object]) -> Make:
-    """Alter schemas, inline or in documents of their own; ``edit`` gets each schema that declares something."""
+    """Return a change that applies ``edit`` to each schema with declarations, in the WSDL or imported."""
 
     def apply(root: Any) -> None:
         for schema in root.iter(f"{_X}schema"):
@@ -43,7 +43,7 @@ def _typed(edit: Callable[[Any], object]) -> Make:
 
 
 def _all(path: str, edit: Callable[[Any], object], which: slice = slice(None)) -> Make:
-    """Alter the WSDL's elements at a path, or some of them."""
+    """Return a change that applies ``edit`` to the WSDL's elements at a path, or to some of them."""
 
     def apply(root: Any) -> None:
         for node in root.findall(path)[which]:
@@ -130,7 +130,7 @@ def _float(schema: Any) -> None:
 
 
 def _long_sequence(edit: Callable[[Any], object]) -> Make:
-    """Alter the first sequence of each schema that has more than two elements."""
+    """Return a change that applies ``edit`` to the first sequence of more than two elements in each schema."""
 
     def apply(schema: Any) -> None:
         for sequence in [one for one in schema.iter(f"{_X}sequence") if len(one) > 2][:1]:
@@ -140,7 +140,7 @@ def _long_sequence(edit: Callable[[Any], object]) -> Make:
 
 
 def _inline_no_target(root: Any) -> None:
-    """A schema of its own in wsdl:types, which declares an element in no namespace at all."""
+    """Add a schema without targetNamespace to wsdl:types."""
     for schema in named(root, "schema")[:1]:
         made = etree.Element(f"{_X}schema")
         etree.SubElement(made, f"{_X}element").set("name", "homeless")
