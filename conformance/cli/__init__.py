@@ -1,1 +1,1 @@
-"""The suite's commands: certify, contract, selftest."""
+"""The commands certify, replay, contract and selftest."""

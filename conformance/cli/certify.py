@@ -1,4 +1,4 @@
-"""``roaas certify``: options to a run, a run to a verdict, a verdict to an exit code."""
+"""``roaas certify``: read the options, run the certification, print the verdict, return the exit code."""
 
 from __future__ import annotations
 
@@ -147,10 +147,10 @@ def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> Comma
 
 
 def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> Statement:
-    """Return the statement with the options applied, which win over it.
+    """Return the statement with the options applied, which override it.
 
     Raises:
-        StatementError: an option has a value that it cannot have.
+        StatementError: an option has an invalid value.
     """
     given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options[key] is not None}
     where = msgspec.structs.replace(declared.endpoints, **given)
@@ -169,7 +169,7 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
 
 
 def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
-    """Return the classes that are claimed by options.
+    """Return the classes that the options claim.
 
     Raises:
         StatementError: the contract has no such profile or class.
@@ -185,7 +185,7 @@ def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
 
 
 def _plan(chosen: Statement, options: dict[str, Any], contract: Contract) -> CommandResult:
-    """Print the plan of a run."""
+    """Print the plan of the run."""
     from conformance.engine.planning import plan_of  # noqa: PLC0415 - only --plan needs it
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415 - as above
 
@@ -250,7 +250,7 @@ def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, sta
 
 
 def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
-    """Return the run that the options ask for."""
+    """Return the run that the options describe."""
     from conformance.verdict.run import Run, seed_of_nonce  # noqa: PLC0415 - see _certify
 
     known = {item.class_ for item in contract.ledger.values()}

@@ -1,4 +1,4 @@
-"""``roaas certify --fleet``: the command's options to many runs, what came of them to a page and an exit code."""
+"""``roaas certify --fleet``: certify several robots, write a page, return one exit code."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _OWN = ("fleet", "parallel", "out", "allow_motion")
 
 
 def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
-    """Judge the robots of a fleet's file.
+    """Certify the robots of a fleet file.
 
     Raises:
-        click.UsageError: the file cannot be used, or an option is given that belongs to one robot.
+        click.UsageError: the file is invalid, or an option is given that applies to a single robot.
     """
     from conformance.fleet.member_run import MemberRun  # noqa: PLC0415 - --help needs no asyncio
     from conformance.fleet.result import ROBOTS_FOLDER, exit_code, fleet_document, write_fleet  # noqa: PLC0415
@@ -86,10 +86,10 @@ def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
 
 
 def _shared() -> list[str]:
-    """The options as given that hold for each robot.
+    """Return the given options that apply to all robots.
 
     Raises:
-        click.UsageError: one is given that belongs to one robot.
+        click.UsageError: an option is given that applies to a single robot.
     """
     context = click.get_current_context()
     shared: list[str] = []
@@ -106,7 +106,7 @@ def _shared() -> list[str]:
 
 
 def _print_summary(results: list[MemberResult]) -> None:
-    """Who may do what, a line for each robot."""
+    """Print one line for each robot: its verdict, and the classes it passed."""
     width = max(len(result.member.name) for result in results)
     click.echo()
     for result in results:

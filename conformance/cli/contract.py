@@ -1,4 +1,4 @@
-"""``roaas contract``: the requirements, the contract's files, and what binds each requirement."""
+"""``roaas contract``: list the requirements, export the contract's files, show the coverage."""
 
 import json
 import shutil
@@ -27,10 +27,10 @@ contract_option = click.option(
 
 
 def loaded(pack: str) -> Contract:
-    """Return a pack.
+    """Return a contract pack.
 
     Raises:
-        click.UsageError: it cannot be used.
+        click.UsageError: the pack cannot be used.
     """
     try:
         return Contract.load(pack)
@@ -63,7 +63,7 @@ def list_(pack: str, class_: str | None, level: str | None, *, as_json: bool) ->
 
 
 def _as_json(requirement: Requirement) -> dict[str, Any]:
-    """A requirement by its public names."""
+    """Return a requirement with its public key names."""
     members = asdict(requirement)
     return {"id": members.pop("id"), "class": members.pop("class_"), **members}
 

@@ -1,4 +1,4 @@
-"""``roaas replay``: a finding's requests again, and whether it is still there."""
+"""``roaas replay``: send a finding's requests again and report whether the finding still occurs."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def _judge_again(
 def _judge_recorded(
     document: dict[str, Any], folder: Path, statement_file: Path | None, pack: str | None, requirement: str | None
 ) -> CommandResult:
-    """Judge the traces in a folder by the rules at hand."""
+    """Judge the traces in a folder by the current rules."""
     from conformance.engine.recorded import judge_recorded  # noqa: PLC0415 - see replay()
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.scenarios.stored import TracesError  # noqa: PLC0415
@@ -193,11 +193,11 @@ def _judge_recorded(
 
 
 def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -> None:
-    """See that the token goes nowhere but where the user said that it may.
+    """Check that the token is sent only to origins that the user trusts.
 
     Raises:
-        click.UsageError: it would.
-        ValueError: an address is none.
+        click.UsageError: it would be sent elsewhere.
+        ValueError: an address is invalid.
     """
     from conformance.engine.permission import strangers  # noqa: PLC0415 - as above
 
@@ -210,10 +210,10 @@ def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -
 
 
 def _contract_of(document: dict[str, Any], pack: str | None) -> Contract | None:
-    """Return the contract that judged, in its present version; None where it is not at hand.
+    """Return the current version of the contract that judged, or None if it is not installed.
 
     Raises:
-        click.UsageError: the pack that was named cannot be used.
+        click.UsageError: the pack named by the user cannot be used.
     """
     named = pack or str(document.get("pack", {}).get("name", DEFAULT_PACK))
     try:

@@ -1,4 +1,4 @@
-"""``roaas selftest``: shows that the suite kills mutants (faulty devices) and has no false positives on good ones."""
+"""``roaas selftest``: show that the suite kills mutants (faulty devices) and has no false positives on good ones."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def selftest(context: click.Context, /, **options: Any) -> None:
 
 
 def _by_hand(contract: Contract, options: dict[str, Any]) -> None:
-    """Mutants made by hand, and the A/A controls."""
+    """Judge hand-written mutants and A/A controls."""
     # lxml and the like cost what --help need not pay.
     from conformance.mutation.self_test import self_test_of  # noqa: PLC0415
     from conformance.selftest.report import Report  # noqa: PLC0415
@@ -111,10 +111,10 @@ def _by_hand(contract: Contract, options: dict[str, Any]) -> None:
 
 
 def _target(contract: Contract, name: str) -> GoodDevice:
-    """Return the good device of a name; the pack's first, where it is empty.
+    """Return the good device with a name, or the pack's first if the name is empty.
 
     Raises:
-        click.UsageError: the pack has none of that name, or none at all.
+        click.UsageError: the pack has no such device.
     """
     from conformance.selftest.robots import RobotError, target_of  # noqa: PLC0415 - see _by_hand()
 
@@ -125,7 +125,7 @@ def _target(contract: Contract, name: str) -> GoodDevice:
 
 
 def _chosen(needs: SelfTest, options: dict[str, Any]) -> list[Mutant]:
-    """Return the mutants that the options ask for; none, where the pack has none.
+    """Return the hand-written mutants that the options select.
 
     Raises:
         click.UsageError: no mutant has such a name.
@@ -144,7 +144,7 @@ def _chosen(needs: SelfTest, options: dict[str, Any]) -> list[Mutant]:
 
 
 def _by_rule(context: click.Context, contract: Contract, options: dict[str, Any]) -> None:
-    """Mutants by rule: before a device that starts in a moment, and Schemathesis only where it is asked for."""
+    """Judge generated mutants of the device that starts fastest; compare with Schemathesis only if requested."""
     from conformance.cli.selftest_generated import chosen_mutants, run_generated  # noqa: PLC0415 - see _by_hand()
     from conformance.mutation.self_test import self_test_of  # noqa: PLC0415 - see _by_hand()
     from conformance.selftest.report import Report  # noqa: PLC0415 - see _by_hand()
@@ -162,7 +162,7 @@ def _by_rule(context: click.Context, contract: Contract, options: dict[str, Any]
 
 
 def _finish(report: Report, run: Callable[[], None], options: dict[str, Any]) -> None:
-    """Run, write the results, also those of a run that was interrupted, and end with the exit code."""
+    """Run, write the results even after an interruption, and exit with the exit code."""
     from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see _by_hand()
 
     started, interrupted = time.monotonic(), False

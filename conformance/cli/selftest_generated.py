@@ -1,4 +1,4 @@
-"""``roaas selftest --generated``: a sample of the mutants by rule, in place of those made by hand."""
+"""``roaas selftest --generated``: judge a sample of generated mutants instead of the hand-written ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def chosen_mutants(contract: Contract, options: dict[str, Any]) -> list[GeneratedMutant]:
-    """Return the sample that the options ask for.
+    """Return the sample of generated mutants that the options select.
 
     Raises:
         click.UsageError: no mutant has such a name.
@@ -33,10 +33,10 @@ def chosen_mutants(contract: Contract, options: dict[str, Any]) -> list[Generate
 
 
 def run_generated(report: Report, mutants: list[GeneratedMutant], options: dict[str, Any], *, compared: bool) -> None:
-    """Judge them, and with ``compared`` let plain Schemathesis try those of REST; the report has each as it is done.
+    """Judge generated mutants, and add the results to the report; with ``compared``, also run Schemathesis on them.
 
     Raises:
-        RobotError: the robot does not start.
+        RobotError: the device does not start.
     """
     from conformance.selftest.generated.judging import judge  # noqa: PLC0415 - see selftest.py
     from conformance.selftest.mutant_run import RobotPool  # noqa: PLC0415 - see selftest.py

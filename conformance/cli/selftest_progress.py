@@ -1,4 +1,4 @@
-"""The progress of ``roaas selftest``: a line on stderr for each result, which the report keeps."""
+"""The progress of ``roaas selftest``: one line on stderr for each result."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Progress:
-    """Reports progress on stderr, and keeps each result in case that the run is interrupted."""
+    """Writes progress to stderr and adds each result to the report, so that an interrupted run keeps it."""
 
     def __init__(self, report: Report, total: int) -> None:
         self.total = total
@@ -28,7 +28,7 @@ class Progress:
         self._controls = 0
 
     def mutant(self, result: MutantResult) -> None:
-        """Report a mutant that has been tried."""
+        """Report the result of a hand-written mutant."""
         self._report.mutant_results.append(result)
         self._done += 1
         said = result.not_tried or (
@@ -37,7 +37,7 @@ class Progress:
         click.echo(f"[{self._done}/{self.total}] {result.mutant.name}: {said} ({result.seconds:.1f} s)", err=True)
 
     def by_rule(self, result: GeneratedResult) -> None:
-        """Report a mutant by rule that has been judged."""
+        """Report the result of a generated mutant."""
         self._report.generated_results.append(result)
         self._done += 1
         by = f" by {result.by[0]}" if result.by else ""
@@ -45,14 +45,14 @@ class Progress:
         click.echo(line, err=True)
 
     def compared(self, result: SchemathesisResult) -> None:
-        """Report a mutant that Schemathesis has tried."""
+        """Report the result of Schemathesis on a mutant."""
         self._report.compared.append(result)
         self._compared += 1
         said = f"killed: {result.findings[0]}" if result.killed else "survived"
         click.echo(f"[{self._compared}] Schemathesis, {result.mutant}: {said}", err=True)
 
     def control(self, result: ControlResult) -> None:
-        """Report a good device that has been judged."""
+        """Report the result of a good device."""
         self._report.control_results.append(result)
         self._controls += 1
         name = f"{result.robot} {result.variant}".strip()
@@ -70,7 +70,7 @@ def _few(result: MutantResult) -> str:
 
 
 def compare(report: Report, pool: RobotPool, mutants: Iterable[Mutant], progress: Progress) -> None:
-    """Let plain Schemathesis try the REST mutants; the report has each as it is done."""
+    """Run plain Schemathesis on the REST mutants, and add the results to the report."""
     from conformance.selftest import comparison  # noqa: PLC0415 - it costs what --help need not pay
 
     if comparison.command() is None:

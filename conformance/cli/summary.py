@@ -1,4 +1,4 @@
-"""What ``roaas certify`` says at its end: classes, findings by cause with a command to replay each, the verdict."""
+"""The summary at the end of ``roaas certify``: classes, findings by cause with a replay command each, the verdict."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SHOWN_BLOCKED = 5
 
 
 def print_summary(outcome: Certification) -> None:
-    """Print a certification to stdout; that the robot was not reached, to stderr."""
+    """Print the summary to stdout; if the robot was not reached, print that to stderr."""
     document = outcome.document
     if outcome.exit_code == ExitCode.UNREACHABLE:
         reasons = (item["reason"] for item in document["requirements"] if item["verdict"] == "error")
@@ -46,7 +46,7 @@ def print_summary(outcome: Certification) -> None:
 
 
 def _print_cause(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
-    """Print one finding, with the requirements that are not tested because of it."""
+    """Print a finding and the requirements that are not tested because of it."""
     head = f"{requirement['verdict'].upper()} {requirement['id']} ({requirement['level']}, {requirement['source']})"
     click.echo(f"\n{cause['number']}. {head}\n  {requirement['text']}\n  {inert(cause['text'])}")
     blocks = cause["blocks"]

@@ -1,1 +1,1 @@
-"""What all commands share: exit codes, the result file they leave, atomic writes, safe terminal output."""
+"""What all commands share: exit codes, result files, atomic writes, safe terminal output."""

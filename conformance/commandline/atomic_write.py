@@ -1,19 +1,16 @@
-"""A file that is there whole or not at all."""
+"""Atomic writing of files."""
 
 import secrets
 from pathlib import Path
 
 
 def write_atomically(path: Path, text: str) -> Path:
-    """Write a file beside its name and put it in place: a reader sees the old one or the new one, whole.
+    """Write a file so that a reader sees either the old content or the whole new content; return its path.
 
-    The draft is opened as any file is, so that its mode follows the umask: a result is for whoever may read the folder.
-
-    Returns:
-        The path that was given.
+    The temporary file is opened like any other, so that its mode follows the umask.
 
     Raises:
-        OSError: it cannot be written; what was there before is still there, and no draft is left.
+        OSError: the file cannot be written; the old content is kept, and no temporary file remains.
     """
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:

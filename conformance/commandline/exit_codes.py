@@ -1,11 +1,11 @@
-"""Exit codes of every command (docs/cli.md)."""
+"""The exit codes of all commands (docs/cli.md)."""
 
 from enum import IntEnum
 from typing import Final
 
 
 class ExitCode(IntEnum):
-    """What a command ends with."""
+    """The exit code of a command."""
 
     PASSED = 0  # conformant; thresholds met
     FAILED = 1  # not conformant; a threshold missed

@@ -1,4 +1,4 @@
-"""What a command that leaves a result file comes to."""
+"""Commands that write a result file."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
 
 
 class CommandResult(NamedTuple):
-    """What the callback of such a command returns.
+    """The return value of such a command.
 
     Attributes:
-        exit_code: of the process.
-        file: the result file that it wrote, or None where it wrote none.
-        notary: what signs it, as the front door gave it, or None.
+        exit_code: exit code of the process.
+        file: the result file that was written, or None.
+        notary: the signer that the front door provided, or None.
     """
 
     exit_code: int
@@ -25,23 +25,23 @@ class CommandResult(NamedTuple):
 
 
 class FrontDoor(Protocol):
-    """What a command that leaves a result file asks of the front door, which is the context's object."""
+    """What such a command needs from roaas.py, which is the click context's object."""
 
     def notary(self, key: Path) -> Any:
-        """What signs with a private key; a usage error where it cannot be read."""
+        """Return a signer with a private key; raise a usage error if the key cannot be read."""
 
     def render(self, written: Path, notary: Any) -> None:
-        """Write the pages of a result file, and sign it where there is a notary."""
+        """Write the pages of a result file, and sign it if there is a signer."""
 
 
 class ResultCommand(click.Command):
-    """A command whose callback returns a CommandResult, and which ends with its exit code.
+    """A click command whose callback returns a CommandResult.
 
-    The front door, where there is one, renders the file that was written.
+    After the callback, the front door, if any, renders the result file, and the process exits with the exit code.
     """
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the callback.
+        """Run the callback, render its result file and exit.
 
         Raises:
             click.exceptions.Exit: always, with the exit code.

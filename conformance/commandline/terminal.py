@@ -1,6 +1,6 @@
-"""What a terminal is shown of a robot's own words."""
+"""Safe terminal output of text from a robot."""
 
 
 def inert(text: str) -> str:
-    r"""Write each character that does not print as its escape, such as `\x1b`: a terminal obeys none of them."""
+    r"""Return a text with unprintable characters escaped (`\x1b`), so that it cannot control the terminal."""
     return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)

@@ -1,1 +1,1 @@
-"""The contract as files, and what reads them: the ground floor, which imports nothing of ours."""
+"""Contract packs and their files: ledger, classes, requirement sets, sections."""

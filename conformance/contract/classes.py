@@ -1,4 +1,4 @@
-"""What a requirement can be: level, origin, prerequisites; and the conformance classes that a pack declares."""
+"""The attributes of requirements (level, origin, prerequisites), and conformance classes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FULL = "full"
 
 
 class Level(StrEnum):
-    """How binding a requirement is (RFC 2119): MUST fails, SHOULD warns, MAY informs."""
+    """How binding a requirement is (RFC 2119): a violated MUST fails, SHOULD warns, MAY informs."""
 
     MUST = "MUST"
     SHOULD = "SHOULD"
@@ -26,7 +26,7 @@ class Level(StrEnum):
 
 
 class Origin(StrEnum):
-    """Where a requirement comes from, and so whom it binds."""
+    """Where a requirement comes from, which decides whom it binds."""
 
     NORM = "norm"  # a clause of an RFC, SOAP 1.1, WSDL 1.1, WS-I or XML Schema: every HTTP or SOAP service
     DESCRIPTION = "description"  # the OpenAPI or WSDL file at hand: the service that it describes
@@ -35,7 +35,7 @@ class Origin(StrEnum):
 
 
 class CauseKind(StrEnum):
-    """Why requirements are not met, or cannot be tested; in the order in which a vendor looks at them."""
+    """The kinds of causes for failures, in the order in which a vendor should look at them."""
 
     NO_RESPONSE = "no-response"  # no connection, or one that was closed without a response
     HANG = "hang"  # no whole response within the deadline
@@ -45,7 +45,7 @@ class CauseKind(StrEnum):
 
 
 class Prerequisite(StrEnum):
-    """What a run must have to judge a requirement, beside the interface."""
+    """What a run must have, beside the interface, to judge a requirement."""
 
     MOTION = "motion"  # permission to move the device
     OBSERVER = "observer"  # a ROS probe, or another way to see the effects of a request
@@ -57,13 +57,13 @@ class Prerequisite(StrEnum):
 
 @dataclass(frozen=True)
 class ConformanceClass:
-    """What a vendor can claim.
+    """A group of requirements that a vendor can claim.
 
     Attributes:
         name: as in claims and requirement ids.
-        title: what the class holds, in words.
+        title: a description.
         interfaces: the interfaces that it judges.
-        one_is_enough: whether one of those interfaces suffices; otherwise each one that is described has to answer.
+        one_is_enough: whether one of these interfaces suffices; otherwise all that the contract describes must respond.
     """
 
     name: str
@@ -72,5 +72,5 @@ class ConformanceClass:
     one_is_enough: bool = False
 
     def missing(self, there: Collection[Interface], described: Collection[Interface] = EVERY) -> tuple[Interface, ...]:
-        """Return the interfaces that the class judges and the contract describes, but that have no address."""
+        """Return the interfaces that the class needs and the contract describes, but that have no address."""
         return tuple(name for name in self.interfaces if name in described and name not in there)

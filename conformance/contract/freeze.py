@@ -1,4 +1,4 @@
-"""``python -m conformance.contract.freeze NAME [PACK]``: freeze a pack's ledger as a set, at the end of a release."""
+"""``python -m conformance.contract.freeze NAME [PACK]``: freeze a pack's ledger as a requirement set."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What any web API is judged by: the generic suite's conformance classes and requirements."""
+"""The conformance classes and requirements that apply to any web API."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LEDGER = "requirements.toml"
 
 
 class ClassEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A conformance class as ``classes.toml`` and ``pack.toml`` have it."""
+    """A conformance class as written in ``classes.toml`` and ``pack.toml``."""
 
     name: Text
     title: Text | None = None
@@ -25,14 +25,14 @@ class ClassEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _Classes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """``rules/classes.toml``."""
+    """The content of ``rules/classes.toml``."""
 
     class_: tuple[ClassEntry, ...] = msgspec.field(name="class")
 
 
 @cache
 def generic_classes() -> dict[str, ConformanceClass]:
-    """Return the conformance classes that any web API can be judged by, by name."""
+    """Return the conformance classes that apply to any web API, by name."""
     entries = read_toml(GENERIC_RULES / "classes.toml", _Classes, ContractError).class_
     return {
         item.name: ConformanceClass(item.name, item.title or "", item.interfaces or (), item.one_is_enough)
@@ -42,5 +42,5 @@ def generic_classes() -> dict[str, ConformanceClass]:
 
 @cache
 def generic_ledger() -> dict[str, Requirement]:
-    """Return the requirements that bind every web API, by id."""
+    """Return the requirements that apply to any web API, by id."""
     return load_ledger(GENERIC_RULES / LEDGER, generic_classes())

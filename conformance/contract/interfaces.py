@@ -1,10 +1,10 @@
-"""The interfaces that a device may have."""
+"""The kinds of interfaces of a device."""
 
 from enum import StrEnum
 
 
 class Interface(StrEnum):
-    """One interface: REST, the SOAP service that acts, the SOAP service that only reads."""
+    """A kind of interface: REST, the SOAP service that acts, or the SOAP service that only reads."""
 
     REST = "rest"
     PUBLISHERS = "publishers"

@@ -1,4 +1,4 @@
-"""The requirement ledger: each requirement once, with its class, level, text, source and origin."""
+"""The requirement ledger: each requirement with its class, level, text, source and origin."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class LedgerError(TomlFileError):
-    """A ledger that cannot be used; the message names the requirement and the offending value."""
+    """Raised for an invalid ledger; the message names the requirement and the offending value."""
 
 
 @dataclass(frozen=True)
@@ -25,15 +25,15 @@ class Requirement:
 
     Attributes:
         id: ``CLASS/NAME``.
-        class_: the conformance class that it is in.
+        class_: its conformance class.
         level: how binding it is.
-        text: one sentence.
+        text: the rule, in one sentence.
         source: section of contract.md (``contract.md#goals``), file of the contract, paper section, RFC clause or
-            WS-I id; several are separated by "; ", and the first one is what binds.
-        origin: what kind of text that is.
-        needs: what a run must have to judge it beside the interface.
+            WS-I id; several are separated by "; ", and the first one is binding.
+        origin: the kind of source.
+        needs: what a run must have to judge it, beside the interface.
         untestable: why no check can judge it, or None.
-        forbids: the kinds of causes that the requirement is about: it gets the finding that others meet as well.
+        forbids: the kinds of causes that the requirement is about; it keeps the finding that other requirements share.
     """
 
     id: str
@@ -48,7 +48,7 @@ class Requirement:
 
 
 class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A requirement as its table in ``requirements.toml`` has it."""
+    """A requirement as written in ``requirements.toml``."""
 
     level: Level
     text: Text
@@ -60,7 +60,7 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def expanded(ids: Iterable[str], ledger: Iterable[str]) -> tuple[str, ...]:
-    """Return ids with each pattern ``*/NAME`` replaced by the requirement of that name of every class."""
+    """Return ids with each pattern ``*/NAME`` replaced by the requirements of that name in all classes."""
     there = tuple(ledger)
     return tuple(
         id_
@@ -73,11 +73,11 @@ def load_ledger(path: Path, classes: Collection[str]) -> dict[str, Requirement]:
     """Read a ``requirements.toml``.
 
     Args:
-        path: of the file.
-        classes: names of the conformance classes that its requirements may be in.
+        path: the file.
+        classes: names of the conformance classes that are allowed.
 
     Raises:
-        LedgerError: the file cannot be read, or a requirement in it is not well made.
+        LedgerError: the file cannot be read, or a requirement in it is invalid.
     """
     ledger: dict[str, Requirement] = {}
     for class_, requirements in read_tables(path, LedgerError).items():

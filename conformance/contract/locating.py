@@ -1,4 +1,4 @@
-"""Where a contract pack is: a folder, a name that comes with the suite, or an installed package's entry point."""
+"""Find a contract pack: by folder, by the name of a built-in pack, or by an installed package's entry point."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ GENERIC_RULES = _SUITE / "rules"
 
 
 class ContractError(TomlFileError):
-    """A contract pack that cannot be used; the message names the file and what is wrong with it."""
+    """Raised for a contract pack that cannot be used; the message names the file and the fault."""
 
 
 def built_in_packs() -> tuple[str, ...]:
-    """Return the names of the packs that come with the suite."""
+    """Return the names of the packs in the suite."""
     return tuple(sorted(path.parent.name for path in _BUILT_IN.glob(f"*/{MANIFEST}")))
 
 
@@ -35,7 +35,7 @@ def folder_of(pack: Path | str) -> Path:
     """Return the folder of a pack.
 
     Raises:
-        ContractError: there is none.
+        ContractError: there is no such pack.
     """
     name = str(pack)
     if name in built_in_packs():
@@ -54,7 +54,7 @@ def folder_of(pack: Path | str) -> Path:
 
 
 def module_of(path: Path) -> ModuleType:
-    """Import a module from its file, once in a process."""
+    """Import a module from its file, once per process."""
     name = f"roaas_pack_{path.resolve().parent.name}_{path.stem}"
     if name in sys.modules:
         return sys.modules[name]

@@ -1,8 +1,8 @@
-"""Contract packs: a folder with a contract's text, its descriptions, its ledger, and what judges a device by it.
+"""Contract packs: folders with a contract's text, descriptions, ledger and checks.
 
-A pack is found by its name (a folder of ``conformance/packs``, or an installed package's entry point in the group
-``roaas.packs``) or by its folder. A folder with nothing but descriptions is a pack too: a device with such a
-description is judged by what binds every web API.
+A pack is found by its name (a folder of ``conformance/packs``, or an entry point in the group ``roaas.packs``) or by
+its folder. A folder with only an OpenAPI or WSDL description is a pack too: its device is judged by the requirements
+that apply to any web API.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _OPENAPI_NAMES = ("openapi.yaml", "openapi.yml", "openapi.json")
 
 
 class _Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """``pack.toml``."""
+    """The content of ``pack.toml``."""
 
     name: Text
     version: Text
@@ -52,12 +52,12 @@ class Contract:
 
     Attributes:
         directory: the pack's folder.
-        openapi_path: the OpenAPI description, or None where the contract has no REST side.
+        openapi_path: the OpenAPI description, or None.
         wadl_path: the WADL, or None.
         publishers_path: the WSDL of the service that acts, or None.
         subscribers_path: the WSDL of the service that only reads, or None.
-        only: ids of the requirements to judge by, so that other checks do not run; empty: all.
-        manifest: what its ``pack.toml`` says; None: the folder has none.
+        only: ids of the requirements to judge; empty: all.
+        manifest: content of ``pack.toml``, or None without that file.
     """
 
     directory: Path
@@ -71,13 +71,13 @@ class Contract:
     @classmethod
     @cache  # reading openapi.yaml takes a third of a second
     def load(cls, pack: Path | str = DEFAULT_PACK, *, only: tuple[str, ...] = ()) -> Contract:
-        """Return the pack of a name or in a folder.
+        """Return the pack with a name or in a folder.
 
-        Of its files, ``openapi.yaml`` (or .yml, .json), one ``*.wadl``, and at most two ``*.wsdl`` describe the device:
-        the WSDL with "subscriber" in its name is of the service that only reads, the other of the service that acts.
+        ``openapi.yaml`` (or .yml, .json), one ``*.wadl`` and at most two ``*.wsdl`` describe the device. The WSDL with
+        "subscriber" in its name describes the service that only reads, the other one the service that acts.
 
         Raises:
-            ContractError: there is no such pack, or nothing in it describes an interface, or too much does.
+            ContractError: there is no such pack, or it describes no interface, or one interface twice.
         """
         directory = folder_of(pack)
         openapi = next((directory / name for name in _OPENAPI_NAMES if (directory / name).is_file()), None)
@@ -103,32 +103,32 @@ class Contract:
 
     @property
     def name(self) -> str:
-        """The pack's name; of a folder without a manifest, the folder's."""
+        """The pack's name; the folder's name without a manifest."""
         return self.manifest.name if self.manifest else self.directory.resolve().name
 
     @property
     def version(self) -> str:
-        """The contract's version; empty where there is no manifest."""
+        """The contract's version; empty without a manifest."""
         return self.manifest.version if self.manifest else ""
 
     @property
     def title(self) -> str:
-        """What a robot that keeps this contract is said to conform to."""
+        """The name of the contract in "conforms to …"."""
         return self.manifest.title if self.manifest else self.name
 
     @property
     def label(self) -> str:
-        """The name by which results know the contract: the version of the suite's own, else name and version."""
+        """The contract's name in results: the version for the default pack, otherwise name and version."""
         if self.name == DEFAULT_PACK:
             return self.version
         return f"{self.name} {self.version}" if self.manifest else f"own ({self.name})"
 
     @cached_property
     def classes(self) -> dict[str, ConformanceClass]:
-        """The conformance classes, by name, in the manifest's order; without a manifest, all of the generic suite.
+        """The conformance classes by name, in the manifest's order; without a manifest, all generic ones.
 
         Raises:
-            ContractError: a class is neither declared with its interfaces nor one of the generic suite's.
+            ContractError: a class neither declares its interfaces nor is a generic one.
         """
         generic = generic_classes()
         if self.manifest is None:
@@ -151,7 +151,7 @@ class Contract:
         """The classes that each profile claims; "full" claims all.
 
         Raises:
-            ContractError: a profile names no class of the pack.
+            ContractError: a profile names an unknown class.
         """
         named = self.manifest.profiles if self.manifest else {}
         for profile, classes in named.items():
@@ -173,10 +173,10 @@ class Contract:
 
     @cached_property
     def openapi(self) -> dict[str, Any]:
-        """The OpenAPI document; empty where there is none.
+        """The OpenAPI document; empty if there is none.
 
         Raises:
-            ContractError: the file is neither YAML nor JSON, or no object.
+            ContractError: the file is neither YAML nor JSON, or not an object.
         """
         if self.openapi_path is None:
             return {}
@@ -192,10 +192,10 @@ class Contract:
 
     @cached_property
     def ledger(self) -> dict[str, Requirement]:
-        """The requirements that apply, by id, class by class: the generic suite's first, then the pack's own.
+        """The requirements by id, class by class: the generic ones first, then the pack's own.
 
         Raises:
-            ContractError: a ledger cannot be read, states an id twice, or lacks one of ``only``.
+            ContractError: a ledger cannot be read, an id occurs twice, or one of ``only`` is unknown.
         """
         generic = {id_: item for id_, item in generic_ledger().items() if item.class_ in self.classes}
         own: dict[str, Requirement] = {}
@@ -232,10 +232,10 @@ class Contract:
 
     @cached_property
     def plugin(self) -> ModuleType | None:
-        """The pack's Python module, which knows its device; None where it has none.
+        """The pack's Python module, which defines its device model; None if it has none.
 
         Raises:
-            ContractError: it cannot be imported.
+            ContractError: the module cannot be imported.
         """
         if self.manifest is None or self.manifest.plugin is None:
             return None
@@ -249,11 +249,11 @@ class Contract:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The files that make up the contract: all in the pack's folder but Python modules."""
+        """The files of the contract: everything in the pack's folder except Python modules."""
         return tuple(sorted(path for path in self.directory.iterdir() if path.is_file() and path.suffix != ".py"))
 
     @property
     def rules(self) -> tuple[Path, ...]:
-        """The folders with the checks that judge by this contract: the generic suite's, then the pack's own."""
+        """The folders with the checks: the generic ones, then the pack's own."""
         own = self.directory / "rules"
         return (GENERIC_RULES, own) if own.is_dir() else (GENERIC_RULES,)

@@ -1,6 +1,6 @@
-"""Where in their files the things stand that a result speaks of, for whoever shows it beside the files.
+"""Line numbers of requirements and claims in their files, for reports that point to them.
 
-TOML's readers give values without their lines; the two files are looked at as text again, for headings and names.
+TOML parsers discard line numbers, so the two files are searched as text.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ _NAME = re.compile(r"[\"']([\w-]+)[\"']")
 
 
 def places(contract: Contract, statement: Path | None) -> dict[str, Any]:
-    """What result.json says of places: of the ledger, and of the statement where there is one.
+    """Return the ``places`` of result.json: lines in the ledgers, and in the statement if there is one.
 
-    Lines count from 1, and files are named from the working directory where they lie below it.
+    Lines count from 1. Files are named relative to the working directory if they are below it.
     """
     own, generic = contract.directory / LEDGER, GENERIC_RULES / LEDGER
     return {
@@ -44,7 +44,7 @@ def _ledger_lines(text: str) -> dict[str, int]:
 
 
 def _claim_lines(text: str) -> dict[str, Any]:
-    """The line of the table `[claims]`, 1 where there is none, and of each name that is claimed there."""
+    """Return the line of the table `[claims]` (1 without one), and of each claimed name in it."""
     table = _CLAIMS.search(text)
     if table is None:
         return {"line": 1, "classes": {}}
@@ -63,7 +63,7 @@ def _text(path: Path) -> str:
 
 
 def _shown(path: Path) -> str:
-    """From the working directory; of what lies elsewhere, only the folder and the name."""
+    """Return a path relative to the working directory; of a file elsewhere, only folder and name."""
     try:
         return path.resolve().relative_to(Path.cwd()).as_posix()
     except ValueError:

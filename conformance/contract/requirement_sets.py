@@ -1,8 +1,6 @@
-"""Frozen sets of requirements: a robot judged by one stays judged by it, whatever a later suite adds.
+"""Frozen requirement sets: a robot that is scored by one is not affected by requirements that a later suite adds.
 
-``sets/NAME.toml`` of a pack holds id, level and text digest of each requirement. It never changes once it is published.
-``python -m conformance.contract.freeze NAME`` writes one from the ledger. A newer requirement is in no set until
-the next one is frozen.
+``sets/NAME.toml`` of a pack lists id, level and text digest of each requirement. A published set never changes.
 """
 
 from __future__ import annotations
@@ -27,11 +25,11 @@ _UNFROZEN = "unfrozen"
 
 
 class RequirementSetError(TomlFileError):
-    """A set that there is not, or whose file cannot be used; the message names it."""
+    """Raised for a requirement set that does not exist or is invalid; the message names it."""
 
 
 class Frozen(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A requirement as a set has it: its level, and the digest of its text, as `sha256:…`."""
+    """A requirement in a set: its level, and the digest of its text as `sha256:…`."""
 
     level: Level
     text: Text
@@ -43,11 +41,11 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class RequirementSet:
-    """Requirements under a name.
+    """A named set of requirements.
 
     Attributes:
         name: as in ``--requirements NAME``.
-        requirements: level and text's digest, by id.
+        requirements: level and text digest, by id.
     """
 
     name: str
@@ -55,30 +53,30 @@ class RequirementSet:
 
     @property
     def digest(self) -> str:
-        """Over ids, levels and texts, as `sha256:…`."""
+        """The digest of all ids, levels and texts, as `sha256:…`."""
         return _digest("".join(f"{id_} {item.level} {item.text}\n" for id_, item in sorted(self.requirements.items())))
 
     @property
     def told(self) -> dict[str, str]:
-        """Name and digest, as a result has them."""
+        """Return name and digest, for a result."""
         return {"name": self.name, "digest": self.digest}
 
 
 def set_folder(contract: Contract) -> Path:
-    """Return the folder that holds a pack's sets."""
+    """Return the folder with a pack's requirement sets."""
     return contract.directory / "sets"
 
 
 def names(contract: Contract) -> tuple[str, ...]:
-    """Return the names of a pack's sets."""
+    """Return the names of a pack's requirement sets."""
     return tuple(sorted(path.stem for path in set_folder(contract).glob("*.toml")))
 
 
 def load_set(contract: Contract, name: str) -> RequirementSet:
-    """Read a set.
+    """Read a requirement set.
 
     Raises:
-        RequirementSetError: there is none of that name, or its file cannot be used.
+        RequirementSetError: the set does not exist or is invalid.
     """
     if name not in names(contract):
         there = ", ".join(names(contract)) or "none"
@@ -88,7 +86,7 @@ def load_set(contract: Contract, name: str) -> RequirementSet:
 
 
 def current(contract: Contract, ledger: Mapping[str, Requirement]) -> RequirementSet:
-    """Return a ledger as a set: under the name of the frozen one that holds the same, where there is one."""
+    """Return a ledger as a set, under the name of the frozen set with the same content if there is one."""
     requirements = {id_: frozen(item) for id_, item in ledger.items()}
     sets = (load_set(contract, name) for name in names(contract))
     same = next((one for one in sets if one.requirements == requirements), None)
@@ -96,19 +94,19 @@ def current(contract: Contract, ledger: Mapping[str, Requirement]) -> Requiremen
 
 
 def frozen(requirement: Requirement) -> Frozen:
-    """A requirement as a set has it."""
+    """Return a requirement as it is stored in a set."""
     return Frozen(requirement.level, _digest(requirement.text))
 
 
 def judged_by(contract: Contract, name: str | None) -> RequirementSet | None:
-    """The set that a run judges by; None where the contract has no pack.toml.
+    """Return the set that scores a run, or None if the contract has no pack.toml.
 
     Args:
-        contract: of the run.
-        name: what was asked for; None for all that this suite has.
+        contract: the contract of the run.
+        name: the requested set; None: everything in this suite.
 
     Raises:
-        RequirementSetError: there is none of that name, or the contract has no pack.toml.
+        RequirementSetError: the set does not exist, or the contract has no pack.toml.
     """
     if contract.manifest is None or contract.only:
         if name is not None:

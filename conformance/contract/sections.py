@@ -14,19 +14,19 @@ _CITED = re.compile(rf"(?:^|; ){re.escape(TEXT_NAME)}#(?P<anchor>[\w-]+)")
 
 
 class Section(NamedTuple):
-    """A heading, and what stands below it up to the next one, as Markdown."""
+    """A heading, and the Markdown text up to the next heading."""
 
     title: str
     text: str
 
 
 def anchor_of(title: str) -> str:
-    """The anchor that GitHub gives a heading: lower case, no punctuation, hyphens for blanks."""
+    """Return the anchor that GitHub gives a heading: lower case, no punctuation, hyphens for spaces."""
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
 def sections_of(text: str) -> dict[str, Section]:
-    """All sections of a Markdown text by their anchor."""
+    """Return all sections of a Markdown text by anchor."""
     headings = list(_HEADING.finditer(text))
     ends = [heading.start() for heading in headings[1:]] + [len(text)]
     return {
@@ -36,5 +36,5 @@ def sections_of(text: str) -> dict[str, Section]:
 
 
 def cited_in(sources: Iterable[str]) -> set[str]:
-    """The anchors of the text that requirements' sources name."""
+    """Return the anchors of the contract's text in requirements' sources."""
     return {anchor for source in sources for anchor in _CITED.findall(source)}

@@ -1,4 +1,4 @@
-"""Sizes that the suite counts on."""
+"""Sizes that requirements and checks share."""
 
 from typing import Final
 

@@ -1,8 +1,7 @@
-"""The one reader of the TOML files that people write: typed, and each message says what to change.
+"""The reader of TOML files that people write. Values are typed, and every error message says what to change.
 
-A file's shape is a frozen ``msgspec.Struct`` that forbids unknown fields; msgspec decides what fits. Its messages
-speak of JSON paths and types, so where something does not fit, the message is made here, from the shape and the value:
-file, table, key, offending value, and what is allowed. What the suite writes into such a file is text, but for strings.
+The type of a file is a frozen ``msgspec.Struct`` that forbids unknown fields. msgspec validates; as its messages
+speak of JSON paths, this module writes its own: file, table, key, offending value, and what is allowed.
 """
 
 from __future__ import annotations
@@ -35,23 +34,23 @@ _STEP = re.compile(r"\.(?P<key>\w+)|\[(?P<index>\d+)\]")
 
 
 class TomlFileError(ValueError):
-    """A file that cannot be used; the message names the file, the table, the key and the offending value."""
+    """Raised for an invalid file; the message names the file, the table, the key and the offending value."""
 
 
 def read_toml(path: Path, shape: type[_Shape], error: type[TomlFileError] = TomlFileError) -> _Shape:
-    """Read a file into a shape.
+    """Read a file as an instance of ``shape``.
 
     Raises:
-        TomlFileError: as ``error``: it cannot be read, is no TOML, or does not fit.
+        TomlFileError: as ``error``: the file cannot be read, is not TOML, or is not valid.
     """
     return fit(read_tables(path, error), shape, str(path), error)
 
 
 def read_tables(path: Path, error: type[TomlFileError] = TomlFileError) -> dict[str, Any]:
-    """Read a file into tables as TOML has them.
+    """Read a file as nested dictionaries.
 
     Raises:
-        TomlFileError: as ``error``: it cannot be read, or is no TOML.
+        TomlFileError: as ``error``: the file cannot be read, or is not TOML.
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
@@ -62,10 +61,10 @@ def read_tables(path: Path, error: type[TomlFileError] = TomlFileError) -> dict[
 
 
 def fit(table: dict[str, Any], shape: type[_Shape], where: str, error: type[TomlFileError] = TomlFileError) -> _Shape:
-    """Turn a table into a shape; ``where`` is what messages begin with.
+    """Convert a table to an instance of ``shape``; ``where`` is the beginning of messages.
 
     Raises:
-        TomlFileError: as ``error``: an unknown key, a missing one, or a value that does not fit.
+        TomlFileError: as ``error``: a key is unknown or missing, or a value is invalid.
     """
     try:
         return msgspec.convert(table, shape, builtin_types=_DATES)
@@ -74,12 +73,12 @@ def fit(table: dict[str, Any], shape: type[_Shape], where: str, error: type[Toml
 
 
 def basic_string(text: str) -> str:
-    """Write a text as TOML's basic string: JSON's escapes are TOML's (TOML 1.0, String), once DEL is escaped too."""
+    """Return a text as a TOML basic string: JSON's escapes are TOML's (TOML 1.0, String), once DEL is escaped too."""
     return json.dumps(text).replace("\x7f", "\\u007f")
 
 
 def _explained(table: dict[str, Any], shape: type, said: str) -> str:
-    """What does not fit, in the words of whoever wrote the file."""
+    """Return what is invalid, in words for the author of the file."""
     place = _PLACE.search(said)
     value: Any = table
     kind = inspect.type_info(shape)
@@ -120,7 +119,7 @@ def _item(kind: Any, index: int) -> inspect.Type:
 
 
 def _bare(kind: inspect.Type) -> inspect.Type:
-    """A type without the None of a key that may be left out."""
+    """Return the type of an optional key without None."""
     if isinstance(kind, inspect.UnionType):
         kinds = tuple(one for one in kind.types if not isinstance(one, inspect.NoneType))
         return kinds[0] if len(kinds) == 1 else inspect.UnionType(kinds)
@@ -128,7 +127,7 @@ def _bare(kind: inspect.Type) -> inspect.Type:
 
 
 def _wanted(kind: inspect.Type, name: str) -> str:
-    """What a value of this type is, in words; ``name`` is its key."""
+    """Return a description of the values of this type; ``name`` is the key."""
     words = _WORDS.get(type(kind))
     return words(kind, name) if words else f"of type {type(kind).__name__.removesuffix('Type').lower()}"
 

@@ -1,1 +1,1 @@
-"""Connects to a robot, runs the checks with pytest, turns exceptions into evidence, writes the result."""
+"""Connect to a robot, run the checks with pytest, turn exceptions into evidence, and write the result."""

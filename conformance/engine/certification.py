@@ -1,4 +1,4 @@
-"""One certification: look for the robot, run the checks, draw the verdicts, write the result."""
+"""One certification: connect to the robot, run the checks, derive the verdicts, write the result."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Certification:
-    """What came of a run.
+    """The result of a run.
 
     Attributes:
-        exit_code: as the command's (cli.md).
-        document: result.json.
-        path: where it was written.
+        exit_code: exit code of the command (docs/cli.md).
+        document: content of result.json.
+        path: where result.json was written.
     """
 
     exit_code: int
@@ -54,18 +54,18 @@ def certify(
     progress: TextIO | None = sys.stderr,
     notes: tuple[str, ...] = (),
 ) -> Certification:
-    """Judge a robot.
+    """Certify a robot.
 
     Args:
-        robot: with claims and permissions; not connected yet.
+        robot: with claims and permissions, not yet connected.
         out: folder for result.json.
-        command: repeats the run; goes into the result.
-        baseline: failures that are expected.
-        progress: where progress is told; None for nowhere.
+        command: the command that repeats the run, for the result.
+        baseline: expected failures.
+        progress: stream for progress lines, or None.
         notes: remarks for the result.
 
     Raises:
-        OSError: the result cannot be written, or the CA file not be read.
+        OSError: the result cannot be written, or the CA file cannot be read.
     """
     run, started = robot.run, dt.datetime.now(dt.UTC)
     remarks = list(notes)
@@ -118,7 +118,7 @@ def certify(
 
 
 def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
-    """Return the verdict of each requirement, whatever a baseline accepts, in the ledger's order; and the causes."""
+    """Return the verdict of each requirement in the ledger's order, before a baseline is applied, and the causes."""
     judge = run.judge
     for requirement in run.contract.ledger.values():
         evidence = judge.evidence[requirement.id]
@@ -134,7 +134,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
 
 
 def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str], recordings: Recordings) -> bool:
-    """Run pytest over the checks, and nothing of the folder that the user happens to be in; True when interrupted."""
+    """Run the checks with pytest, without configuration from the current folder; return True when interrupted."""
     teller = Progress(robot, progress)
     plugin = ChecksPlugin(lambda: robot, lambda: robot.run.contract, recordings)
     try:

@@ -1,7 +1,4 @@
-"""How pytest runs the checks on one robot: which of them, in which order, with which fixtures, and what comes of each.
-
-One object, given to pytest, is all that connects a run with its checks.
-"""
+"""The pytest plugin that runs the checks on a robot: selection, order, fixtures, and evidence from exceptions."""
 
 from __future__ import annotations
 
@@ -56,9 +53,9 @@ class ChecksPlugin:
     """A pytest plugin for one run.
 
     Args:
-        connect: returns the robot, connected; called once, and only when there is a check to run.
-        contract: returns the pack to judge by; called when the first file with checks is collected.
-        recordings: what is recorded; None: it is not kept.
+        connect: returns the connected robot; called once, when there is a check to run.
+        contract: returns the contract pack; called when the first file with checks is collected.
+        recordings: keeps the traces of scenarios; None: they are discarded.
     """
 
     def __init__(
@@ -84,7 +81,7 @@ class ChecksPlugin:
         return expanded(marked, self._robot().run.contract.ledger)
 
     def step_of(self, item: pytest.Item) -> Step:
-        """Return a check's step in the plan."""
+        """Return a check's step in the plan of the run."""
         stage, scenario = item.get_closest_marker("phase"), item.get_closest_marker("scenario")
         return Step(
             name=item.name.removeprefix("test_").replace("_", " "),
@@ -117,7 +114,7 @@ class ChecksPlugin:
             parent.config.pluginmanager.register(import_module(name), name)
 
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
-        """Keep the checks that judge something claimed, in the order of their phases."""
+        """Deselect checks of classes that are not claimed, and sort the others by the plan."""
         if not any(map(is_check, items)):
             return
         run = self._robot().run
@@ -132,7 +129,7 @@ class ChecksPlugin:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> None:
-        """Skip what cannot be judged in this run; the reason goes into the verdict."""
+        """Skip a check that cannot run; the reason becomes the verdict's reason."""
         if not is_check(item):
             return
         run = self._robot().run
@@ -149,7 +146,7 @@ class ChecksPlugin:
                 self._need(Interface(name), self.ids_of(item))
 
     def _need(self, name: Interface, ids: tuple[str, ...]) -> None:
-        """Skip for want of an interface; what the contract does not describe, nobody has claimed."""
+        """Skip a check that needs an interface which has no address or is not described by the contract."""
         run = self._robot().run
         if not self._robot().has(name):
             reason = _NO_ADDRESS.format(name)
@@ -161,7 +158,7 @@ class ChecksPlugin:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Generator[None, object, object]:
-        """Run a check, and turn what it raises into evidence."""
+        """Run a check, and turn exceptions into evidence."""
         if not is_check(item):
             return (yield)
         ids = self.ids_of(item)
@@ -180,7 +177,7 @@ class ChecksPlugin:
         return result
 
     def _tell(self, item: pytest.Item, run: Run) -> None:
-        """Fail a check for each MUST that it found not met; skip it where earlier checks have failed for the causes."""
+        """Fail the pytest item if a MUST failed; skip it if earlier checks failed for the same causes."""
         from conformance.verdict.finding import in_full  # noqa: PLC0415 - as above
 
         musts = {
@@ -201,7 +198,7 @@ class ChecksPlugin:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
-        """Put a skip's reason down as evidence."""
+        """Record the reason of a skip as evidence."""
         report: pytest.TestReport = yield
         ids = self.ids_of(item) if is_check(item) and _TOLD_BEFORE not in item.stash else ()
         if ids and report.skipped and call.excinfo is not None:
@@ -213,68 +210,68 @@ class ChecksPlugin:
         return report
 
     def pytest_sessionfinish(self) -> None:
-        """Leave the robot at rest, whatever happened, Ctrl-C included."""
+        """Stop the robot at the end of the session, also after Ctrl-C."""
         if self._connected is not None and self._connected.rest is not None:
             self._connected.device.leave_at_rest(self._connected.rest)
 
     @pytest.fixture(scope="session")
     def run(self) -> Run:
-        """What is judged, by what, and what has been found."""
+        """Return the data of the run."""
         return self._robot().run
 
     @pytest.fixture(scope="session")
     def connection(self) -> Connection:
-        """What all clients of the run share."""
+        """Return the settings that all clients of the run share."""
         return self._robot().connection
 
     @pytest.fixture(scope="session")
     def interfaces(self) -> Interfaces:
-        """All of the robot's interfaces, each of which may be missing."""
+        """Return the robot's interfaces, each of which may be missing."""
         return self._robot().interfaces
 
     @pytest.fixture
     def judge(self, run: Run) -> Judge:
-        """Takes what a check sees."""
+        """Return the judge, which records evidence."""
         return run.judge
 
     @pytest.fixture
     def statement(self, run: Run) -> Statement:
-        """What the vendor says of the robot."""
+        """Return the vendor's statement."""
         return run.statement
 
     @pytest.fixture
     def effort(self, run: Run) -> Effort:
-        """How much to try."""
+        """Return how much to try."""
         return run.effort
 
     @pytest.fixture
     def api(self, interfaces: Interfaces) -> RestInterface:
-        """The robot's REST interface, with the run that it is judged in."""
+        """Return the robot's REST interface together with the run."""
         return _there(interfaces.rest, Interface.REST)
 
     @pytest.fixture
     def rest(self, api: RestInterface) -> HttpClient:
-        """The client of the robot's REST interface."""
+        """Return the HTTP client of the robot's REST interface."""
         return api.client
 
     @pytest.fixture
     def soap(self, interfaces: Interfaces) -> SoapServices:
-        """The robot's SOAP services, each of which may be missing."""
+        """Return the robot's SOAP services, each of which may be missing."""
         return interfaces.soap
 
     @pytest.fixture
     def publishers(self, soap: SoapServices) -> SoapService:
-        """The SOAP service that acts."""
+        """Return the SOAP service whose operations act."""
         return _there(soap.publishers, Interface.PUBLISHERS)
 
     @pytest.fixture
     def subscribers(self, soap: SoapServices) -> SoapService:
-        """The SOAP service that only reads."""
+        """Return the SOAP service whose operations only read."""
         return _there(soap.subscribers, Interface.SUBSCRIBERS)
 
     @pytest.fixture
     def explore(self, request: pytest.FixtureRequest, run: Run) -> Explorer:
-        """Hypothesis, seeded by the run's seed and the check's name."""
+        """Return the Hypothesis runner, seeded by the run's seed and the check's name."""
         from conformance.verdict.explorer import Explorer  # noqa: PLC0415 - as above
 
         return Explorer(run.seed, request.node.nodeid.rsplit("/", 1)[-1], run.effort, run.cut_short)

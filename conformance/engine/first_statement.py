@@ -1,4 +1,4 @@
-"""``roaas certify --init``: a first statement, from what the robot's descriptions say."""
+"""``roaas certify --init``: write a first statement from the robot's descriptions."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ classes = [
 
 
 def write_first_statement(path: Path, known: Statement, contract: Contract) -> str:
-    """Ask the robot what it is and write a commented statement.
+    """Connect to the robot and write a commented statement.
 
     Returns:
-        Why the robot could not be asked, or an empty text.
+        Why the robot could not be reached, or an empty text.
 
     Raises:
         OSError: the file cannot be written.
@@ -103,7 +103,7 @@ def _endpoints(robot: RobotUnderTest) -> list[str]:
 
 
 def _undescribed(robot: RobotUnderTest) -> list[str]:
-    """The descriptions that the robot does not serve."""
+    """Return the names of the descriptions that the robot does not serve."""
     asked: list[tuple[HttpClient, str, str]] = []
     if robot.rest:
         asked += [(robot.rest.client, path, path) for path in ("/openapi.json", "/application.wadl")]
@@ -120,7 +120,7 @@ def _undescribed(robot: RobotUnderTest) -> list[str]:
 
 
 def _doubts(robot: RobotUnderTest) -> dict[str, str]:
-    """A doubt for each class that the robot does not look as if it had."""
+    """Return, by class, why the robot does not seem to implement it."""
     unreached = robot.run.unreachable
     doubts: dict[str, str] = {
         name: f"no address for {' and '.join(missing)}"

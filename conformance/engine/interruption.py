@@ -1,7 +1,7 @@
-"""Ctrl-C and SIGTERM in a run: remembered as well as raised, so that no run that was broken off looks complete.
+"""Record Ctrl-C and SIGTERM during a run, so that no interrupted run looks complete.
 
-Python raises KeyboardInterrupt wherever the main thread is just then. Where that is a finalizer or a callback whose
-exceptions are ignored, the exception is lost; the flag is not, and is looked at before each check and at the end.
+Python raises KeyboardInterrupt wherever the main thread happens to be. In a finalizer or a callback whose exceptions
+are ignored, the exception is lost; the recorded flag is not. It is checked before each check and at the end.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 @contextmanager
 def remembered(run: Run) -> Iterator[None]:
-    """Put an interruption down in ``run.interrupted``, and raise KeyboardInterrupt as ever.
+    """Set ``run.interrupted`` on a signal and raise KeyboardInterrupt as usual.
 
-    Outside the main thread, where no signal arrives, it does nothing.
+    Outside the main thread, where no signal arrives, this does nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

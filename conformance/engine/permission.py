@@ -1,7 +1,7 @@
-"""What a recorded finding would do if it were sent again: judged by its octets, as a result may be anybody's.
+"""Decide whether sending a recorded finding's requests again may move the robot or reach an unknown server.
 
-What cannot be told to be harmless may move the robot, so that nothing a result says of itself is believed: neither a
-method beside octets of another one, nor which endpoint only reads.
+A result file may come from anybody. So the bytes of the requests are examined, and nothing that the result claims
+about them is trusted. A request that is not provably harmless may move the robot.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _PORTS: Final = {"http": 80, "https": 443}
 
 
 def moves(failure: Mapping[str, Any]) -> bool:
-    """Whether sending a finding's requests again may move the robot.
+    """Return whether sending a finding's requests again may move the robot.
 
     Raises:
-        ValueError, KeyError, TypeError: it is not well made.
+        ValueError, KeyError, TypeError: the finding is malformed.
     """
     requests = (read_request(item) for item in failure.get("sequence") or ())
     # What was too large to be kept is not sent.
@@ -38,10 +38,10 @@ def moves(failure: Mapping[str, Any]) -> bool:
 
 
 def strangers(failure: Mapping[str, Any], trusted: Iterable[str]) -> list[str]:
-    """The addresses that a finding's requests go to and that are none of the trusted ones, as scheme://host:port.
+    """Return the origins of a finding's requests that are not trusted, as scheme://host:port.
 
     Raises:
-        ValueError, KeyError, TypeError: it is not well made.
+        ValueError, KeyError, TypeError: the finding is malformed.
     """
     known = {origin(url) for url in trusted}
     asked = {origin(str(item["url"])) for item in failure.get("sequence") or ()}
@@ -49,10 +49,10 @@ def strangers(failure: Mapping[str, Any], trusted: Iterable[str]) -> list[str]:
 
 
 def origin(url: str) -> str:
-    """Scheme, host and port of a URL (RFC 6454 4), as one text.
+    """Return scheme, host and port of a URL as one text (RFC 6454 4).
 
     Raises:
-        ValueError: it is no http or https URL.
+        ValueError: it is not an http or https URL.
     """
     parts = urlsplit(url)
     if parts.scheme not in _PORTS or not parts.hostname:
@@ -70,7 +70,7 @@ def _only_reads(request: Request) -> bool:
 
 
 def _asks(body: bytes) -> bool:
-    """Whether a body is a SOAP message for an operation of the contract that only reads."""
+    """Return whether a body is a SOAP message for one of the contract's read-only operations."""
     # Imported late: lxml and xmlschema cost a third of a second that a REST finding need not pay.
     from conformance.api.soap.envelope import NotSoapError, read  # noqa: PLC0415
 
@@ -83,7 +83,7 @@ def _asks(body: bytes) -> bool:
 
 @cache
 def _questions() -> frozenset[str]:
-    """The elements that ask the contract's subscribers service for something."""
+    """Return the input elements of the operations of the contract's subscribers service."""
     from conformance.documents.wsdl import read_file  # noqa: PLC0415 - as above
 
     operations = read_file(path).operations if (path := Contract.load().subscribers_path) else ()

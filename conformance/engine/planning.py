@@ -1,4 +1,4 @@
-"""``roaas certify --plan``: what would be done in which order, without sending anything."""
+"""``roaas certify --plan``: the order of scenarios and checks, without sending anything."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _UNUSED = ("terminal", "cacheprovider", "logging", "junitxml", "unraisableexcept
 
 
 def pytest_options() -> list[str]:
-    """Return the options with which pytest runs the checks, and nothing of the folder that the user is in."""
+    """Return the options that make pytest run the checks and ignore the current folder's configuration."""
     return [
         f"--config-file={os.devnull}",
         f"--rootdir={_SUITE}",
@@ -32,14 +32,14 @@ def pytest_options() -> list[str]:
 
 
 def collected(robot: RobotUnderTest, plugin: ChecksPlugin | None = None) -> list[pytest.Item]:
-    """Return the checks of a run on a robot, which need not be connected, in the order of their turns."""
+    """Return the checks of a run in their order; the robot need not be connected."""
     seen: list[pytest.Item] = []
 
     class _Collected:
-        """Takes down the checks that were collected."""
+        """A pytest plugin that stores the collected items."""
 
         def pytest_collection_finish(self, session: pytest.Session) -> None:
-            """Take them down."""
+            """Store the items."""
             seen.extend(item for item in session.items if is_check(item))
 
     collect(robot, plugin or ChecksPlugin(lambda: robot, lambda: robot.run.contract), _Collected())
@@ -47,7 +47,7 @@ def collected(robot: RobotUnderTest, plugin: ChecksPlugin | None = None) -> list
 
 
 def collect(robot: RobotUnderTest, *plugins: object) -> None:
-    """Have pytest collect the checks of a run on a robot, as the run does, with plugins that look on."""
+    """Collect the checks of a run with pytest, with further plugins."""
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
         environment.delenv("PYTEST_ADDOPTS", raising=False)
@@ -56,7 +56,7 @@ def collect(robot: RobotUnderTest, *plugins: object) -> None:
 
 
 def plan_of(robot: RobotUnderTest) -> list[str]:
-    """Return the plan of a run on a robot, which need not be connected, in lines."""
+    """Return the plan of a run as lines of text; the robot need not be connected."""
     plugin = ChecksPlugin(lambda: robot, lambda: robot.run.contract)
     seen: list[Step] = [plugin.step_of(item) for item in collected(robot, plugin)]
     scenarios = {step.scenario.name for step in seen if step.scenario}

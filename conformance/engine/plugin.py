@@ -1,6 +1,6 @@
-"""The pytest plugin for a project of one's own: ``pytest -p roaas_pytest --pyargs conformance --robot-rest URL``.
+"""The pytest plugin for other projects: ``pytest -p roaas_pytest --pyargs conformance --robot-rest URL``.
 
-It imports the suite only when there is a check.
+It imports the suite only if there is a check to run.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Options for use in a project of one's own; ``roaas certify`` has better ones."""
+    """Add the options of the plugin."""
     group = parser.getgroup("robot", "RoAAS: conformance of a robot's web services")
     group.addoption("--robot-statement", metavar="FILE", help="implementation conformance statement (TOML)")
     group.addoption("--robot-contract", metavar="PACK", help="contract pack to judge by: its name or its folder")
@@ -32,7 +32,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Have the checks run on the robot that the options name."""
+    """Register the checks for the robot that the options name."""
 
     def connect() -> RobotUnderTest:
         from conformance.engine.pytest_run import robot_from_options  # noqa: PLC0415 - see the module's docstring

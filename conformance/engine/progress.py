@@ -1,4 +1,4 @@
-"""Progress of a run, line by line, for who waits for it."""
+"""Progress of a run, as lines of text."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _OFTEN_S = 2.0
 
 
 class Progress:
-    """A pytest plugin that says where a run is; ``out`` is None for nowhere."""
+    """A pytest plugin that writes progress lines to ``out``, or nothing if that is None."""
 
     def __init__(self, robot: RobotUnderTest, out: TextIO | None) -> None:
         self._robot, self._out = robot, out
@@ -29,12 +29,12 @@ class Progress:
         self._done = self._total = 0
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
-        """Take the number of checks."""
+        """Store the number of checks."""
         self._total = len(session.items)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        """Say where the run is, when a phase begins and when there was nothing to read for a while."""
+        """Write a line when a stage begins, and when none was written for a while."""
         mark = item.get_closest_marker("phase")
         phase = mark.args[0] if mark else STAGES[0]
         now = time.monotonic()

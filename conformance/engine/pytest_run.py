@@ -1,4 +1,4 @@
-"""A robot from pytest's own options, for ``pytest -p roaas_pytest --pyargs conformance`` in somebody's project."""
+"""Make a robot from pytest's options, for ``pytest -p roaas_pytest --pyargs conformance`` in another project."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 def robot_from_options(config: pytest.Config) -> RobotUnderTest:
-    """Make and connect a robot.
+    """Return the connected robot that the options name.
 
     Raises:
-        pytest.UsageError: no robot is named, an option has a value that it cannot have, or nothing answers.
+        pytest.UsageError: no robot is named, an option is invalid, or the robot does not respond.
     """
     given = config.getoption("robot_statement")
     try:
@@ -67,7 +67,7 @@ def _endpoints(config: pytest.Config, declared: Endpoints) -> Endpoints:
 
 
 def connection_of(where: Endpoints) -> Connection:
-    """Deadline, credentials and ceiling as the statement has them.
+    """Return connection settings with the statement's deadline, token and rate limit.
 
     Raises:
         OSError: the token file cannot be read.

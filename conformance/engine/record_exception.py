@@ -1,4 +1,4 @@
-"""What an exception in a check means: the robot failed, the robot is gone, or the suite could not judge."""
+"""Turn an exception in a check into evidence: the robot failed, the robot is gone, or the suite could not judge."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 def record_exception(
     run: Run, alive: Callable[[], bool], ids: tuple[str, ...], judged: dict[str, int], error: Exception
 ) -> None:
-    """Put down what an exception that ended a check says of the requirements that it was to judge.
+    """Record what an exception that ended a check means for the check's requirements.
 
-    ``alive`` asks the robot anew; ``judged`` is how many cases each requirement had before the check.
+    ``alive`` checks whether the robot still responds; ``judged`` is each requirement's number of cases before the
+    check.
     """
     if isinstance(error, RefutedError):
         return

@@ -1,4 +1,4 @@
-"""``roaas replay --recorded``: the rules judge the traces of a run again, and nothing is sent."""
+"""``roaas replay --recorded``: judge the recorded traces of a run again, without sending anything."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Rejudged:
-    """What the rules say of one requirement by the recorded traces.
+    """The judgement of one requirement by recorded traces.
 
     Attributes:
-        requirement: its id.
-        cases: how many were judged.
-        failures: what each failure says.
+        requirement: id of the requirement.
+        cases: number of judged cases.
+        failures: the text of each failure.
     """
 
     requirement: str
@@ -32,10 +32,10 @@ class Rejudged:
 
 
 def judge_recorded(robot: RobotUnderTest, folder: Path) -> list[Rejudged]:
-    """Judge the traces in a result's folder by the rules of the run's contract; the robot need not be there.
+    """Judge the traces in a result's folder by the contract's rules; the robot is not needed.
 
     Raises:
-        TracesError: there are no traces, or they are not well made.
+        TracesError: there are no traces, or they are malformed.
     """
     rules: list[tuple[Rule, Scenario]] = []
     for item in collected(robot):

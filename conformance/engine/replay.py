@@ -1,4 +1,4 @@
-"""Whether a finding is still there: its requests are sent again, or the checks of its requirement run again."""
+"""Check whether a finding still occurs: send its requests again, or run the checks of its requirement again."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _BY_KIND = "by status, media type and whether there is content"
 
 
 class Outcome(StrEnum):
-    """What became of a finding."""
+    """The outcome of a replay."""
 
     STILL_THERE = "still there"
     GONE = "gone"
@@ -46,15 +46,15 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Replayed:
-    """One finding that was sent again.
+    """A finding after its replay.
 
     Attributes:
-        requirement: its id.
-        message: what was found.
-        outcome: what became of it.
-        came: what came now, in a few words.
-        sent: how many requests went out.
-        told_by: what tells the outcome, in a few words.
+        requirement: id of the requirement.
+        message: the text of the finding.
+        outcome: whether it still occurs.
+        came: description of the new response.
+        sent: number of requests sent.
+        told_by: how the outcome was decided, in a few words.
     """
 
     requirement: str
@@ -66,7 +66,7 @@ class Replayed:
 
 
 def findings(result: Mapping[str, Any], requirement: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The findings of a result, of one requirement or of all, by its id."""
+    """Yield (requirement id, finding) for all findings of a result, or for those of one requirement."""
     for item in result["requirements"]:
         if requirement in {None, item["id"]}:
             yield from ((item["id"], failure) for failure in item["failures"])
@@ -81,18 +81,17 @@ def replay(
 ) -> Replayed:
     """Send one finding's requests again.
 
-    What the observers found in the recorded answer by itself, they judge in the new one. Of all else only the kind of
-    the answer can be compared.
+    Findings of observers are judged again by the new response. For others, only status and media type are compared.
 
     Args:
-        id_: of the requirement.
+        id_: id of the requirement.
         failure: the finding, as in result.json.
-        connection: to the robot.
-        rest: base URL of its REST interface, or None.
-        contract: by which its observers judge; None: nothing but the kind of response is compared.
+        connection: settings for the robot's clients.
+        rest: base URL of the robot's REST interface, or None.
+        contract: whose observers judge; None: only status and media type are compared.
 
     Raises:
-        ValueError, KeyError, TypeError: the result is not well made.
+        ValueError, KeyError, TypeError: the result is malformed.
     """
     message, sequence = str(failure["message"]), failure.get("sequence") or []
     requests = [request for item in sequence if (request := read_request(item)) is not None]
@@ -121,21 +120,21 @@ def judged_by_checks(
     seed: int,
     effort: str,
 ) -> list[dict[str, Any]]:
-    """Run the checks of some requirements, and no others, on a robot.
+    """Run the checks of some requirements on a robot.
 
     Args:
-        contract: by which it is judged.
+        contract: the contract.
         statement: of the robot.
-        requirements: their ids.
+        requirements: ids.
         allow_motion: whether the robot may be moved.
-        seed: of everything random, as in the run before.
-        effort: as in the run before.
+        seed: seed of everything random, as in the recorded run.
+        effort: effort of the recorded run.
 
     Returns:
         The requirements as in result.json, in the ledger's order.
 
     Raises:
-        ContractError: there is no such requirement.
+        ContractError: the contract has no such requirement.
         OSError: a file that the statement names cannot be read.
     """
     contract = Contract.load(contract.directory, only=tuple(sorted(requirements)))
@@ -157,7 +156,7 @@ def judged_by_checks(
 def _still_there(
     id_: str, recorded: Mapping[str, Any], request: Request, came: Attempt, rest: str | None, contract: Contract | None
 ) -> tuple[bool, str]:
-    """Whether an answer is what was found, and what tells it."""
+    """Return whether the new response shows the finding again, and how that was decided."""
     if recorded["status"] is None or not isinstance(came, Exchange):
         return recorded["status"] is None and not isinstance(came, Exchange), _BY_KIND
     fields = tuple(
@@ -178,13 +177,13 @@ def _still_there(
 
 
 def _observed_to_fail(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:
-    """Whether the observers of REST, which judge each answer by itself, find a requirement not met in an exchange.
+    """Return whether the REST observers, which judge single responses, fail a requirement for this exchange.
 
     Args:
-        contract: by which the exchange was judged.
-        base_url: of the robot's REST interface.
-        requirement: its id.
-        exchange: any; one with another interface fails nothing.
+        contract: the contract.
+        base_url: base URL of the robot's REST interface.
+        requirement: id of the requirement.
+        exchange: any exchange; one with another interface fails nothing.
     """
     run = Run(empty_statement(contract), contract)
     with closing(HttpClient(base_url, Connection())) as client:

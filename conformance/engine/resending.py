@@ -1,4 +1,4 @@
-"""Recorded requests: as result.json keeps them, sent again as they were, and how often a failure comes back."""
+"""Store requests in result.json, send them again, and count how often a failure occurs again."""
 
 from __future__ import annotations
 
@@ -43,22 +43,22 @@ _LONGEST_S = 8.0
 
 
 class Recorder(Listener):
-    """Tells the judge which requests were sent, before any observer judges them."""
+    """A listener that reports each request to the judge before any observer judges it."""
 
     def __init__(self, judge: Judge) -> None:
         self._judge = judge
 
     def answered(self, exchange: Exchange) -> None:
-        """Take a request that was answered."""
+        """Report a request with its response."""
         self._judge.sent(exchange.request)
 
     def unanswered(self, request: Unanswered) -> None:
-        """Take one that was not."""
+        """Report a request without a response."""
         self._judge.sent(request.request)
 
 
 def written(sequence: Sequence[Sent]) -> list[dict[str, Any]]:
-    """Return a sequence as JSON; ``at_s`` counts from its first request."""
+    """Return a sequence of requests as JSON; ``at_s`` is the time since the first request, s."""
     return [
         {
             "at_s": round(sent.at_s - sequence[0].at_s, 3),
@@ -73,10 +73,10 @@ def written(sequence: Sequence[Sent]) -> list[dict[str, Any]]:
 
 
 def read_request(item: dict[str, Any]) -> Request | None:
-    """Return a request of a written sequence; None where it was too large to be kept.
+    """Return a request from its JSON, or None if it was too large to be stored.
 
     Raises:
-        ValueError, KeyError, TypeError: it is not one.
+        ValueError, KeyError, TypeError: the JSON is malformed.
     """
     body, octets = _unpacked(item["body"]), None if item["raw"] is None else _unpacked(item["raw"])
     if body is None or (item["raw"] is not None and octets is None):
@@ -97,7 +97,7 @@ def read_request(item: dict[str, Any]) -> Request | None:
 
 
 def send_again(request: Request, connection: Connection) -> Attempt:
-    """Send a request as it was sent, over a connection of its own, and return what became of it."""
+    """Send a request over a new connection and return the result."""
     where = urlsplit(request.url)
     with closing(HttpClient(f"{where.scheme}://{where.netloc}", connection)) as client:
         try:
@@ -118,7 +118,7 @@ def send_again(request: Request, connection: Connection) -> Attempt:
 
 
 def is_same(before: Response, came: Attempt) -> bool:
-    """Return whether a response has the status and the media type of another one, and content where that has some."""
+    """Return whether two responses have the same status and media type, and both or neither have a body."""
     if not isinstance(came, Exchange):
         return False
     now = came.response
@@ -127,16 +127,16 @@ def is_same(before: Response, came: Attempt) -> bool:
 
 
 def look_again(run: Run, connection: Connection, rest: RestInterface | None = None) -> None:
-    """Send the request of each finding again, and put down how often the failure came back.
+    """Send the request of each finding again, and record how often the failure occurs again.
 
-    Where an observer judges the requirement by every response, its verdict counts; else a response of the same kind. A
-    request that is not safe is sent again only where the robot may be moved and the response was 5xx: that is wrong in
-    any state of the robot, while for others the state may make the difference.
+    If an observer judges the requirement by single responses, its judgement counts; otherwise a response with the same
+    status and media type. An unsafe request is repeated only if the robot may be moved and the response was 5xx, which
+    is wrong in any state of the robot.
 
     Args:
         run: with its findings.
-        connection: of the run.
-        rest: the robot's REST interface, by which it is left at rest.
+        connection: settings for the robot's clients.
+        rest: the robot's REST interface, through which the robot is stopped afterwards.
     """
     findings = [
         (number, finding, finding.exchange)
@@ -169,7 +169,7 @@ def _may_be_sent(run: Run, exchange: Exchange) -> bool:
 
 
 def _fails_again(run: Run, finding: Finding, exchange: Exchange, connection: Connection) -> bool:
-    """Send a finding's request once more, and return whether the failure came back."""
+    """Send a finding's request once more; return whether the failure occurred again."""
     evidence, before = run.judge.evidence[finding.requirement], exchange.response
     cases, failures = evidence.cases, evidence.failures
     came = send_again(exchange.request, connection)
@@ -184,13 +184,13 @@ def _fails_again(run: Run, finding: Finding, exchange: Exchange, connection: Con
 
 
 def _packed(octets: bytes) -> str | None:
-    """Return octets in base64, compressed (RFC 1950); None where that is still too much."""
+    """Return bytes compressed (RFC 1950) in base64, or None if that is still too large."""
     packed = zlib.compress(octets) if octets else b""
     return base64.b64encode(packed).decode() if len(packed) <= _MOST and len(octets) <= _MOST_SENT else None
 
 
 def _unpacked(text: str | None) -> bytes | None:
-    """Return octets as they were; a result may be anybody's, and no more than a run writes is ever unpacked."""
+    """Return the original bytes; decompression stops at the size that a run writes, as the result may be hostile."""
     if not text:
         return None if text is None else b""
     packed = base64.b64decode(text)

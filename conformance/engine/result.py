@@ -1,4 +1,4 @@
-"""result.json: what a run found, as a document (format roaas-result/1)."""
+"""The content of result.json (format roaas-result/1)."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def result_document(
     interrupted: bool,
     accepted_until: str = "",
 ) -> dict[str, Any]:
-    """Put a run together as result.json has it."""
+    """Return the content of result.json for a run."""
     run, statement = robot.run, robot.run.statement
     return {
         "format": RESULT_FORMAT,
@@ -194,15 +194,15 @@ def _body(body: bytes) -> dict[str, Any]:
 
 
 def rfc3339(moment: dt.datetime) -> str:
-    """A time in UTC with its microseconds, as result files have it (RFC 3339 5.6)."""
+    """Return a time in UTC with microseconds (RFC 3339 5.6)."""
     return moment.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
 
 
 def write_result(document: dict[str, Any], directory: Path) -> Path:
-    """Write result.json whole or not at all.
+    """Write result.json atomically; return its path.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     directory.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document, indent=1, ensure_ascii=False)

@@ -1,4 +1,4 @@
-"""The robot that a run is about: opening its interfaces, and looking whether they answer."""
+"""The robot of a run: opens its interfaces and checks whether they respond."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ class RobotUnderTest:
     """A robot and its connections.
 
     Attributes:
-        run: what is judged, and by what.
-        connection: deadline, credentials and listeners of all clients.
-        rest: its REST interface, or None; ``connect`` looks for it, and for the services.
+        run: the data of the run.
+        connection: the settings that all clients share.
+        rest: client of its REST interface, or None; ``connect`` sets it.
     """
 
     run: Run
@@ -55,7 +55,7 @@ class RobotUnderTest:
 
     @property
     def soap(self) -> SoapServices:
-        """Its SOAP services, each of which may be missing."""
+        """The SOAP services, each of which may be missing."""
         # Imported late: zeep, lxml and xmlschema cost a third of a second that --help need not pay.
         from conformance.api.soap.callable_services import SoapServices  # noqa: PLC0415
 
@@ -65,7 +65,7 @@ class RobotUnderTest:
 
     @cached_property
     def device(self) -> Device:
-        """What the contract pack knows of the robot."""
+        """The contract pack's model of the robot."""
         return device_of(self.run) if self.rest is None else self.rest.device
 
     @property
@@ -76,10 +76,10 @@ class RobotUnderTest:
         return Interfaces(self.rest, self.soap)
 
     def connect(self, progress: TextIO | None = None) -> None:
-        """Look for each interface that has an address; what is not there is put down in ``run.unreachable``.
+        """Connect to each interface that has an address; record failures in ``run.unreachable``.
 
         Args:
-            progress: where it is told what is waited for, and that a request had no answer; None for nowhere.
+            progress: stream for what is waited for and for failures, or None.
 
         Raises:
             OSError: the CA file cannot be used.
@@ -116,7 +116,7 @@ class RobotUnderTest:
 
     @contextmanager
     def _told(self, name: Interface, url: str) -> Iterator[None]:
-        """Look for an interface, and tell what is waited for where that takes long."""
+        """Report what is waited for if connecting takes long."""
         waits = f"{name}: waiting for {url}, up to {self.connection.timeout_s:g} s for each answer"
         later = threading.Timer(_SILENT_S, self._tell, [waits])
         later.daemon = True
@@ -132,7 +132,7 @@ class RobotUnderTest:
             self._progress.flush()
 
     def _look(self, name: Interface, client: HttpClient, path: str) -> None:
-        """Put an interface down as unreachable unless it answers something, and see how fast it answers."""
+        """Measure an interface's response time, or record it as unreachable."""
         run = self.run
         times: list[float] = []
         # Should the resource hang, another one may not: that is one broken resource, not a robot that is not there.
@@ -152,16 +152,16 @@ class RobotUnderTest:
             self.connection.pace.usual_s = run.effort.usual_ms / 1000
 
     def has(self, name: Interface) -> bool:
-        """Whether an interface has an address."""
+        """Return whether an interface has an address."""
         return self.rest is not None if name is Interface.REST else name in self.soap.there
 
     @property
     def reached(self) -> bool:
-        """Whether any interface answered at the start."""
+        """Whether any interface responded at the start."""
         return any(self.has(name) and name not in self.run.unreachable for name in Interface)
 
     def alive(self) -> bool:
-        """Whether the robot answers HTTP at all, on any interface that it answered at the start."""
+        """Return whether the robot still responds on any interface that responded at the start."""
         grace_s = _GRACE_S + _GRACE_ANSWERS * self.connection.pace.usual_s
         until = time.monotonic() + grace_s
         clients = self._answering()
@@ -181,7 +181,7 @@ class RobotUnderTest:
             time.sleep(0.1)
 
     def _answering(self) -> list[tuple[HttpClient, str]]:
-        """A client and a path for each interface that answered at the start."""
+        """Return a client and a path for each interface that responded at the start."""
         found: list[tuple[HttpClient, str]] = []
         if self.rest is not None and Interface.REST not in self.run.unreachable:
             found.append((self.rest.client, plain_path(self.run.contract)))

@@ -1,4 +1,4 @@
-"""Which suite this is: its version and digest, and what it knows."""
+"""The identity of the suite: version, digests, and the contract packs it knows."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SELFTEST = {"mutants", "faulty_bodies", "independent_robots", "selftest.py"}
 
 
 def installed(name: str) -> str:
-    """Version of a distribution, or that it is not installed."""
+    """Return the version of a distribution, or a text that it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:
@@ -37,12 +37,12 @@ def installed(name: str) -> str:
 
 
 def suite_version() -> str:
-    """Version of the installed distribution."""
+    """Return the version of the installed suite."""
     return installed("roaas")
 
 
 def suite_digest(contract: Contract, package: Path = _PACKAGE) -> str:
-    """Return the digest over all that judges: the suite's modules and ledger, the pack's modules and files."""
+    """Return a digest of everything that judges: the suite's modules and ledger, the pack's modules and files."""
     modules = {
         path.relative_to(package).as_posix(): path
         for room in JUDGING
@@ -57,21 +57,21 @@ def suite_digest(contract: Contract, package: Path = _PACKAGE) -> str:
 
 
 def contract_digests(contract: Contract) -> dict[str, str]:
-    """Each file of a contract with its digest, as `sha256:…`."""
+    """Return the digest of each file of a contract, as `sha256:…`."""
     return {path.name: file_digest(path) for path in contract.files}
 
 
 def file_digest(path: Path) -> str:
-    """Digest of a file, as `sha256:…`.
+    """Return the digest of a file, as `sha256:…`.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
     """
     return f"sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}"
 
 
 def known(pack: str | None = None) -> dict[str, Any]:
-    """What tells whether a certificate is of this suite: its digest, its requirement sets, its profiles' classes."""
+    """Return what a verifier needs to recognise this suite's certificates: digest, requirement sets, profiles."""
     contract = Contract.load(pack or DEFAULT_PACK)
     return {
         "suite": suite_digest(contract),
@@ -81,6 +81,6 @@ def known(pack: str | None = None) -> dict[str, Any]:
 
 
 def _judging(contract: Contract) -> list[Path]:
-    """Return what of a pack decides on a verdict: its files, and its modules but those of the self-test."""
+    """Return the files of a pack that influence verdicts: everything but the modules of the self-test."""
     modules = (path for path in contract.directory.rglob("*.py") if not _SELFTEST.intersection(path.parts))
     return [*contract.files, *modules]

@@ -1,1 +1,1 @@
-"""Many robots judged side by side: the fleet's file, a process for each robot, what came of them all."""
+"""Certify a fleet: the fleet file, one process for each robot, and the combined result."""

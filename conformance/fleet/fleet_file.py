@@ -1,4 +1,4 @@
-"""FLEET.toml: which robots there are, and how each of them is judged."""
+"""The fleet file FLEET.toml: the robots, and how each is certified."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
 class FleetError(TomlFileError):
-    """A fleet that cannot be judged; the message names the file, the robot and the offending value."""
+    """Raised for an invalid fleet file; the message names the file, the robot and the offending value."""
 
 
 class Member(msgspec.Struct, frozen=True):
     """One robot of a fleet.
 
     Attributes:
-        name: unique in the fleet, and its folder's name.
-        statement: file of its implementation conformance statement, or None where the fleet's file has the addresses.
-        endpoints: where its interfaces are.
-        identity: name and vendor, as its certificate will have them.
-        baseline: file of its accepted failures, or None.
-        movable: whether it may be moved, where the command allows motion at all.
-        time_limit_s: after which it is given up, s; None where nothing is said.
+        name: unique name, also of its folder.
+        statement: file of its implementation conformance statement, or None if the fleet file has the addresses.
+        endpoints: addresses of its interfaces.
+        identity: name and vendor, as on its certificate.
+        baseline: file of its expected failures, or None.
+        movable: whether it may be moved, if the command allows motion.
+        time_limit_s: time after which its run is aborted, s; None: the default.
     """
 
     name: str
@@ -54,21 +54,21 @@ class _Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The tables of the file, as they are written."""
+    """The tables of the fleet file."""
 
     time_limit_s: Positive | None = None
     robot: tuple[_Robot, ...] = ()
 
 
 def load_fleet(path: Path, contract: Contract) -> tuple[Member, ...]:
-    """Read a fleet's file, and the statements that it names.
+    """Read a fleet file and the statements that it names.
 
     Args:
-        path: of the file; files that it names are looked for beside it.
-        contract: by which the robots are judged.
+        path: the file; file names in it are relative to its folder.
+        contract: the contract that judges the robots.
 
     Raises:
-        FleetError: it cannot be read, a statement of it cannot, or two robots have a name or an address in common.
+        FleetError: the file or a statement is invalid, or two robots have the same name or address.
     """
     file = read_toml(path, _File, FleetError)
     if not file.robot:
@@ -112,7 +112,7 @@ def _member(path: Path, number: int, robot: _Robot, file: _File, contract: Contr
 
 
 def _refuse_common(path: Path, members: tuple[Member, ...]) -> None:
-    """Two runs in one folder would overwrite each other, and two on one robot disturb each other."""
+    """Refuse robots with the same folder, whose results would overwrite each other, or the same address."""
     named, found_at = defaultdict(list), defaultdict(list)
     for number, member in enumerate(members, 1):
         named[member.name.lower()].append(number)  # some file systems know no other case
@@ -125,10 +125,10 @@ def _refuse_common(path: Path, members: tuple[Member, ...]) -> None:
 
 
 def refuse_same_identity(path: Path, members: tuple[Member, ...]) -> None:
-    """Certificates tell robots apart by name and vendor: with two of one name, the later would supersede the other's.
+    """Refuse robots with the same name and vendor, whose certificates could not be told apart.
 
     Raises:
-        FleetError: two robots have the same.
+        FleetError: two robots have the same name and vendor.
     """
     seen: dict[tuple[str, str], int] = {}
     for number, member in enumerate(members, 1):
@@ -141,7 +141,7 @@ def refuse_same_identity(path: Path, members: tuple[Member, ...]) -> None:
 
 
 def _addresses(where: Endpoints) -> set[str]:
-    """The URLs at which a robot is; a WSDL's file may serve many robots."""
+    """Return the URLs of a robot. WSDL files are left out, because several robots may share one."""
     urls = (where.rest, where.publishers_endpoint, where.subscribers_endpoint)
     wsdls = (where.publishers_wsdl, where.subscribers_wsdl)
     return {url.rstrip("/") for url in urls if url} | {url for url in wsdls if url and "://" in url}

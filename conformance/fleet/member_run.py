@@ -1,4 +1,4 @@
-"""One robot of a fleet: its command, its process, and what came of it."""
+"""The certification of one robot of a fleet, in a process of its own."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _SHOWN = 400
 
 
 class Outcome(StrEnum):
-    """What came of a robot."""
+    """The outcome of one robot's certification."""
 
     CONFORMANT = "conformant"
     NOT_CONFORMANT = "not-conformant"
@@ -74,14 +74,14 @@ _OF_VERDICT = {str(one): one for one in (Outcome.CONFORMANT, Outcome.NOT_CONFORM
 
 @dataclass(frozen=True)
 class MemberResult:
-    """What came of one robot.
+    """The result of one robot's certification.
 
     Attributes:
         outcome: in a word.
-        exit_code: of its process, negative for a signal; None where it was not started.
+        exit_code: of its process, negative for a signal; None if it was not started.
         reason: why there is no verdict, or empty.
-        seconds: how long it took.
-        document: its result.json, or None where it left none.
+        seconds: duration, s.
+        document: content of its result.json, or None.
         digest: SHA-256 of that file, as `sha256:…`, or None.
     """
 
@@ -95,10 +95,7 @@ class MemberResult:
 
     @property
     def trusted(self) -> list[str]:
-        """The classes that it may be trusted with: passed, in a run that was not cut short, nothing of them accepted.
-
-        A class that passed only because a baseline accepts its failures is none of them.
-        """
+        """The classes that the robot passed in a complete run, without failures accepted by a baseline."""
         if self.document is None or self.document["interrupted"]:
             return []
         accepted = {item["class"] for item in self.document["requirements"] if "expected_failure" in item}
@@ -107,31 +104,31 @@ class MemberResult:
 
 
 class Stop:
-    """Whether the fleet is told to end: once, so that each run ends by itself, and twice, so that it is ended."""
+    """The interrupt signals so far: the first ends each run gracefully, the second kills it."""
 
     def __init__(self) -> None:
         self.asked, self.insisted = asyncio.Event(), asyncio.Event()
 
     def ask(self) -> None:
-        """Take note of a signal."""
+        """Count a signal."""
         (self.insisted if self.asked.is_set() else self.asked).set()
 
 
 class MemberRun:
-    """The run of one robot, in a process and a folder of its own.
+    """The certification of one robot, in a process and folder of its own.
 
     Args:
         member: the robot.
-        folder: where its results go.
-        options: of `roaas certify`, for it and for all others alike.
-        time_limit_s: after which it is given up, s.
+        folder: for its results.
+        options: of `roaas certify`, the same for all robots.
+        time_limit_s: time after which the run is aborted, s.
     """
 
     def __init__(self, member: Member, folder: Path, options: list[str], time_limit_s: float) -> None:
         self.member, self._folder, self._options, self._limit_s = member, folder, options, time_limit_s
 
     async def judge(self, stop: Stop) -> MemberResult:
-        """Judge the robot; whatever goes wrong is its result, and none of the others'."""
+        """Certify the robot. Any failure becomes its result and does not affect the other robots."""
         started = time.monotonic()
         try:
             self._prepare()
@@ -149,7 +146,7 @@ class MemberRun:
         return self._result(process.returncode, ended, time.monotonic() - started)
 
     def progress(self) -> str:
-        """How far it is, as `57/146 checks`, or empty where that is not known yet."""
+        """The progress, as `57/146 checks`; empty if unknown."""
         with contextlib.suppress(OSError), (self._folder / LOG_NAME).open("rb") as log:
             log.seek(max(0, log.seek(0, os.SEEK_END) - 1000))
             found = _PROGRESS.search(log.read())
@@ -170,7 +167,7 @@ class MemberRun:
         return [*command, "--baseline", str(self.member.baseline)] if self.member.baseline else command
 
     async def _wait(self, process: asyncio.subprocess.Process, stop: Stop) -> Outcome | None:
-        """Wait for the end, at most for the time limit; returns what ended it, where it did not end by itself."""
+        """Wait for the process, at most until the time limit; return why it was ended, or None if it ended itself."""
         if await _first(process, stop.asked, self._limit_s):
             return None
         ended = Outcome.INTERRUPTED if stop.asked.is_set() else Outcome.GIVEN_UP
@@ -191,7 +188,7 @@ class MemberRun:
         return MemberResult(self.member, outcome, code, reason, seconds, document, digest)
 
     def _outcome(self, code: int | None, ended: Outcome | None, document: dict[str, Any] | None) -> tuple[Outcome, str]:
-        """The outcome, and why there is no verdict."""
+        """Return the outcome, and why there is no verdict."""
         if ended is not None:
             reason = f"given up after {self._limit_s:g} s, its time limit" if ended is Outcome.GIVEN_UP else ""
             return ended, reason
@@ -204,7 +201,7 @@ class MemberRun:
         return Outcome.NOT_JUDGED, f"its process ended with {code}: {self._last_words()}"
 
     def _last_words(self) -> str:
-        """What its process said last that is no progress and no name of a file."""
+        """Return the last output line that is neither progress nor a file name."""
         with contextlib.suppress(OSError):
             lines = (self._folder / LOG_NAME).read_text(encoding="utf-8", errors="replace").splitlines()
             said = [line for line in lines if line.strip() and not line.startswith(("[", "report: ", "result: "))]
@@ -213,14 +210,14 @@ class MemberRun:
 
 
 def _kill(process: asyncio.subprocess.Process) -> None:
-    """Kill a process that has not ended, with what it started; it still leads its group, since nobody waited for it."""
+    """Kill a running process and its children, by its process group."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
 
 
 async def _first(process: asyncio.subprocess.Process, event: asyncio.Event, most_s: float) -> bool:
-    """Wait for the end of a process, an event or a time; returns whether the process has ended."""
+    """Wait for the end of a process, an event or a timeout; return whether the process has ended."""
     ended, happened = asyncio.create_task(process.wait()), asyncio.create_task(event.wait())
     await asyncio.wait({ended, happened}, timeout=most_s, return_when=asyncio.FIRST_COMPLETED)
     happened.cancel()
@@ -231,7 +228,7 @@ async def _first(process: asyncio.subprocess.Process, event: asyncio.Event, most
 
 
 def _statement(member: Member) -> str:
-    """A statement with the addresses that the fleet's file has."""
+    """Return a statement (TOML) with the addresses from the fleet file."""
     endpoints = [
         f"{key} = {basic_string(value) if isinstance(value, str) else value}"
         for key, value in asdict(member.endpoints).items()

@@ -1,4 +1,4 @@
-"""fleet.json: what came of a fleet, as a document (format roaas-fleet/1), and the exit code that follows."""
+"""The content of fleet.json (format roaas-fleet/1), and the fleet's exit code."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ ROBOTS_FOLDER = "robots"
 
 
 def exit_code(results: Sequence[MemberResult], *, interrupted: bool) -> ExitCode:
-    """Of the whole fleet: 130 where it was interrupted, else the lowest of its robots' codes that is not 0.
+    """Return 130 if the fleet was interrupted, otherwise the lowest exit code of its robots that is not 0.
 
-    So one robot that does not conform (1) outranks one that could not be judged by its files (2), that was not
-    reached (3), or about which nothing could be said (4).
+    So a robot that does not conform (1) outranks one with a usage error (2), one that was not reached (3), and an
+    inconclusive one (4).
     """
     if interrupted:
         return ExitCode.INTERRUPTED
@@ -42,7 +42,7 @@ def _code(result: MemberResult) -> ExitCode:
 def fleet_document(
     results: Sequence[MemberResult], *, started: dt.datetime, finished: dt.datetime, parallel: int, interrupted: bool
 ) -> dict[str, Any]:
-    """Put a fleet together as fleet.json has it."""
+    """Return the content of fleet.json."""
     titles = {name: title for one in results for name, title in (one.document or {}).get("class_titles", {}).items()}
     return {
         "format": FLEET_FORMAT,
@@ -60,10 +60,10 @@ def fleet_document(
 
 
 def write_fleet(document: dict[str, Any], directory: Path) -> Path:
-    """Write fleet.json whole or not at all.
+    """Write fleet.json atomically; return its path.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     directory.mkdir(parents=True, exist_ok=True)
     return write_atomically(directory / FLEET_NAME, json.dumps(document, indent=1, ensure_ascii=False) + "\n")

@@ -1,4 +1,4 @@
-"""A fleet's robots judged, several at once: none waits for another, and Ctrl-C ends them all with what they have."""
+"""Run the certifications of a fleet concurrently. Ctrl-C ends all of them and keeps their results."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _OFTEN_S = 10.0
 
 
 class FleetRun:
-    """The runs of a fleet.
+    """The certifications of a fleet.
 
     Args:
         runs: one for each robot.
-        parallel: how many may be under way at once.
-        out: where progress is told, or None for nowhere.
-        keep: is given what there is whenever one is done, in the fleet's order.
+        parallel: maximum number at once.
+        out: stream for progress, or None.
+        keep: called with all results so far, in the fleet's order, whenever a run ends.
     """
 
     def __init__(
@@ -41,11 +41,11 @@ class FleetRun:
 
     @property
     def interrupted(self) -> bool:
-        """Whether somebody ended it before its time."""
+        """Whether a signal interrupted the fleet."""
         return self._stop.asked.is_set()
 
     async def judge(self) -> list[MemberResult]:
-        """Judge them all; returns what came of each, in the fleet's order."""
+        """Certify all robots; return their results in the fleet's order."""
         with self._signals():
             telling = asyncio.create_task(self._tell_often())
             try:
@@ -74,7 +74,7 @@ class FleetRun:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """SIGINT and SIGTERM end the runs; a second one does not wait for them."""
+        """End the runs on SIGINT or SIGTERM; a second signal kills them."""
         loop = asyncio.get_running_loop()
 
         def stop() -> None:

@@ -1,1 +1,1 @@
-"""What a vendor says of a device: the implementation conformance statement and its reader."""
+"""The implementation conformance statement, in which a vendor describes a device, and its reader."""

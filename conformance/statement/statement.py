@@ -1,4 +1,4 @@
-"""The implementation conformance statement: what a vendor says of a device, and what it is then judged by."""
+"""The implementation conformance statement: what a vendor declares about a device, and what it is judged by."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
 
 
 class StatementError(TomlFileError):
-    """A statement that cannot be used; the message names the file, the key and the offending value."""
+    """Raised for an invalid statement; the message names the file, the key and the offending value."""
 
 
 class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where a device's interfaces are.
+    """The addresses of a device's interfaces.
 
     Attributes:
         rest: base URL.
         publishers_wsdl: URL or file; likewise subscribers_wsdl.
-        publishers_endpoint: where the service is, when its WSDL does not say so; likewise subscribers_endpoint.
+        publishers_endpoint: URL of the service if it differs from the WSDL's; likewise subscribers_endpoint.
         ca_file: certificate authorities to trust.
-        token_file: holds the bearer token.
-        request_rate: ceiling in requests per second.
+        token_file: file with the bearer token.
+        request_rate: maximum requests per second.
         timeout_s: deadline of one request, s.
     """
 
@@ -64,11 +64,11 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a load test may ask of the device.
+    """What a load test may do to the device.
 
     Attributes:
-        max_rate: most requests per second.
-        max_duration_s: longest measurement, s.
+        max_rate: maximum requests per second.
+        max_duration_s: maximum duration of a measurement, s.
     """
 
     max_rate: Positive | None = None
@@ -76,11 +76,11 @@ class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Statement(msgspec.Struct, frozen=True):
-    """What a vendor says of a device. A pack whose device has more to declare extends it.
+    """What a vendor declares about a device. A pack whose device has more to declare extends it.
 
     Attributes:
         robot: name, vendor, version.
-        claims: the conformance classes that the vendor claims; None: none were named.
+        claims: the claimed conformance classes; None: none were named.
     """
 
     robot: dict[str, str] = {}
@@ -90,12 +90,12 @@ class Statement(msgspec.Struct, frozen=True):
 
     @property
     def figures(self) -> dict[str, dict[str, float]]:
-        """What result.json tells of the device's figures: ``declared``, ``limits`` and ``tolerances``, by name."""
+        """Return the declared figures for result.json: ``declared``, ``limits`` and ``tolerances``, by name."""
         return {"declared": {}, "limits": {}, "tolerances": {}}
 
     @property
     def undeclared(self) -> dict[str, str]:
-        """Why requirements that need a figure are not tested, by the prerequisite that the statement lacks."""
+        """Return why requirements are not tested whose prerequisite is not declared, by prerequisite."""
         return {}
 
     @property
@@ -104,17 +104,17 @@ class Statement(msgspec.Struct, frozen=True):
         return None
 
     def on_domain(self, domain_id: int) -> Self:
-        """Return the statement with a ROS domain.
+        """Return the statement with another ROS domain.
 
         Raises:
-            StatementError: this kind of statement has none.
+            StatementError: this type of statement has no ROS domain.
         """
         raise StatementError(f"--ros-domain-id {domain_id}: this contract has no ROS probe")
 
     def claimed(self, contract: Contract) -> tuple[str, ...]:
-        """Return the classes to judge: those that are claimed, else those whose interfaces all have an address.
+        """Return the classes to judge: those claimed, or, without claims, those whose interfaces all have an address.
 
-        A robot whose vendor names no classes is never judged more mildly than one whose vendor does.
+        So a vendor who claims nothing is not judged more leniently than one who claims everything.
         """
         if self.claims is not None:
             return tuple(name for name in contract.classes if name in self.claims)
@@ -123,7 +123,7 @@ class Statement(msgspec.Struct, frozen=True):
         return tuple(item.name for item in judged if any(one in described for one in item.interfaces))
 
     def lacking(self, contract: Contract) -> dict[str, tuple[Interface, ...]]:
-        """Return the classes that are not judged where none are named, with the interfaces that have no address."""
+        """Return the classes that are not judged although none were claimed, with the interfaces without an address."""
         if self.claims is not None:
             return {}
         there, described = self.endpoints.interfaces, contract.interfaces
@@ -142,7 +142,7 @@ class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     classes: tuple[str, ...] | None = None
 
     def named(self, contract: Contract, path: Path) -> tuple[str, ...] | None:
-        """Return the classes that are claimed in either way; None: nothing is said.
+        """Return the classes that are claimed by profile or name, or None if none are.
 
         Raises:
             StatementError: the contract has no such profile or class.
@@ -160,7 +160,7 @@ class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The tables of a statement, as they are written. A pack adds its own by extending it."""
+    """The tables of a statement file. A pack extends it with its own tables."""
 
     robot: _Robot = _Robot()
     endpoints: Endpoints = Endpoints()
@@ -168,18 +168,18 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     load: Load = Load()
 
     def read(self, contract: Contract, path: Path) -> Statement:
-        """Return the statement that a file makes.
+        """Return the statement.
 
         Raises:
-            StatementError: it claims what the contract does not have.
+            StatementError: it claims an unknown class or profile.
         """
         return Statement(**self.common(contract, path))
 
     def common(self, contract: Contract, path: Path) -> dict[str, Any]:
-        """Return what every statement has, by name.
+        """Return the attributes that every statement has, by name.
 
         Raises:
-            StatementError: as read().
+            StatementError: it claims an unknown class or profile.
         """
         robot = msgspec.structs.asdict(self.robot)
         return {
@@ -191,10 +191,10 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def load_statement(path: Path, contract: Contract) -> Statement:
-    """Read a statement. Files that it names (CA, token, WSDL) are looked for beside it.
+    """Read a statement. Files that it names (CA, token, WSDL) are relative to its folder.
 
     Raises:
-        StatementError: it cannot be read, or has an unknown key or a value of the wrong kind.
+        StatementError: it cannot be read, or has an unknown key or an invalid value.
         ContractError: the contract's plugin cannot be imported.
     """
     shape: type[StatementFile] = getattr(contract.plugin, "StatementFile", StatementFile)
@@ -202,7 +202,7 @@ def load_statement(path: Path, contract: Contract) -> Statement:
 
 
 def empty_statement(contract: Contract) -> Statement:
-    """Return the statement of a vendor who says nothing.
+    """Return the statement of a vendor who declares nothing.
 
     Raises:
         ContractError: the contract's plugin cannot be imported.
@@ -212,7 +212,7 @@ def empty_statement(contract: Contract) -> Statement:
 
 
 def beside(folder: Path, where: Endpoints) -> Endpoints:
-    """Return endpoints whose files are looked for in a folder; URLs stay as they are."""
+    """Return endpoints with file names relative to a folder; URLs stay unchanged."""
     named = {key: getattr(where, key) for key in ("ca_file", "token_file", "publishers_wsdl", "subscribers_wsdl")}
     files = {key: str(folder / name) for key, name in named.items() if name is not None and "://" not in name}
     return msgspec.structs.replace(where, **files)
