@@ -1,1 +1,1 @@
-"""A web API as its description tells it: REST by OpenAPI, SOAP by WSDL."""
+"""A web API by its description: REST by OpenAPI, SOAP by WSDL."""

@@ -1,4 +1,4 @@
-"""The hooks by which a contract pack tells the generic suite about its device; the defaults move nothing."""
+"""The hooks through which a contract pack describes its device to the generic suite; the defaults move nothing."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _SETTLE_S = 2.0
 
 
 class Device:
-    """One device in one run. A pack's plugin module has a class ``Device`` of this kind.
+    """The model of one device in one run. A pack's plugin module subclasses it as ``Device``.
 
     Attributes:
-        run: what is judged, and by what.
+        run: the data of the run.
     """
 
     #: Whether the device's own values are known, so that no other valid request that moves it is sent.
@@ -44,32 +44,32 @@ class Device:
 
     @property
     def settle_s(self) -> float:
-        """Time within which the device takes up what it was sent, s."""
+        """Time within which a command takes effect, s."""
         return _SETTLE_S
 
     @property
     def hold_s(self) -> float | None:
-        """Time for which the device keeps what it was sent unless it is sent again, s; None: for ever."""
+        """Time for which a command lasts unless it is repeated, s; None: for ever."""
         return None
 
     def fit(self, api: Rest, operation_id: str, value: Any) -> Any:  # noqa: ARG002 - for packs
-        """Return a valid value of an operation (its body, or its parameters by name) that makes sense to the device."""
+        """Return a valid value for an operation (body, or parameters by name) that is also sensible for the device."""
         return value
 
     def marked(self, operation_id: str, value: Any) -> Any:  # noqa: ARG002 - for packs
-        """Return a valid value with a text of the suite's own in it, where the operation has room for one."""
+        """Return a valid value with a text that identifies the suite, if the operation has room for one."""
         return value
 
     def answers_alike(self, template: str) -> bool:  # noqa: ARG002 - for packs
-        """Return whether a resource's responses to equal requests are equal."""
+        """Return whether equal requests to a resource get equal responses."""
         return False
 
     def is_near(self, place: str, shown: Any, wanted: Any) -> bool:  # noqa: ARG002 - for packs
-        """Return whether a value that is read is the one that was sent, within the device's tolerance."""
+        """Return whether a value that GET returns equals the one that was sent, within the device's tolerance."""
         return bool(shown == wanted)
 
     def messages(self, service: Soap, operation: Operation) -> Iterator[Node]:  # noqa: ARG002 - for packs
-        """Yield SOAP messages that the device takes, likeliest first; none where the obvious one will do."""
+        """Yield SOAP messages that the device accepts, the most promising first; empty if the default one suffices."""
         return iter(())
 
     def questions(self, api: Rest) -> Iterable[Question]:  # noqa: ARG002 - for packs
@@ -77,11 +77,11 @@ class Device:
         return ()
 
     def observers(self, api: Rest) -> Iterable[Listener]:  # noqa: ARG002 - for packs
-        """Return what judges every exchange of the run."""
+        """Return listeners that judge every exchange of the run."""
         return ()
 
     def halt(self, api: Rest) -> None:
-        """Stop what a request may have set in motion, without waiting until the device stands still."""
+        """Send the device a stop command, without waiting until it stands still."""
 
     def bring_to_rest(self, api: Rest) -> str:  # noqa: ARG002 - for packs
         """Stop the device and wait until it stands still; return why it does not, or an empty text."""

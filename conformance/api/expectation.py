@@ -1,4 +1,4 @@
-"""What a check expects of one response: each method judges one case of one requirement, and words the finding."""
+"""Judge one response by one requirement: each method judges one case and words the finding."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from conformance.verdict.evidence import Judge
 
 @dataclass(frozen=True)
 class Expectation:
-    """One requirement, to be judged on one request and what became of it.
+    """One requirement and one exchange to judge it by.
 
-    A finding reads "Sent GET /x. Expected {expected}. Got {got}.": so both are noun phrases, and neither repeats the
-    request.
+    A finding reads "Sent GET /x. Expected {expected}. Got {got}.", so both texts are noun phrases without the request.
 
     Attributes:
-        judge: takes the evidence.
+        judge: records the evidence.
         requirement: id of the requirement.
-        attempt: the request with its response, or why there is none; None where no request was sent.
-        got: describes the response; empty: its status and media type, which a finding says anyway.
+        attempt: the request with its response or the reason for a missing one; None if no request was sent.
+        got: description of the response; empty: status and media type, which the finding contains anyway.
     """
 
     judge: Judge
@@ -35,12 +34,12 @@ class Expectation:
         *,
         cause: str = "",
     ) -> bool:
-        """Judge one case, and return ``holds``.
+        """Record whether the response meets the requirement; return ``holds``.
 
         Args:
-            holds: whether the response meets the requirement.
-            expected: what the requirement asks for, as a noun phrase.
-            got: what a look at the response showed, as a noun phrase; empty: status and media type show it.
+            holds: whether it does.
+            expected: what the requirement demands, as a noun phrase.
+            got: what the response showed, as a noun phrase; empty: status and media type.
             cause: failures of the same cause are one finding; empty: the texts without their numbers.
         """
         return self.judge.check(self.requirement, holds, self.attempt, expected, found=got or self.got, cause=cause)
@@ -48,14 +47,14 @@ class Expectation:
     def status(
         self, *allowed: int | str, when: str = "", closed: bool = False, or_else: bool = False, cause: str = ""
     ) -> bool:
-        """Judge that the response has one of some statuses.
+        """Record whether the response has one of the statuses.
 
         Args:
-            allowed: statuses (404) and classes of them ("4xx").
-            when: what is special about the request: "the body is text/plain".
-            closed: whether the robot may close the connection instead of responding.
+            allowed: statuses (404) and classes of statuses ("4xx").
+            when: the special property of the request: "the body is text/plain".
+            closed: whether the robot may close the connection instead.
             or_else: whether the response meets the requirement for another reason.
-            cause: by default each status is a cause of its own.
+            cause: by default, each status is a cause of its own.
         """
         expected = f"status {' or '.join(map(str, allowed))}" + (" or a closed connection" if closed else "")
         expected += f" when {when}" if when else ""
@@ -66,23 +65,23 @@ class Expectation:
         return self.that(or_else or (closed and is_closed), expected, cause=cause)
 
     def taken(self, when: str, *, or_else: bool = False, cause: str = "") -> bool:
-        """Judge that a valid request was accepted, or only put off with 409 (a goal of the robot's own is active)."""
+        """Record whether a valid request was accepted, or deferred with 409 because a goal is active."""
         return self.status("2xx", 409, when=when, or_else=or_else, cause=cause)
 
     def media_type(self, *allowed: str, when: str = "") -> bool:
-        """Judge that the response has one of some media types."""
+        """Record whether the response has one of the media types."""
         found = self.attempt.response.media_type if isinstance(self.attempt, Exchange) else ""
         expected = f"Content-Type: {' or '.join(allowed)}" + (f" when {when}" if when else "")
         return self.that(found in allowed, expected, cause=found)
 
     def header(self, name: str) -> bool:
-        """Judge that the response has a header field."""
+        """Record whether the response has a header."""
         there = isinstance(self.attempt, Exchange) and self.attempt.response.header(name) is not None
         return self.that(there, f"the header field {name}", f"no header field {name}")
 
 
 def expect(judge: Judge, requirement: str, attempt: Attempt | None) -> Expectation:
-    """Return what a requirement expects of one request's response, to be judged by one of the methods."""
+    """Return the Expectation of a requirement for one exchange; its methods judge."""
     return Expectation(judge, requirement, attempt)
 
 

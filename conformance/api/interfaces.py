@@ -1,4 +1,4 @@
-"""All interfaces of one robot, each of which may be missing."""
+"""The interfaces of one robot, each of which may be missing."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,8 @@ class Interfaces:
     """The interfaces that have an address.
 
     Attributes:
-        rest: or None.
-        soap: the services, each of which may be None.
+        rest: the REST interface, or None.
+        soap: the SOAP services, each of which may be None.
     """
 
     rest: RestInterface | None

@@ -1,7 +1,6 @@
-"""Mutations of a valid document, in whatever format: each breaks it in one way, at one place.
+"""Invalid variants of a valid document in any format, each with one fault at one place.
 
-A format shows a place of its documents as a list of members, and writes the broken list. What can go wrong with any
-list is here; what can go wrong with a text, each format knows for itself.
+This module contains the faults that a list of members can have. The faults of values are in the modules of each format.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -16,16 +15,16 @@ STRANGE_TEXT = "roaas-no-number"
 
 @dataclass(frozen=True)
 class Mutation(Generic[Made]):
-    """A document with one thing wrong.
+    """A document with one fault.
 
     Attributes:
-        kind: missing, unknown, duplicate, non-finite, ...: the end of the id in class strict-input, behind the format.
-        what: what is wrong and where, as a noun phrase.
-        made: the broken document, as its format has it.
-        field: name of the field that is wrong, or empty.
-        shown: what a refusal can name of the value, or empty.
-        malformed: whether it cannot be parsed at all (400), or has a wrong shape or value (422); None: either.
-        reason: why validators refuse it, or empty.
+        kind: missing, unknown, duplicate, non-finite, ...: the last part of the requirement's id in class strict-input.
+        what: the fault and its place, as a noun phrase.
+        made: the invalid document.
+        field: name of the invalid field, or empty.
+        shown: the invalid value as an error message can quote it, or empty.
+        malformed: whether it cannot be parsed (400) or has an invalid shape or value (422); None: either.
+        reason: why validators reject it, or empty.
     """
 
     kind: str
@@ -39,13 +38,13 @@ class Mutation(Generic[Made]):
 
 @dataclass(frozen=True)
 class Member:
-    """One child of a place in a valid document.
+    """One member of an object or element.
 
     Attributes:
         name: local name.
-        item: the child, as its format has it.
-        required: whether the contract requires one of the name.
-        repeatable: whether the contract allows any number of them.
+        item: the member in its format.
+        required: whether the contract requires a member of this name.
+        repeatable: whether the contract allows several of them.
     """
 
     name: str
@@ -57,9 +56,9 @@ class Member:
 def broken_members(
     where: str, members: Sequence[Member], strange: Iterable[Member], write: Callable[[list[Any]], Made]
 ) -> Iterator[Mutation[Made]]:
-    """Yield the mutations of a list of members: one missing, one twice, a strange one last and first.
+    """Yield the mutations of a list of members: one missing, one duplicated, an unknown one at the end and the start.
 
-    ``where`` names the place, and ``write`` makes a document with other items there.
+    ``where`` names the place; ``write`` returns the document with other members there.
     """
     items = [member.item for member in members]
     for index, member in enumerate(members):

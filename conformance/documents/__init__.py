@@ -1,1 +1,1 @@
-"""One reader for each kind of document: JSON, XML, YAML, JSON Schema, XSD, OpenAPI, WADL, WSDL."""
+"""Readers for documents: JSON, XML, YAML, JSON Schema, XSD, OpenAPI, WADL, WSDL."""

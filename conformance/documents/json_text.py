@@ -1,4 +1,4 @@
-"""JSON as it came over the wire, read more strictly than programs usually do (RFC 8259)."""
+"""Read JSON more strictly than most parsers (RFC 8259)."""
 
 import codecs
 import json
@@ -15,14 +15,14 @@ _DIGITS_READ = 400
 
 @dataclass(frozen=True)
 class JsonText:
-    """What a JSON text holds, and what is wrong with it.
+    """The value of a JSON text, and its faults.
 
     Attributes:
-        value: what it holds; None where it is no JSON.
-        malformed: why it is no JSON, or empty.
-        encoding: why it is not UTF-8 without a byte order mark, or empty.
-        non_finite: the first NaN, Infinity or number beyond every double, or empty.
-        twice: the first name that stands twice in one object, or empty.
+        value: the value; None if the text is not JSON.
+        malformed: why the text is not JSON, or empty.
+        encoding: why the text is not UTF-8 without a byte order mark, or empty.
+        non_finite: the first NaN, Infinity or number too large for a double, or empty.
+        twice: the first name that occurs twice in one object, or empty.
     """
 
     value: Any = None
@@ -33,47 +33,47 @@ class JsonText:
 
     @property
     def problem(self) -> str:
-        """The first thing that is wrong, or empty."""
+        """The first fault, or empty."""
         if self.non_finite:
             return f"the number {self.non_finite}"
         return self.malformed or self.encoding or (f"the name {self.twice!r} twice" if self.twice else "")
 
     @property
     def unreadable(self) -> str:
-        """Why no reader gets the value, or empty: most pass over a byte order mark and a name that stands twice."""
+        """Why a usual parser cannot read the text, or empty; most accept a byte order mark and duplicate names."""
         if self.non_finite:
             return f"the number {self.non_finite}"
         return self.malformed or (self.encoding if self.encoding != _BYTE_ORDER_MARK else "")
 
 
 class _Reader:
-    """Hooks for ``json.loads`` that keep what it would let pass."""
+    """Hooks for ``json.loads`` that record faults which it tolerates."""
 
     def __init__(self) -> None:
         self.non_finite = ""
         self.twice = ""
 
     def constant(self, name: str) -> float:
-        """Return NaN or an Infinity, which are no JSON, and record it."""
+        """Return NaN or Infinity, and record it as a fault."""
         self.non_finite = self.non_finite or name
         return {"NaN": math.nan, "Infinity": math.inf}.get(name, -math.inf)
 
     def real(self, lexeme: str) -> float:
-        """Return a number with a fraction or an exponent."""
+        """Return a number with a fraction or exponent; record it if it is infinite."""
         number = float(lexeme)
         if math.isinf(number):
             self.non_finite = self.non_finite or lexeme[:40]
         return number
 
     def whole(self, lexeme: str) -> int | float:
-        """Return an integer of any length."""
+        """Return an integer of any length; record it if it is too large for a double."""
         if len(lexeme) <= _DIGITS_READ:
             return int(lexeme)
         self.non_finite = self.non_finite or f"{lexeme[:12]}... ({len(lexeme)} digits)"
         return -math.inf if lexeme.startswith("-") else math.inf
 
     def members(self, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        """Return an object, and record a name that stands in it twice."""
+        """Return an object, and record the first duplicate name."""
         result = dict(pairs)
         if len(result) < len(pairs):
             names = [name for name, _ in pairs]
@@ -83,9 +83,9 @@ class _Reader:
 
 @lru_cache(maxsize=4)
 def read_json(body: bytes) -> JsonText:
-    """Read a JSON text; nothing that comes raises.
+    """Read a JSON text. Never raises.
 
-    Several readers look at one body one after another: what was read is kept for a moment, and must not be changed.
+    The result is cached for a moment, because several checks read the same body; it must not be changed.
     """
     encoding = ""
     if body.startswith(codecs.BOM_UTF8):
@@ -115,7 +115,7 @@ def read_json(body: bytes) -> JsonText:
 
 
 def shown(value: Any) -> str:
-    """Return a value as JSON writes it, cut where it is long."""
+    """Return a value as JSON text, truncated if it is long."""
     try:
         text = json.dumps(value)
     except (ValueError, RecursionError):

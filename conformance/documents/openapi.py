@@ -1,4 +1,4 @@
-"""The operations of a contract, read from its OpenAPI description into values."""
+"""The operations of a contract, from its OpenAPI description."""
 
 import re
 from dataclasses import dataclass, field
@@ -21,12 +21,12 @@ class Parameter:
     """One parameter of an operation.
 
     Attributes:
-        name: as it is sent.
+        name: as in requests.
         where: path, query, header or cookie.
-        required: whether a request needs it.
+        required: whether requests must have it.
         schema: of its value.
-        examples: values that the contract gives for it; may be empty.
-        also: what else it is called, in ROS for instance (x-roaas-also).
+        examples: example values in the description; may be empty.
+        also: other names of it, for instance in ROS (x-roaas-also).
     """
 
     name: str
@@ -39,12 +39,12 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Body:
-    """One media type that an operation takes.
+    """One media type of an operation's request body.
 
     Attributes:
         media_type: without parameters.
         schema: of the value.
-        examples: values (text for XML) that the contract gives; may be empty.
+        examples: example values (text for XML) in the description; may be empty.
     """
 
     media_type: str
@@ -57,15 +57,16 @@ class Operation:
     """One method of one resource.
 
     Attributes:
-        id: operationId, or method and path where there is none.
+        id: operationId, or method and path without one.
         method: in upper case.
         template: path with ``{name}`` for parameters.
-        parameters: of path and operation together.
-        bodies: what it takes, by media type.
-        body_required: whether a request needs a body.
-        responses: schemas of what it answers, by status ("200", "2XX", "default") and media type; open to more fields.
-        motion: whether it may move the robot (or change what a vendor would not have changed).
-        optional: whether a robot may do without it.
+        parameters: of path and operation.
+        bodies: possible request bodies, by media type.
+        body_required: whether a request must have a body.
+        responses: schemas of response bodies, by status ("200", "2XX", "default") and media type; further members
+            allowed.
+        motion: whether it may move the robot or change persistent state.
+        optional: whether a robot need not implement it.
     """
 
     id: str
@@ -80,16 +81,16 @@ class Operation:
 
     @property
     def label(self) -> str:
-        """Method and path, for people."""
+        """Method and path."""
         return f"{self.method} {self.template}"
 
     @property
     def safe(self) -> bool:
-        """Whether the method is safe by RFC 9110 9.2.1."""
+        """Whether the method is safe (RFC 9110 9.2.1)."""
         return self.method in SAFE
 
     def declared(self, status: int) -> dict[str, Schema] | None:
-        """Return the media types that the contract declares for a status; None where it does not declare the status."""
+        """Return the schemas by media type for a status; None if the status is not declared."""
         for key in (str(status), f"{status // 100}XX", f"{status // 100}xx", "default"):
             if key in self.responses:
                 return self.responses[key]
@@ -97,13 +98,13 @@ class Operation:
 
     @cached_property
     def formats(self) -> tuple[str, ...]:
-        """The media types of its successful answers, the contract's first one first."""
+        """The media types of its successful responses, in the description's order."""
         found = [name for status, content in self.responses.items() if status.startswith("2") for name in content]
         return tuple(dict.fromkeys(found))
 
     @cached_property
     def shape(self) -> Schema | None:
-        """The schema of what a successful answer holds, whatever its format; None where the contract has none."""
+        """The schema of its successful response's body, or None."""
         for status, content in self.responses.items():
             if status.startswith("2"):
                 for media_type, schema in content.items():
@@ -112,7 +113,7 @@ class Operation:
         return None
 
     def parameter(self, where: str) -> tuple[Parameter, ...]:
-        """Return the parameters of one kind."""
+        """Return the parameters of one kind: path, query, header or cookie."""
         return tuple(item for item in self.parameters if item.where == where)
 
 
@@ -128,10 +129,10 @@ def is_xml(media_type: str) -> bool:
 
 @lru_cache(maxsize=8)
 def operations_of(contract: Contract) -> tuple[Operation, ...]:
-    """Return all operations of a contract, in its order.
+    """Return all operations of a contract, in the description's order.
 
     Raises:
-        ContractError: its OpenAPI description has a reference that leads nowhere, or is not built as one.
+        ContractError: the OpenAPI description is malformed, or a reference has no target.
     """
     try:
         return tuple(read_operations(contract.openapi))
@@ -143,7 +144,7 @@ def read_operations(document: Schema) -> list[Operation]:
     """Return the operations of an OpenAPI document.
 
     Raises:
-        UnresolvedError, AttributeError, TypeError, KeyError: it is not built as one.
+        UnresolvedError, AttributeError, TypeError, KeyError: the document is malformed.
     """
     found: list[Operation] = []
     for path, item in document.get("paths", {}).items():
@@ -195,7 +196,7 @@ def _parameter(given: dict[str, Any]) -> Parameter:
 
 
 def _examples(given: dict[str, Any]) -> tuple[Any, ...]:
-    """Return the examples of a parameter or a media type; its schema's where it has none of its own."""
+    """Return the examples of a parameter or media type, or those of its schema."""
     if "example" in given:
         return (given["example"],)
     named = tuple(item["value"] for item in given.get("examples", {}).values() if "value" in item)
@@ -214,28 +215,28 @@ class Resource:
 
     @cached_property
     def pattern(self) -> re.Pattern[str]:
-        """Matches the paths that the template stands for."""
+        """A regular expression that matches the paths of the template."""
         parts = PARAMETER.split(self.template)
         return re.compile("".join(re.escape(part) if i % 2 == 0 else "[^/]*" for i, part in enumerate(parts)))
 
     @property
     def methods(self) -> frozenset[str]:
-        """The methods that the contract gives it, HEAD with GET included."""
+        """The methods that the description declares, and HEAD if it declares GET."""
         given = frozenset(self.operations)
         return given | {"HEAD"} if "GET" in given else given
 
     @property
     def optional(self) -> bool:
-        """Whether a robot may do without it."""
+        """Whether a robot need not implement it."""
         return all(operation.optional for operation in self.operations.values())
 
 
 @lru_cache(maxsize=8)
 def resources_of(contract: Contract) -> tuple[Resource, ...]:
-    """Return the resources of a contract, in its order.
+    """Return the resources of a contract, in the description's order.
 
     Raises:
-        ContractError: see operations_of.
+        ContractError: as operations_of().
     """
     by_path: dict[str, dict[str, Operation]] = {}
     for operation in operations_of(contract):
@@ -245,31 +246,31 @@ def resources_of(contract: Contract) -> tuple[Resource, ...]:
 
 @lru_cache(maxsize=512)
 def resource_at(contract: Contract, path: str) -> Resource | None:
-    """Return the resource that a path is for; a literal path wins over a template (OpenAPI 3.1, 4.8.8.2)."""
+    """Return the resource of a path, or None; literal paths precede templates (OpenAPI 3.1, 4.8.8.2)."""
     found = [item for item in resources_of(contract) if item.pattern.fullmatch(path)]
     return min(found, key=lambda item: item.template.count("{"), default=None)
 
 
 def matching(contract: Contract, method: str, path: str) -> Operation | None:
-    """Return the operation that a request is for; HEAD counts as GET. The path is below the base URL, without query."""
+    """Return the operation of a request, or None; HEAD counts as GET. ``path`` is below the base URL, without query."""
     resource = resource_at(contract, path)
     return resource.operations.get("GET" if method == "HEAD" else method) if resource else None
 
 
 def known_path(contract: Contract, path: str) -> bool:
-    """Return whether any resource of the contract has this path."""
+    """Return whether the contract has a resource with this path."""
     return resource_at(contract, path) is not None
 
 
 @lru_cache(maxsize=512)
 def is_normal(path: str) -> bool:
-    """Return whether a path has no segment that servers take away by themselves: an empty one, ``.`` or ``..``."""
+    """Return whether a path has no segment that servers may remove: empty, ``.`` or ``..``."""
     segments = [unquote(segment) for segment in path.split("/")]
     return "" not in segments[1:-1] and not {".", ".."} & set(segments)
 
 
 def inside_prefix(contract: Contract, path: str) -> bool:
-    """Return whether a path begins like one of the contract's; elsewhere another server may respond."""
+    """Return whether a path begins like one of the contract's paths; another server may serve other paths."""
     return path.lstrip("/").split("/", 1)[0] in {
         item.template.lstrip("/").split("/", 1)[0] for item in resources_of(contract)
     }

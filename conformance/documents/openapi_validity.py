@@ -1,4 +1,4 @@
-"""Whether a document is a valid OpenAPI description: by the schema of its version, its references and its paths."""
+"""Check whether a document is a valid OpenAPI description: schema of its version, references, path parameters."""
 
 import re
 from collections.abc import Sequence
@@ -10,9 +10,9 @@ from conformance.documents.openapi import PARAMETER, Operation, read_operations
 
 
 def openapi_fault(document: Any) -> str:
-    """Return why a document is no valid OpenAPI 3 description; empty where it is one.
+    """Return why a document is not a valid OpenAPI 3 description; empty if it is.
 
-    Schemathesis carries the schemas that the OpenAPI Initiative publishes, and is there anyway.
+    The schemas of the OpenAPI Initiative come from Schemathesis, which is a dependency anyway.
     """
     if not isinstance(document, dict):
         return "it is no object"
@@ -42,7 +42,7 @@ def _validator(version: str) -> Any:
 
 
 def _path_fault(operations: Sequence[Operation]) -> str:
-    """Return a path parameter that is used and not described, or described and not used (OpenAPI 3.1, 4.8.8.2)."""
+    """Return a path parameter that is in a path but not described, or the reverse (OpenAPI 3.1, 4.8.8.2); or empty."""
     for operation in operations:
         used = set(PARAMETER.findall(operation.template))
         described = {item.name for item in operation.parameter("path")}

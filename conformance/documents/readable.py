@@ -1,4 +1,4 @@
-"""Whether a body is what its media type says, as far as that is JSON or XML."""
+"""Check whether a JSON or XML body can be parsed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from conformance.documents.openapi import is_json, is_xml
 
 
 def unreadable(media_type: str, body: bytes) -> str:
-    """Return why a parser cannot read a body of JSON or XML; empty where it can, and for every other media type."""
+    """Return why a JSON or XML body cannot be parsed; empty if it can, and for other media types."""
     if is_json(media_type):
         return read_json(body).unreadable
     if not is_xml(media_type):

@@ -1,4 +1,4 @@
-"""JSON, XML and YAML read by one schema into one comparable value."""
+"""Read JSON, XML and YAML bodies by one schema into comparable JSON values."""
 
 import re
 from typing import Any
@@ -23,16 +23,16 @@ _NIL = "{http://www.w3.org/2001/XMLSchema-instance}nil"
 
 
 class UnreadableError(Exception):
-    """A body that is not what its media type says; the message names what is wrong."""
+    """Raised for a body that does not have the format of its media type; the message says why."""
 
 
 def read(media_type: str, body: bytes, schema: Schema) -> Any:
-    """Return a body as a JSON value of the given schema; fields that the schema does not name are left out.
+    """Return a body as a JSON value by a schema; members that the schema does not name are left out.
 
-    What does not fit the schema stays as it is written (mostly text), so that validating the value shows it.
+    A value that does not fit the schema stays as written (usually text), so that validation reports it.
 
     Raises:
-        UnreadableError: it is no JSON, XML or YAML at all.
+        UnreadableError: the body is not JSON, XML or YAML.
     """
     try:
         if is_json(media_type):
@@ -48,7 +48,7 @@ def read(media_type: str, body: bytes, schema: Schema) -> Any:
 
 
 def parse_xml(body: bytes) -> etree._Element:
-    """Return the root element of a document that a robot sent, without comments.
+    """Return the root element of a robot's XML document, without comments.
 
     Raises:
         UnreadableError: it is not well-formed, or has a document type declaration.
@@ -60,12 +60,12 @@ def parse_xml(body: bytes) -> etree._Element:
 
 
 def parse_yaml(body: bytes) -> Any:
-    """Return the one document of a YAML stream, its scalars as text; a last empty document (``---``) is no document.
+    """Return the only document of a YAML stream, with all scalars as text. An empty last document is ignored.
 
-    ``ros2 topic echo`` prints ``---`` behind each message.
+    ``ros2 topic echo`` prints ``---`` after each message.
 
     Raises:
-        UnreadableError: it is no YAML, or more than one document.
+        UnreadableError: it is not YAML, or has several documents.
     """
     try:
         documents = list(yaml.load_all(body.decode("utf-8"), Loader=_Loader))
@@ -79,10 +79,10 @@ def parse_yaml(body: bytes) -> Any:
 
 
 def by_itself(body: bytes) -> Any:
-    """Return the first document of a YAML stream as a reader takes it that knows no schema: plain 123 is a number.
+    """Return the first document of a YAML stream with types by YAML's rules: plain 123 is a number.
 
     Raises:
-        UnreadableError: it is no YAML.
+        UnreadableError: it is not YAML.
     """
     try:
         return next(iter(yaml.load_all(body.decode("utf-8"), Loader=_ByItself)), None)
@@ -96,7 +96,7 @@ def local_name(element: etree._Element) -> str:
 
 
 def from_element(element: etree._Element, schema: Schema) -> Any:
-    """Return an element as a JSON value; see read()."""
+    """Return an XML element as a JSON value by a schema, as read() does."""
     schema = flat(schema)
     kind = kind_of(schema)
     children = xml.elements(element)
@@ -132,7 +132,7 @@ def _from_children(children: list[etree._Element], schema: Schema) -> dict[str, 
 
 
 def _items(group: list[etree._Element], schema: Schema) -> list[Any]:
-    """Return an array's items: one child of the field's name for each, or all nested in one such child."""
+    """Return the items of an array: one child element for each, or all inside one child element."""
     if len(group) == 1:
         inner = xml.elements(group[0])
         fields = set(flat(schema).get("properties", {}))
@@ -143,7 +143,7 @@ def _items(group: list[etree._Element], schema: Schema) -> list[Any]:
 
 
 def from_plain(value: Any, schema: Schema) -> Any:
-    """Return YAML whose scalars are all text as a JSON value; see read()."""
+    """Return YAML with text scalars as a JSON value by a schema, as read() does."""
     schema = flat(schema)
     kind = kind_of(schema)
     if isinstance(value, str):
@@ -165,7 +165,7 @@ def from_plain(value: Any, schema: Schema) -> Any:
 
 
 def scalar(text: str, kind: str) -> Any:
-    """Return a single value as its schema's type; the text itself where it is none."""
+    """Return a text as a value of a JSON type; the text itself if it does not fit."""
     stripped = text.strip(" \t\r\n")
     if kind in {"number", "integer"} and _NUMBER.fullmatch(stripped):
         return int(stripped) if _WHOLE.fullmatch(stripped) else float(stripped)
@@ -175,7 +175,7 @@ def scalar(text: str, kind: str) -> Any:
 
 
 def projected(value: Any, schema: Schema) -> Any:
-    """Return a JSON value without the fields that its schema does not name."""
+    """Return a JSON value without the members that its schema does not name."""
     if not isinstance(value, list | dict):
         return value
     schema = flat(schema)
@@ -191,7 +191,7 @@ def projected(value: Any, schema: Schema) -> Any:
 
 
 def flat(schema: Schema) -> Schema:
-    """Return a schema with the properties of its allOf, or of its first alternative, as its own."""
+    """Return a schema with the properties of its allOf, or of its first alternative, merged into it."""
     if _COMBINING.isdisjoint(schema):
         return schema
     parts = [*schema.get("allOf", ()), *schema.get("oneOf", ())[:1], *schema.get("anyOf", ())[:1]]
@@ -210,7 +210,7 @@ def flat(schema: Schema) -> Schema:
 
 
 def flattened(value: Any, where: str = "") -> dict[str, Any]:
-    """Return every single value by its place; numbers as doubles, and the length of each list."""
+    """Return all scalars of a value by their paths, numbers as doubles, and the length of each list."""
     if isinstance(value, dict):
         leaves: dict[str, Any] = {} if value else {where: "{}"}
         for name, item in value.items():

@@ -1,4 +1,4 @@
-"""The inside of a program, as it shows in an answer by accident."""
+"""Recognise tracebacks and other internals of a program in response bodies."""
 
 import re
 
@@ -25,6 +25,6 @@ _INSIDES = re.compile(
 
 
 def inside_shown(body: bytes) -> str:
-    """Return the first piece of a traceback or of another inside of a program; empty where a body shows none."""
+    """Return the first part of a traceback or of similar internals in a body, or empty."""
     found = _INSIDES.search(body[:_LOOKED_THROUGH])
     return found[0].decode("utf-8", "replace")[:_SHOWN] if found else ""

@@ -1,4 +1,4 @@
-"""A WADL (W3C member submission of 2009) as the operations that it describes."""
+"""Read the operations of a WADL (W3C member submission, 2009)."""
 
 import re
 from urllib.parse import urlsplit
@@ -16,10 +16,10 @@ _KINDS = {"template": "path", "query": "query", "matrix": "matrix", "header": "h
 
 
 def read_wadl(body: bytes) -> list[Operation]:
-    """Return the operations of a WADL, their paths below the server's root.
+    """Return the operations of a WADL, with paths relative to the server's root.
 
     Raises:
-        UnreadableError: it is no XML, or its root is no WADL application.
+        UnreadableError: it is not XML, or its root is not a WADL application.
     """
     root = parse_xml(body)
     if root.tag != f"{{{WADL}}}application":
@@ -55,7 +55,7 @@ def _of_resource(
 
 
 def _referred(method: etree._Element, root: etree._Element) -> etree._Element:
-    """Return a method, or the one that it refers to by ``href="#id"``."""
+    """Return a method element, or the one that its ``href="#id"`` refers to."""
     name = method.get("href", "").lstrip("#")
     return next((item for item in root.iter(f"{{{WADL}}}method") if name and item.get("id") == name), method)
 

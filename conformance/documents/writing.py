@@ -1,4 +1,4 @@
-"""JSON and XML as they are sent: also what no JSON library would write."""
+"""Write JSON and XML, also texts that no library would write."""
 
 import json
 from collections.abc import Iterable
@@ -12,20 +12,20 @@ from conformance.documents.xml import elements
 
 @dataclass(frozen=True)
 class Token:
-    """A piece of JSON text that is written as it is: ``NaN``, ``1e400``, ``0x1``."""
+    """A piece of JSON text that is written verbatim: ``NaN``, ``1e400``, ``0x1``."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """An object as a list of its members, so that a name can stand in it twice."""
+    """An object as a list of (name, value) pairs, in which a name may occur twice."""
 
     members: tuple[tuple[str, Any], ...]
 
 
 def json_text(value: Any) -> str:
-    """Return a value as JSON; Token and Pairs may stand anywhere in it."""
+    """Return a value as JSON text; it may contain Token and Pairs."""
     if isinstance(value, Token):
         return value.text
     if isinstance(value, Pairs):
@@ -42,12 +42,12 @@ def _object(members: Iterable[tuple[str, Any]]) -> str:
 
 
 def xml_bytes(value: Any, root: str, like: etree._Element | None = None) -> bytes:
-    """Return a value as XML: a child per field, one child per array item.
+    """Return a value as XML: one child per member, one child per array item.
 
     Args:
-        value: JSON value; Pairs makes an element stand twice, Token's text is written as it is.
+        value: JSON value, which may contain Pairs for duplicate elements and Token for verbatim text.
         root: name of the root element.
-        like: an element that the robot sent for such a value: gives namespace and order of the fields.
+        like: an element from the robot with such a value, whose namespace and order are copied; or None.
     """
     namespace = etree.QName(like).namespace if like is not None else None
     element = etree.Element(etree.QName(namespace, root), nsmap={None: namespace} if namespace else None)  # type: ignore[dict-item] # lxml's own default prefix
@@ -71,7 +71,7 @@ def _fill(element: etree._Element, value: Any, like: etree._Element | None) -> N
 
 
 def text_of(value: Any) -> str:
-    """Return a single value as it stands in XML, a path or a query."""
+    """Return a scalar as text for XML, a path or a query."""
     if isinstance(value, Token):
         return value.text
     if isinstance(value, bool):

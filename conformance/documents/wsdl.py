@@ -1,7 +1,7 @@
-"""A WSDL with all it refers to: its names, its operations, and the types of their messages.
+"""Read a WSDL and the documents it refers to: names, operations, and the types of messages.
 
-Whatever the layout: schemas inline, by xsd:import with a relative or absolute location, several of them, or the whole
-description by wsdl:import, as JAX-WS RI writes it when interface and service are in different namespaces.
+Schemas may be inline or imported, by relative or absolute locations, and the description may be split by wsdl:import,
+as JAX-WS RI does if interface and service have different namespaces.
 """
 
 from collections.abc import Iterator
@@ -21,17 +21,17 @@ _ACTIONS: Final = tuple(clark(space, "Action") for space in (WSAM, WSAW, "http:/
 
 
 class DescriptionError(ValueError):
-    """A WSDL that describes no service; the message says what is missing."""
+    """Raised for a WSDL that describes no service; the message says what is missing."""
 
 
 @dataclass(frozen=True)
 class Operation:
-    """One operation.
+    """One operation of a WSDL.
 
     Attributes:
-        name: as in the port type.
-        request: tag of the element that asks for it, in Clark notation; None where the message names none.
-        response: tag of the element that answers; None for an operation without an answer.
+        name: name in the port type.
+        request: tag of the request's element in Clark notation; None if the message names none.
+        response: tag of the response's element; None for a one-way operation.
         input_action: wsam:Action of the input, or None; output_action: of the output.
         messages: local names of the input and output messages.
         parts: names of the parts of the input and the output message.
@@ -48,12 +48,12 @@ class Operation:
 
 @dataclass(frozen=True)
 class Description:
-    """One service as its WSDL tells it.
+    """One service as its WSDL describes it.
 
     Attributes:
-        definitions: the wsdl:definitions elements, the one that was asked for first.
+        definitions: the wsdl:definitions elements, that of the requested document first.
         schemas: all schema documents.
-        missing: documents that are referred to and could not be had, with the reason.
+        missing: referenced documents that could not be fetched, with the reason.
     """
 
     definitions: tuple[etree._Element, ...]
@@ -61,7 +61,7 @@ class Description:
     missing: tuple[tuple[str, str], ...] = ()
 
     def all(self, path: str) -> list[etree._Element]:
-        """Return elements of all definitions by an XPath in which ``w`` is WSDL and ``s`` its SOAP binding."""
+        """Return the elements of all definitions that match an XPath; prefix ``w`` is WSDL, ``s`` its SOAP binding."""
         spaces = {"w": WSDL, "s": WSDL_SOAP}
         found: list[etree._Element] = []
         for root in self.definitions:
@@ -71,7 +71,7 @@ class Description:
 
     @property
     def target_namespace(self) -> str:
-        """Of the definitions that hold the port type."""
+        """The target namespace of the definitions with the port type."""
         for element in self.all("w:portType"):
             parent = element.getparent()
             return (parent.get("targetNamespace") or "") if parent is not None else ""
@@ -79,10 +79,10 @@ class Description:
 
     @cached_property
     def binding(self) -> etree._Element:
-        """The binding to SOAP over HTTP that a port uses, else the first one that there is.
+        """The SOAP/HTTP binding that a port uses, otherwise the first binding.
 
         Raises:
-            DescriptionError: there is none.
+            DescriptionError: there is no binding.
         """
         bindings = {name(element): element for element in self.all("w:binding[s:binding]")}
         for port in self.all("w:service/w:port[s:address]"):
@@ -98,7 +98,7 @@ class Description:
         """The port type of the binding.
 
         Raises:
-            DescriptionError: there is none.
+            DescriptionError: there is no port type.
         """
         wanted = _local(self.binding.get("type"))
         for element in self.all("w:portType"):
@@ -131,7 +131,7 @@ class Description:
         return Types.compiled(self.schemas)
 
     def shape(self, tag: str) -> Element | None:
-        """Return the global element of that name; None where no schema has it.
+        """Return the global element with a tag, or None.
 
         Raises:
             SchemaError: the schemas do not compile.
@@ -139,7 +139,7 @@ class Description:
         return self.types.shape(tag)
 
     def message(self, reference: str | None) -> etree._Element | None:
-        """Return the wsdl:message that a QName refers to; prefixes are not looked at, names are unique in practice."""
+        """Return the wsdl:message of a QName, by its local name only, or None."""
         wanted = _local(reference)
         return next((element for element in self.all("w:message") if name(element) == wanted), None)
 
@@ -168,7 +168,7 @@ def name(element: etree._Element) -> str:
 
 
 def qname(element: etree._Element, written: str | None) -> str | None:
-    """Return a QName in an attribute of ``element``, in Clark notation; None without one, or with an unbound prefix."""
+    """Return a QName in an attribute in Clark notation; None if it is missing or its prefix is not declared."""
     if not written:
         return None
     prefix, _, local = written.strip().rpartition(":")
@@ -181,15 +181,15 @@ def _local(written: str | None) -> str:
 
 
 def describe(wsdl: bytes, location: str, fetch: Fetch) -> Description:
-    """Read a WSDL and what it refers to.
+    """Read a WSDL and the documents it refers to.
 
     Args:
         wsdl: the document.
-        location: where it came from; relative references start there.
-        fetch: obtains a further document by its resolved location.
+        location: its URL or file name, the base of relative references.
+        fetch: returns a further document by its resolved location.
 
     Raises:
-        DescriptionError: it is no WSDL.
+        DescriptionError: it is not a WSDL.
     """
     try:
         found: Collected = collect(wsdl, location, fetch)
@@ -202,7 +202,7 @@ def read_file(path: Path) -> Description:
     """Return the description in a file of the contract.
 
     Raises:
-        DescriptionError: it is no WSDL, or refers to files that are not there.
+        DescriptionError: it is not a WSDL, or refers to missing files.
     """
 
     def fetch(location: str) -> bytes:
@@ -215,7 +215,7 @@ def read_file(path: Path) -> Description:
 
 
 def faults(description: Description) -> Iterator[str]:
-    """Yield what keeps a description from being used: no binding, no port type, no operations, broken schemas."""
+    """Yield why a description cannot be used: no binding, no port type, no operations, invalid schemas."""
     try:
         if not description.operations:
             yield "a port type without operations"

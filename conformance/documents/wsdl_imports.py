@@ -1,4 +1,4 @@
-"""Follows a WSDL's references: wsdl:import, xsd:import and xsd:include, each document once."""
+"""Collect the documents of a WSDL by wsdl:import, xsd:import and xsd:include, each once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,12 +20,12 @@ _MOST: Final = 50
 
 @dataclass
 class Collected:
-    """What was found.
+    """The documents of a description.
 
     Attributes:
         definitions: wsdl:definitions elements.
         schemas: schema documents.
-        missing: reason by location.
+        missing: reasons why documents are missing, by location.
     """
 
     definitions: list[etree._Element] = field(default_factory=list)
@@ -34,10 +34,10 @@ class Collected:
 
 
 def collect(wsdl: bytes, location: str, fetch: Fetch) -> Collected:
-    """Find all documents of a description.
+    """Return all documents of a description.
 
     Raises:
-        ValueError: the first one is no WSDL; the message says why.
+        ValueError: the first one is not a WSDL; the message says why.
     """
     try:
         # WSDL 1.1 forbids no DOCTYPE: that one is there blames nobody, and nothing of it is read.
@@ -67,7 +67,7 @@ def collect(wsdl: bytes, location: str, fetch: Fetch) -> Collected:
 
 
 def _take(found: Collected, place: str, root: etree._Element) -> list[str]:
-    """Put a document where it belongs, and return the locations that it refers to."""
+    """Add a document, and return the locations that it refers to."""
     if root.tag == clark(WSDL, "definitions"):
         found.definitions.append(root)
         references = [element.get("location") for element in root.findall(clark(WSDL, "import"))]

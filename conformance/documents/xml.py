@@ -1,24 +1,24 @@
-"""The suite's one XML parser, and how text and children of an element are read.
+"""The suite's XML parser, and functions that read an element's text and children.
 
-What a robot sends is hostile input: no entity is expanded, no DTD loaded, nothing fetched, and libxml2's own limits on
-depth, names and texts stay on (``huge_tree``); how many octets come at all is bounded by the transport. A DOCTYPE is
-refused here, unless the caller judges it by itself.
+Documents from a robot are hostile input: entities are not expanded, DTDs not loaded, nothing is fetched, and libxml2's
+limits on depth, names and texts stay on (no ``huge_tree``). The transport limits the size. A DOCTYPE is rejected
+unless the caller asks for it.
 """
 
 from lxml import etree
 
 
 class NotXmlError(ValueError):
-    """Octets that are no XML document to be read; the message says why."""
+    """Raised for bytes that are not an acceptable XML document; the message says why."""
 
 
 def parse(document: bytes, *, doctype: bool = False, comments: bool = True) -> etree._Element:
-    """Return the root element of a document from outside.
+    """Return the root element of an untrusted document.
 
     Args:
-        document: octets.
-        doctype: whether a DOCTYPE is let be (unread) rather than refused.
-        comments: whether comments and processing instructions are kept; without them a text is in one piece.
+        document: bytes.
+        doctype: whether a DOCTYPE is accepted (and ignored) instead of rejected.
+        comments: whether comments and processing instructions are kept; without them, text is not split.
 
     Raises:
         NotXmlError: it is not well-formed, or has a DOCTYPE.
@@ -52,7 +52,7 @@ def elements(parent: etree._Element) -> list[etree._Element]:
 
 
 def text_of(element: etree._Element) -> str:
-    """Return the character data right inside an element, across comments and CDATA sections."""
+    """Return the text directly inside an element, across comments and CDATA sections."""
     parts = [element.text or ""]
     parts += [child.tail or "" for child in element]
     return "".join(parts)

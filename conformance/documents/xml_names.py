@@ -1,4 +1,4 @@
-"""Namespaces and qualified names, in Clark notation where they name elements or attributes."""
+"""XML namespaces, and qualified names in Clark notation (``{namespace}name``)."""
 
 from typing import Final
 

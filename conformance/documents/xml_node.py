@@ -1,4 +1,4 @@
-"""XML as a frozen value: what strategies draw, mutations change, and findings show."""
+"""XML elements as immutable values, for Hypothesis strategies, mutations and findings."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _USUAL: Final = {ENVELOPE: "soap", XSI: "xsi", ADDRESSING: "wsa"}
 
 @dataclass(frozen=True)
 class Node:
-    """An element.
+    """An immutable XML element.
 
     Attributes:
         tag: name in Clark notation.
-        text: character data before the first child.
-        children: element children, in order.
-        attributes: pairs of name in Clark notation and value.
+        text: text before the first child.
+        children: child elements, in order.
+        attributes: (name in Clark notation, value) pairs.
     """
 
     tag: str
@@ -29,11 +29,11 @@ class Node:
 
     @property
     def name(self) -> str:
-        """Local name."""
+        """The local name."""
         return local(self.tag)
 
     def path_to(self, name: str) -> tuple[int, ...]:
-        """Return the path of the first descendant of a local name.
+        """Return the path (child indexes) of the first descendant with a local name.
 
         Raises:
             StopIteration: there is none.
@@ -41,15 +41,15 @@ class Node:
         return next(path for path in self.paths() if self.at(path).name == name)
 
     def at(self, path: tuple[int, ...]) -> Node:
-        """Return the descendant at a path of child positions."""
+        """Return the descendant at a path of child indexes."""
         return self.children[path[0]].at(path[1:]) if path else self
 
     def replaced(self, path: tuple[int, ...], *new: Node) -> Node:
-        """Return a copy in which others stand for the descendant at ``path``: none, one or more.
+        """Return a copy in which the descendant at ``path`` is replaced by zero or more nodes.
 
         Args:
-            path: of child positions; empty for the node itself, which one other can stand for.
-            new: what stands there.
+            path: child indexes; empty for the node itself, which must be replaced by exactly one.
+            new: the replacement.
         """
         if not path:
             (whole,) = new
@@ -59,7 +59,7 @@ class Node:
         return replace(self, children=(*self.children[:index], *inside, *self.children[index + 1 :]))
 
     def paths(self) -> list[tuple[int, ...]]:
-        """Return the paths of all descendants, parents before their children."""
+        """Return the paths of all descendants, parents before children."""
         found: list[tuple[int, ...]] = []
         for index, child in enumerate(self.children):
             found.append((index,))
@@ -67,7 +67,7 @@ class Node:
         return found
 
     def written(self) -> bytes:
-        """Return the document in plain UTF-8, each namespace bound to a prefix at the root."""
+        """Return the document in UTF-8, with all namespaces declared at the root."""
         spaces = sorted(_namespaces(self))
         # The usual prefixes where there are any: findings are read by people.
         prefixes = {space: _USUAL.get(space, f"n{number}") for number, space in enumerate(spaces)}

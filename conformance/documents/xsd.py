@@ -1,6 +1,6 @@
-"""XML Schemas from several documents, compiled twice: by libxml2 and by xmlschema.
+"""XML Schemas from several documents, compiled by both libxml2 and xmlschema.
 
-A verdict on a message holds only where both agree, so that an error in one of them blames no robot.
+A message counts as valid or invalid only if both agree, so that a bug in one of them blames no robot.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SHOWN: Final = 300
 
 
 class SchemaError(ValueError):
-    """Schema documents that do not compile; the message is the compiler's."""
+    """Raised for schemas that do not compile; the message is the compiler's."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class SchemaDocument:
     """One xs:schema.
 
     Attributes:
-        location: URL or file name that it came from; inline ones have that of the WSDL with a fragment.
+        location: its URL or file name; for an inline schema, that of the WSDL with a fragment.
         root: the xs:schema element.
-        inline: whether it stands inside wsdl:types.
+        inline: whether it is inside wsdl:types.
     """
 
     location: str
@@ -43,18 +43,18 @@ class SchemaDocument:
 
     @property
     def namespace(self) -> str:
-        """Its targetNamespace; empty without one."""
+        """The targetNamespace; empty without one."""
         return self.root.get("targetNamespace") or ""
 
 
 class Types:
-    """The compiled schemas.
+    """Compiled schemas.
 
     Args:
-        documents: all schema documents; their own schemaLocation are not looked at any more.
+        documents: all schema documents; their schemaLocation attributes are ignored.
 
     Raises:
-        SchemaError: neither compiler takes them.
+        SchemaError: neither compiler accepts them.
     """
 
     def __init__(self, documents: Sequence[SchemaDocument]) -> None:
@@ -81,10 +81,10 @@ class Types:
 
     @classmethod
     def compiled(cls, documents: Sequence[SchemaDocument]) -> Types:
-        """Return the compiled schemas of some documents, once compiled in a process: that takes a tenth of a second.
+        """Return the compiled schemas, cached per process, because compiling takes 0.1 s.
 
         Raises:
-            SchemaError: neither compiler takes them.
+            SchemaError: neither compiler accepts them.
         """
         key = tuple(etree.tostring(document.root) for document in documents)
         if key not in _COMPILED:
@@ -92,21 +92,21 @@ class Types:
         return _COMPILED[key]
 
     def shape(self, tag: str) -> Element | None:
-        """Return the global element of that name, or None where the schemas have none."""
+        """Return the global element with a tag, or None."""
         if tag not in self._shapes:
             declared = self.python.maps.elements.get(tag)
             self._shapes[tag] = None if declared is None else shape(declared)
         return self._shapes[tag]
 
     def libxml_problem(self, element: etree._Element) -> str:
-        """Return why libxml2 finds the element invalid; empty where it finds it valid, or does not know the schema."""
+        """Return why libxml2 finds an element invalid; empty if it is valid or libxml2 rejected the schemas."""
         if self.libxml is None or self.libxml.validate(element):
             return ""
         log: Any = self.libxml.error_log
         return str(log[0].message) if len(log) else "invalid"
 
     def python_problem(self, element: etree._Element) -> str:
-        """Return why xmlschema finds the element invalid; empty where it finds it valid."""
+        """Return why an element is invalid according to xmlschema; empty if it is valid."""
         # A copy, because what stands around the element is none of the schema's business; without comments, because
         # xmlschema takes a value to end at the first one.
         alone = copy.deepcopy(element)
@@ -118,7 +118,7 @@ class Types:
         return "" if error is None else str(getattr(error, "reason", "") or "invalid")
 
     def invalid(self, element: etree._Element) -> str:
-        """Return why both find the element invalid; empty where one of them finds it valid."""
+        """Return why an element is invalid according to both; empty if either finds it valid."""
         first = self.libxml_problem(element)
         if self.libxml is not None and not first:
             return ""
@@ -134,9 +134,9 @@ _COMPILED: Final[dict[tuple[bytes, ...], Types]] = {}
 
 
 def _assemble(documents: Sequence[SchemaDocument], folder: Path) -> Path:
-    """Write the documents down so that each finds the others, and an entry that reaches all; return the entry.
+    """Write the documents into a folder with an entry document that imports them all; return its path.
 
-    libxml2 loads one document for each imported namespace. So each namespace gets one that includes all its documents.
+    libxml2 loads one document per imported namespace, so each namespace gets one that includes all its documents.
     """
     spaces = sorted({document.namespace for document in documents if not _only_imports(document)})
     collected = {space: f"namespace{number}.xsd" for number, space in enumerate(spaces)}
@@ -154,7 +154,7 @@ def _assemble(documents: Sequence[SchemaDocument], folder: Path) -> Path:
 
 
 def _relocated(schema: etree._Element, collected: dict[str, str]) -> bytes:
-    """Return a document whose imports point at the collected files, and whose includes are left to those."""
+    """Return a schema document whose imports refer to the written files, without includes."""
     root = copy.deepcopy(schema)
     for reference in [*root.iter(_IMPORT), *root.iter(_INCLUDE)]:
         space = reference.get("namespace") or ""
@@ -177,7 +177,7 @@ def _schema_of(space: str, *, includes: Sequence[str], imports: Mapping[str, str
 
 
 def _only_imports(document: SchemaDocument) -> bool:
-    """Return whether a document is nothing but a list of imports, as WSDL tools write them into wsdl:types (R2105)."""
+    """Return whether a schema document consists of imports only, as WSDL tools write it into wsdl:types (R2105)."""
     return not document.namespace and all(
         child.tag == _IMPORT for child in document.root if isinstance(child.tag, str) and "annotation" not in child.tag
     )

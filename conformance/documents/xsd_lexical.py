@@ -1,7 +1,7 @@
-"""How values of XML Schema's simple types are written: valid forms over the whole range, and forms that are none.
+"""Texts of XML Schema's simple types: valid ones over the whole range, and invalid ones.
 
-After XML Schema 1.0 Part 2 (the clause is named at each type). White space around a value is no part of it, where the
-type's whiteSpace is collapse (4.3.6), which it is for all but strings.
+Source: XML Schema 1.0 Part 2; each type names its clause. White space around a value is ignored for all types but
+string (4.3.6).
 """
 
 from decimal import Decimal
@@ -62,14 +62,14 @@ NON_FINITE: Final = ("INF", "-INF", "NaN")
 
 
 def bounds(simple: Simple) -> tuple[int, int]:
-    """Return the smallest and greatest value of an integer type; where it has no bound, the widest that are tried."""
+    """Return minimum and maximum of an integer type; without a bound, the largest values that are tried."""
     low = int(simple.minimum.to_integral_value()) if simple.minimum is not None else -_WIDEST
     high = int(simple.maximum.to_integral_value()) if simple.maximum is not None else max(low, 0) + _WIDEST
     return min(low, high), max(low, high)
 
 
 def outside(simple: Simple) -> tuple[str, ...]:
-    """Return integers that the type does not hold, as text."""
+    """Return texts of integers outside the type's range."""
     if simple.builtin not in INTEGERS:
         return ()
     found: list[int] = []
@@ -87,7 +87,7 @@ def _is_outside(value: int, simple: Simple) -> bool:
 
 
 def unreadable(simple: Simple) -> tuple[str, ...]:
-    """Return texts that are no value of the type; none where readers disagree."""
+    """Return texts that are invalid for the type; empty for types on which parsers disagree."""
     if simple.enumeration:
         return ("no-such-value", "")
     if simple.builtin in INTEGERS:
@@ -98,7 +98,7 @@ def unreadable(simple: Simple) -> tuple[str, ...]:
 
 
 def plain(simple: Simple) -> str:
-    """Return an ordinary value of the type, as text."""
+    """Return the text of an ordinary value of the type."""
     if simple.enumeration:
         return simple.enumeration[0]
     if simple.builtin in INTEGERS:

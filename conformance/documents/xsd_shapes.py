@@ -1,4 +1,4 @@
-"""What a schema allows, as frozen values that strategies, mutations and comparisons walk."""
+"""The content that an XML Schema allows, as immutable values."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Simple:
     """A simple type.
 
     Attributes:
-        builtin: local name of the type of XML Schema Part 2 that it comes from.
-        enumeration: the values it is limited to, as written; empty: not limited.
-        minimum: smallest value; maximum: greatest; None: those of the builtin.
+        builtin: local name of the built-in type (XML Schema Part 2) that it is derived from.
+        enumeration: allowed values, as written; empty: any.
+        minimum: smallest value; maximum: greatest; None: those of the built-in type.
         min_length: in characters; max_length: likewise.
-        patterns: regular expressions of XML Schema that a value must match.
+        patterns: regular expressions (XML Schema) that a value must match.
     """
 
     builtin: str
@@ -36,12 +36,12 @@ class Simple:
 
 @dataclass(frozen=True)
 class Group:
-    """Children.
+    """A group of child elements.
 
     Attributes:
         model: sequence, choice or all.
         items: the particles.
-        minimum: how often the group stands at least; maximum: at most (None: without bound).
+        minimum: minOccurs; maximum: maxOccurs (None: unbounded).
     """
 
     model: str
@@ -50,7 +50,7 @@ class Group:
     maximum: int | None = 1
 
     def elements(self) -> Iterator[Element]:
-        """Yield the elements of this group and of those in it."""
+        """Yield the elements of this group and of nested groups."""
         for item in self.items:
             yield from (item,) if isinstance(item, Element) else item.elements()
 
@@ -60,10 +60,10 @@ class Complex:
     """A complex type.
 
     Attributes:
-        content: the children, or None.
-        text: the type of its text, where it has simple content.
-        attributes: name in Clark notation, type and whether it is required, for each.
-        wildcard: whether it takes children or attributes that the schema does not name.
+        content: the child elements, or None.
+        text: the type of its text, if it has simple content.
+        attributes: (name in Clark notation, type, required) for each.
+        wildcard: whether it allows elements or attributes that the schema does not name.
     """
 
     content: Group | None = None
@@ -77,9 +77,9 @@ class Element:
     """An element declaration.
 
     Attributes:
-        tag: as it stands in a message, in Clark notation: form and elementFormDefault are in it.
-        type: of its content.
-        minimum: how often it stands at least; maximum: at most (None: without bound).
+        tag: name in messages, in Clark notation, after form and elementFormDefault are applied.
+        type: type of its content.
+        minimum: minOccurs; maximum: maxOccurs (None: unbounded).
         nillable: whether xsi:nil is allowed.
     """
 
@@ -91,14 +91,14 @@ class Element:
 
     @property
     def children(self) -> tuple[Element, ...]:
-        """The element particles right inside, groups flattened."""
+        """The child element declarations, with groups flattened."""
         if isinstance(self.type, Simple) or self.type.content is None:
             return ()
         return tuple(self.type.content.elements())
 
 
 def shape(declared: Any, depth: int = 0) -> Element:
-    """Return what an element declaration of xmlschema allows; ``depth`` is how many elements it is in already."""
+    """Return the content that an xmlschema element declaration allows; ``depth`` is its nesting depth."""
     space, _, name = str(declared.name).rpartition("}")
     tag = str(declared.name) if space else name
     return Element(
@@ -156,7 +156,7 @@ def _written(value: object) -> str:
 
 
 def _decimal(value: object) -> Decimal | None:
-    """Return a bound as a number; one of a type that is no number (a date) is not known here."""
+    """Return a bound as a number, or None for types that are not numbers, such as dates."""
     if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
         return None
     bound = Decimal(value) if not isinstance(value, float) else Decimal(repr(value))

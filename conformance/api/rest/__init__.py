@@ -1,1 +1,1 @@
-"""What is generic over HTTP: operations and their targets come from the contract's OpenAPI, never from code."""
+"""The REST interface of any web API. Operations and their targets come from the contract's OpenAPI description."""

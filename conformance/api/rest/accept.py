@@ -1,4 +1,4 @@
-"""The Accept field as RFC 9110 12.5.1 means it: which media type a client would rather have."""
+"""The Accept header (RFC 9110 12.5.1)."""
 
 import re
 from functools import lru_cache
@@ -8,13 +8,13 @@ _QUALITY = re.compile(r"0(?:\.\d{0,3})?|1(?:\.0{0,3})?", re.ASCII)
 
 @lru_cache(maxsize=512)
 def quality(media_type: str, accept: str | None) -> float:
-    """Return the quality value of a media type, by the most specific range that matches; 0 where none does.
+    """Return the quality value of a media type by the most specific matching range; 0 if no range matches.
 
-    A range with parameters counts as matching the type without them: whether it does is the server's choice.
+    A range with parameters also matches the type without them, since the server may choose.
 
     Args:
         media_type: in lower case, without parameters.
-        accept: the field's value; None or empty where there is no such field, which accepts anything.
+        accept: value of the header; None or empty accepts everything.
     """
     if accept is None or not accept.strip():
         return 1.0
@@ -38,6 +38,6 @@ def _weight(parameters: list[str]) -> float:
 
 
 def accept_of(headers: tuple[tuple[str, str], ...]) -> str | None:
-    """Return the Accept field of a request, several lines as one; None where there is none."""
+    """Return the Accept header of a request, several lines joined; None without one."""
     values = [value for name, value in headers if name.lower() == "accept"]
     return ", ".join(values) if values else None

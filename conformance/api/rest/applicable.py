@@ -1,4 +1,4 @@
-"""The operations of the contract that a check can be tried on, with this robot and the run's permission."""
+"""The operations of the contract that a check can use with this robot and the run's permissions."""
 
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
@@ -13,19 +13,20 @@ NO_MOTION = "it moves the robot, and --allow-motion was not given"
 
 
 def reads(api: RestInterface) -> list[Call]:
-    """Return a valid request for each operation that only reads, the optional ones last; see readable()."""
+    """Return a valid request for each read-only operation, the optional ones last; see readable()."""
     found = [item for item in operations_of(api.run.contract) if item.method == "GET" and allowed(api, item)]
     return [readable(api, item) for item in sorted(found, key=lambda item: item.optional)]
 
 
 def readable(api: RestInterface, operation: Operation) -> Call:
-    """Return a request for an operation that reads, with values that this robot accepts if any.
+    """Return a request for a read-only operation, with parameters that this robot accepts if possible.
 
-    Where the contract's example makes no sense to this robot (a place outside its map), small numbers do. The first
-    call for an operation finds them: it sends up to four requests.
+    If the robot rejects the description's example (a place outside its map), small numbers are tried. The first call
+    for
+    an operation sends up to four requests.
 
     Raises:
-        HarnessError: what was made is not valid by the contract.
+        HarnessError: the generated request is invalid by the contract.
     """
     call = example_call(api, operation)
     numbers = [item.name for item in operation.parameter("query") if kind_of(item.schema) in {"number", "integer"}]
@@ -48,9 +49,9 @@ def _with(call: Call, names: list[str], text: str) -> Call:
 
 
 def answered(api: RestInterface, *ids: str) -> list[Call]:
-    """Send each of reads(), and return those that get 200 now: a robot may lack an extension, or have no goal.
+    """Send each of reads(), and return those with status 200: a robot may lack an extension, or have no goal.
 
-    Where none does, note it at the requirements.
+    If there are none, add a note to the requirements.
     """
     found = [call for call in reads(api) if call.send(api).response.status == HTTPStatus.OK]
     for id_ in ids if not found else ():
@@ -64,15 +65,15 @@ def allowed(api: RestInterface, operation: Operation) -> bool:
 
 
 def usable_operations(api: RestInterface, wanted: Callable[[Operation], bool]) -> list[Operation]:
-    """Return the operations of a kind that may be sent; a few of them with a slow robot."""
+    """Return the operations that ``wanted`` selects and this run may send; for a slow robot, a few of them."""
     usable = [item for item in operations_of(api.run.contract) if wanted(item) and allowed(api, item)]
     return api.run.effort.subsample(usable, 2)
 
 
 def record_unusable(api: RestInterface, ids: Sequence[str], wanted: Callable[[Operation], bool], what: str) -> None:
-    """Record why requirements cannot be judged, if no operation of a kind may be sent.
+    """Record why requirements cannot be judged if this run may not send any of the operations.
 
-    Where the contract has no such operation, they do not apply; where the run has no permission, they are skipped.
+    Without such operations in the contract, the requirements do not apply; without permission, they are not tested.
     """
     found = [item for item in operations_of(api.run.contract) if wanted(item)]
     for id_ in ids if not any(allowed(api, item) for item in found) else ():
@@ -85,12 +86,12 @@ def record_unusable(api: RestInterface, ids: Sequence[str], wanted: Callable[[Op
 def applicable_operations(
     api: RestInterface, ids: Sequence[str], wanted: Callable[[Operation], bool], what: str
 ) -> list[Operation]:
-    """Return the operations that a check is about, after recording why there is none of them.
+    """Return the operations that a check uses, after recording why there are none.
 
     Args:
         api: the robot's REST interface.
         ids: the requirements that only these operations can show.
-        wanted: picks the operations.
+        wanted: selects the operations.
         what: describes them: "takes JSON".
     """
     record_unusable(api, ids, wanted, what)

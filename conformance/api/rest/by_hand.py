@@ -1,6 +1,6 @@
-"""Valid requests over a plain socket: each is read back from its octets before it is sent.
+"""Valid requests over a raw socket, verified by h11 before they are sent.
 
-h11 stands for the robot's server: octets that it does not read as valid requests are never sent as such.
+h11 plays the server: bytes that it does not parse as valid requests are never sent as such.
 """
 
 from collections.abc import Iterator
@@ -17,41 +17,41 @@ from conformance.verdict.evidence import HarnessError
 
 
 def ask(api: RestInterface, method: str, path: str, *fields: str, body: bytes = b"", **how: Any) -> Attempt:
-    """Send one valid request over a socket of its own, and return what became of it.
+    """Send one valid request over a new raw socket and return the result.
 
     Args:
         api: the robot's REST interface.
-        method: as on the wire.
-        path: below the base URL.
-        fields: whole lines, without line ends.
-        body: as on the wire, in chunks if the fields say so.
-        how: deadline and pauses, as raw.talk() has them.
+        method: HTTP method.
+        path: request target below the base URL.
+        fields: whole header lines, without line ends.
+        body: body as on the wire, in chunks if the headers say so.
+        how: deadline and pauses, as for raw.talk().
 
     Raises:
-        HarnessError: the request is not valid by the contract.
-        NoAnswerError: no connection could be opened.
+        HarnessError: the request is invalid by the contract.
+        NoAnswerError: the connection cannot be opened.
     """
     return ask_octets(api, raw.head(api.client, method, path, *fields) + body, method, **how)
 
 
 def ask_octets(api: RestInterface, octets: bytes, method: str = "GET", **how: Any) -> Attempt:
-    """Send the octets of one valid request, and return what became of it; as ask()."""
+    """Send the bytes of one valid request and return the result, as ask() does."""
     return raw.read_one(api.client, octets, talk(api, octets, answers=1, **how), method)[0]
 
 
 def talk(api: RestInterface, octets: bytes, *, answers: int = 0, refused: bool = False, **how: Any) -> raw.RawAnswer:
-    """Send octets that hold valid requests, and return what comes; as raw.talk().
+    """Send bytes of valid requests and return what was received, as raw.talk() does.
 
     Args:
         api: the robot's REST interface.
-        octets: what to send.
-        answers: stop after so many complete responses to GET.
-        refused: whether the requests may break the contract; they are complete all the same.
-        how: deadline and pauses, as raw.talk() has them.
+        octets: the bytes.
+        answers: stop after this number of complete responses to GET.
+        refused: whether the requests may be invalid by the contract; they must be complete.
+        how: deadline and pauses, as for raw.talk().
 
     Raises:
-        HarnessError: they do not.
-        NoAnswerError: there is no connection.
+        HarnessError: the bytes are not such requests.
+        NoAnswerError: the connection cannot be opened.
     """
     for request, body in _requests(octets):
         method, target = request.method.decode(), request.target.decode()
@@ -67,10 +67,10 @@ def talk(api: RestInterface, octets: bytes, *, answers: int = 0, refused: bool =
 
 
 def _requests(octets: bytes) -> Iterator[tuple[h11.Request, bytes]]:
-    """Yield each request in some octets, with its content.
+    """Yield each request in the bytes with its body.
 
     Raises:
-        HarnessError: they are no requests, or not whole.
+        HarnessError: the bytes are not complete requests.
     """
     while octets:
         server = h11.Connection(h11.SERVER)

@@ -1,4 +1,4 @@
-"""Requests made from the contract's own examples, made fit for the robot at hand."""
+"""Requests made from the contract's examples and adapted to the robot."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Call:
     """One request for an operation.
 
     Attributes:
-        operation: which.
-        values: texts of path and query parameters, by name, before they are percent-encoded.
-        media_type: of the body; empty where there is none.
-        body: octets.
-        value: what the body holds, or None.
+        operation: the operation.
+        values: texts of path and query parameters by name, not percent-encoded.
+        media_type: of the body; empty without one.
+        body: bytes.
+        value: the value in the body, or None.
     """
 
     operation: Operation
@@ -43,7 +43,7 @@ class Call:
 
     @property
     def path(self) -> str:
-        """The target below the base URL, with its query."""
+        """The request target below the base URL, with its query."""
         path = self.operation.template
         for item in self.operation.parameter("path"):
             path = path.replace(f"{{{item.name}}}", quote(self.values.get(item.name, ""), safe=""))
@@ -55,19 +55,19 @@ class Call:
         return f"{path}?{query}" if query else path
 
     def having(self, name: str, text: str | None) -> Call:
-        """Return the same request with another text for a parameter, or without the parameter."""
+        """Return the request with another text for a parameter, or without the parameter."""
         values = {key: item for key, item in self.values.items() if key != name}
         return replace(self, values=values if text is None else {**values, name: text})
 
     def carrying(self, body: bytes) -> Call:
-        """Return the same request with another body, valid or not."""
+        """Return the request with another body, valid or not."""
         return replace(self, body=body)
 
     def rewritten(self, api: RestInterface, body: bytes) -> Call:
-        """Return the same request with another valid body.
+        """Return the request with another valid body.
 
         Raises:
-            HarnessError: it is not valid by the contract.
+            HarnessError: the body is invalid by the contract.
         """
         require_valid(api.run.contract, self.operation.method, self.path, self.media_type, body)
         return replace(self, body=body)
@@ -75,10 +75,10 @@ class Call:
     def send(
         self, api: RestInterface, *headers: tuple[str, str], method: str | None = None, fresh: bool = False
     ) -> Exchange:
-        """Send the request; send a read again, a few times in a run, that the robot puts off for a moment.
+        """Send the request. A read that the robot defers by Retry-After is repeated, a few times per run.
 
         Raises:
-            NoAnswerError: no HTTP response came.
+            NoAnswerError: no HTTP response was received.
         """
         fields = list(headers)
         names = {name.lower() for name, _ in fields}
@@ -96,24 +96,24 @@ class Call:
 
 
 def _put_off(exchange: Exchange) -> int | None:
-    """Return the seconds of Retry-After (RFC 9110 10.2.3), where they are few; else None."""
+    """Return the seconds of Retry-After (RFC 9110 10.2.3) if they are few, otherwise None."""
     after = exchange.response.header("retry-after") or ""
     put_off = exchange.response.status == HTTPStatus.SERVICE_UNAVAILABLE and after.isdecimal() and after.isascii()
     return int(after) if put_off and len(after) == 1 and int(after) <= _MOMENT_S else None
 
 
 def example_call(api: RestInterface, operation: Operation, media_type: str = JSON) -> Call:
-    """Return a valid request for an operation, by the contract's examples.
+    """Return a valid request for an operation, made from the contract's examples.
 
-    Optional query parameters are given where the contract has an example for them.
+    Optional query parameters are included if the contract has an example of them.
 
     Args:
         api: the robot's REST interface.
-        operation: which.
-        media_type: of the body, where the operation takes one.
+        operation: the operation.
+        media_type: of the body, if the operation has one.
 
     Raises:
-        HarnessError: what was made is not valid by the contract.
+        HarnessError: the generated request is invalid by the contract.
     """
     call = _example(api, operation, media_type)
     require_valid(api.run.contract, operation.method, call.path, call.media_type, call.body)
@@ -141,12 +141,12 @@ def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
 
 
 def root_name(schema: Schema) -> str:
-    """Return the name that a schema gives its XML element; empty where it gives none."""
+    """Return the name of a schema's XML element; empty without one."""
     return str(schema.get("xml", {}).get("name", ""))
 
 
 def minimal(schema: Schema, depth: int = 0) -> Any:
-    """Return a small value that a schema allows (patterns aside)."""
+    """Return a small value that a schema allows, except for patterns."""
     schema = flat(_without_null(schema))
     given = [schema[key] for key in ("example", "const", "default") if key in schema]
     given += [schema[key][0] for key in ("examples", "enum") if schema.get(key)]
@@ -171,5 +171,5 @@ def _without_null(schema: Schema) -> Schema:
 
 
 def _fitted(api: RestInterface, operation: Operation, value: Any) -> Any:
-    """Return a value made fit for this robot: within its limits, near where it is."""
+    """Return a value adapted to this robot: within its limits, near its position."""
     return api.device.fit(api, operation.id, value)

@@ -1,4 +1,4 @@
-"""Whether a response is one that the contract declares for its operation: status, media type, shape, Vary."""
+"""Judge whether the contract declares a response for its operation: status, media type, schema, Vary."""
 
 from http import HTTPStatus
 
@@ -19,7 +19,7 @@ _OK, _NO_CONTENT, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 
 
 
 def judge(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:
-    """Judge one response to a request that is for an operation of the contract."""
+    """Judge one response to a request for an operation of the contract."""
     operation = context.operation
     if operation is None:
         return

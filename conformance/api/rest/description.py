@@ -1,4 +1,4 @@
-"""What of the contract a robot's own descriptions of its REST interface lack."""
+"""Compare a robot's own REST descriptions (OpenAPI, WADL) with the contract."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from conformance.documents.wadl import read_wadl
 
 @dataclass(frozen=True)
 class Described:
-    """One operation of a description.
+    """One operation of a robot's description.
 
     Attributes:
-        operation: as it is described.
-        path: below the base URL that the run knows; the operation's own path may have a prefix more or less.
+        operation: the operation as described.
+        path: path below the base URL of the run; the description's own path may have another prefix.
     """
 
     operation: Operation
@@ -24,12 +24,12 @@ class Described:
 
     @property
     def address(self) -> tuple[str, str]:
-        """Its method, and its path without the names of its parameters."""
+        """Method, and path without the names of parameters."""
         return self.operation.method, PARAMETER.sub("{}", self.path)
 
 
 def described_by_openapi(document: Any, base_url: str) -> list[Described]:
-    """Return the operations of a robot's OpenAPI description; of a broken one, none."""
+    """Return the operations of a robot's OpenAPI description; empty if it is malformed."""
     if not isinstance(document, dict):
         return []
     try:
@@ -47,7 +47,7 @@ def described_by_wadl(body: bytes, base_url: str) -> list[Described]:
     """Return the operations of a robot's WADL.
 
     Raises:
-        UnreadableError: it is no XML, or its root is no WADL application.
+        UnreadableError: it is not XML, or its root is not a WADL application.
     """
     return [Described(item, _below(item.template, base_url)) for item in read_wadl(body)]
 
@@ -59,7 +59,7 @@ def _below(path: str, base_url: str) -> str:
 
 
 def differences(wanted: Iterable[Operation], found: Iterable[Described]) -> list[str]:
-    """Return what a description lacks of the contract, in words."""
+    """Return, in words, the operations and parameters of the contract that a description lacks."""
     by_address: dict[tuple[str, str], list[Operation]] = {}
     for item in found:
         by_address.setdefault(item.address, []).append(item.operation)

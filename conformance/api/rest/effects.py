@@ -1,4 +1,4 @@
-"""Whether GET shows what was put."""
+"""Check whether GET returns the value that PUT sent."""
 
 import math
 import time
@@ -15,7 +15,7 @@ _PAUSE_S = 0.01
 
 
 def reader_of(api: RestInterface, call: Call) -> Call | None:
-    """Return the GET of the resource that a PUT is for, with the same values in its path."""
+    """Return the GET request of the resource that a PUT request writes, or None."""
     for operation in operations_of(api.run.contract):
         if operation.method == "GET" and operation.template == call.operation.template:
             read = example_call(api, operation)
@@ -24,11 +24,12 @@ def reader_of(api: RestInterface, call: Call) -> Call | None:
 
 
 def settles_at(api: RestInterface, call: Call) -> str | None:
-    """Wait until GET shows what was put.
+    """Wait until GET returns the value that PUT sent.
 
     Returns:
-        Empty when it does; what GET shows instead when the settle time is over (a quarter more than declared, and half
-        a second for a loaded machine); None where nothing can be compared.
+        Empty if it does; what GET returns instead after the settle time (plus 25 % and 0.5 s for a loaded machine);
+        None
+        if the values cannot be compared.
     """
     read = reader_of(api, call)
     if read is None or not isinstance(call.value, dict):

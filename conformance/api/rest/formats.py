@@ -1,4 +1,4 @@
-"""One state in several formats: read each, and compare value by value."""
+"""Read one state in several formats, and compare the values."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ class Disagreement:
     """One value that differs between two formats.
 
     Attributes:
-        place: which.
-        description: the value in each of them.
-        exchange: the response that disagrees with JSON.
+        place: path of the value.
+        description: the value in both formats.
+        exchange: the exchange whose response differs from JSON.
     """
 
     place: str
@@ -38,13 +38,13 @@ Found = dict[tuple[str, str], Disagreement]
 def disagreements(
     api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
 ) -> tuple[list[Disagreement], Exchange]:
-    """Read a resource as JSON, in the other formats, and as JSON again, until all agree.
+    """Read a resource as JSON, in the other formats, and as JSON again, repeatedly until all agree.
 
-    Only values that are equal in both JSON responses are compared, so that a value that changes between two reads is
-    no failure; a value that differs in every turn, at the same place, is a disagreement.
+    Only values that are equal in both JSON responses are compared, as others change by themselves. A disagreement is a
+    value that differs at the same place every time.
 
     Returns:
-        The values that disagree in every turn; and the last JSON exchange.
+        The disagreements, and the last JSON exchange.
     """
     suspects: Found | None = None
     for _ in range(_TURNS):
@@ -57,10 +57,11 @@ def disagreements(
 
 
 def one_turn(api: RestInterface, call: Call, media_types: list[str]) -> tuple[Found, Exchange]:
-    """Read a resource as JSON, in the other formats, and as JSON again, once.
+    """Read a resource once as JSON, in the other formats, and as JSON again.
 
     Returns:
-        What disagrees, by format and place (nothing where JSON cannot be read, which others judge); and the last JSON
+        The disagreements by format and place (empty if the JSON is invalid, which other checks report), and the last
+        JSON
         exchange.
     """
     schema = call.operation.shape or {}
@@ -81,13 +82,13 @@ def one_turn(api: RestInterface, call: Call, media_types: list[str]) -> tuple[Fo
 def judge_same_values(
     api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
 ) -> Exchange:
-    """Judge that the formats of a resource agree, where it can be read; return the last JSON exchange.
+    """Judge whether the formats of a resource agree; return the last JSON exchange.
 
     Args:
         api: the robot's REST interface.
         call: reads the resource.
-        media_types: other than JSON.
-        renew: what keeps the state as it is, before each turn.
+        media_types: the formats other than JSON.
+        renew: called before each comparison to keep the state constant.
     """
     found, exchange = disagreements(api, call, media_types, renew)
     if exchange.response.ok:
@@ -96,7 +97,7 @@ def judge_same_values(
 
 
 def judge_disagreement(api: RestInterface, call: Call, found: Disagreement | None, exchange: Exchange) -> None:
-    """Judge that the formats of a resource agree."""
+    """Record whether the formats of a resource agree."""
     expect(api.run.judge, "rest-formats/same-values", found.exchange if found else exchange).that(
         found is None,
         f"the same values in all formats of {call.operation.template}",

@@ -1,7 +1,7 @@
-"""Schemathesis as a maker of requests: its cases go through the suite's own client and are judged by the suite.
+"""Generate requests with Schemathesis. They are sent by the suite's client and judged by the suite.
 
-Its own checks take 5xx for a refusal, and call data negative that is valid once it is on the wire; so what it makes
-is read back from the wire (validity.py) and judged by that.
+Schemathesis's own checks accept 5xx as a refusal and may consider data invalid that is valid once serialised. So each
+request is parsed from its bytes (validity.py) and judged by that.
 """
 
 import warnings
@@ -29,12 +29,12 @@ _BASE = "http://robot.invalid"
 
 @dataclass(frozen=True)
 class Target:
-    """One operation, as Schemathesis has it.
+    """One operation, as Schemathesis represents it.
 
     Attributes:
         label: method and path.
-        operation: Schemathesis's own.
-        schema: of the whole contract.
+        operation: the Schemathesis object.
+        schema: the Schemathesis schema of the contract.
     """
 
     label: str
@@ -43,7 +43,7 @@ class Target:
 
     @property
     def has_input(self) -> bool:
-        """Whether there is anything in its requests to vary."""
+        """Whether its requests have parameters or a body."""
         return any(True for _ in self.operation.iter_parameters()) or bool(list(self.operation.body))
 
     def examples(self) -> Iterator[GeneratedRequest]:
@@ -67,16 +67,19 @@ class Target:
         yield from _requests(maker)
 
     def fuzzing(self, *, negative: bool) -> SearchStrategy[GeneratedRequest | None]:
-        """Return a strategy for requests that fit the schemas, or do not; None stands for those that cannot be sent."""
+        """Return a strategy for requests that fit the schemas, or violate them.
+
+        It yields None for a request that cannot be sent.
+        """
         mode = GenerationMode.NEGATIVE if negative else GenerationMode.POSITIVE
         strategy: SearchStrategy[Any] = self.operation.as_strategy(generation_mode=mode)
         return strategy.map(as_request)
 
 
 def targets(contract: Contract) -> tuple[Target, ...]:
-    """Return the operations of a contract; those that Schemathesis cannot read are left out.
+    """Return the operations of a contract, except those that Schemathesis cannot read.
 
-    Read anew each time: Schemathesis keeps in its schema which cases it has made, and makes some only once.
+    The schema is loaded anew each time, because Schemathesis stores in it which cases it has generated.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -91,7 +94,7 @@ def targets(contract: Contract) -> tuple[Target, ...]:
 
 
 def state_machine(document: dict[str, Any]) -> Any:
-    """Return the state machine that the contract's links make; None where it has none."""
+    """Return the state machine of the contract's OpenAPI links, or None without links."""
     from schemathesis.core.errors import NoLinksFound  # noqa: PLC0415 - an internal name, used here alone
 
     try:
@@ -112,7 +115,7 @@ def _requests(cases: Any) -> Iterator[GeneratedRequest]:
 
 
 def as_request(case: Any) -> GeneratedRequest | None:
-    """Return a case as it goes over the wire; None where HTTP cannot carry it."""
+    """Return a Schemathesis case as a request, or None if HTTP cannot transmit it."""
     try:
         given = case.as_transport_kwargs(base_url=_BASE)
         keys = ("method", "url", "files", "data", "json", "params", "cookies")
@@ -134,7 +137,7 @@ def as_request(case: Any) -> GeneratedRequest | None:
 
 
 def as_thesis(exchange: Exchange) -> ThesisResponse:
-    """Return a response in the form that Schemathesis's state machine takes."""
+    """Return a response as Schemathesis's state machine expects it."""
     answer = exchange.response
     headers: dict[str, list[str]] = {}
     for name, value in answer.headers:

@@ -11,15 +11,15 @@ from conformance.verdict.run import Run
 
 @dataclass
 class RestInterface:
-    """What generic checks over HTTP need.
+    """What generic REST checks need.
 
     Attributes:
-        run: what is judged, and by what.
-        client: sends the requests.
-        alive: sends a request, and returns whether the robot responds to HTTP at all.
-        device: what the contract pack knows of it.
-        small_numbers: by operation, the text for its numbers with which the robot accepts it; empty: the example's own.
-        waits: how many more reads that the robot puts off for a moment are sent again.
+        run: the data of the run.
+        client: sends requests.
+        alive: sends a request, and returns whether the robot responds.
+        device: the contract pack's model of the device.
+        small_numbers: by operation, the number that the robot accepts for its numeric parameters; empty: the example's.
+        waits: how many more deferred reads may be repeated.
     """
 
     run: Run
@@ -34,12 +34,12 @@ class RestInterface:
 
     @property
     def path(self) -> str:
-        """A path that can be read without parameters."""
+        """A path for GET without parameters."""
         return plain_path(self.run.contract)
 
 
 def plain_path(contract: Contract) -> str:
-    """Return a path that a contract lets be read without parameters, for asking whether a robot is there."""
+    """Return a path of the contract for GET without parameters, to check whether a robot responds."""
     for path, operations in contract.openapi.get("paths", {}).items():
         if "get" in operations and "{" not in path and not operations["get"].get("x-roaas-optional"):
             return str(path)

@@ -1,4 +1,4 @@
-"""Mutations of a valid JSON value: each breaks the contract in one way, at one place."""
+"""Invalid variants of a valid JSON value, each with one fault at one place."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -40,7 +40,7 @@ _DIGITS = 5_000
 
 @dataclass(frozen=True)
 class Place:
-    """One place in a value: its path, what is there, and its schema."""
+    """One place in a JSON value: its path, its value, and its schema."""
 
     path: Path
     value: Any
@@ -48,7 +48,7 @@ class Place:
 
     @property
     def field(self) -> str:
-        """The name of the field, or of the one around an array's item."""
+        """The name of the member, or of the one around an array's item."""
         return next((str(part) for part in reversed(self.path) if isinstance(part, str)), "")
 
     @property
@@ -62,7 +62,7 @@ class Place:
         return bool({"number", "integer"} & set(types_of(self.schema)))
 
     def members_broken(self, write: Callable[[Any], bytes]) -> Iterator[Mutation[bytes]]:
-        """Yield the mutations of an object's members; ``write`` makes a document with another value here."""
+        """Yield the mutations of an object's members; ``write`` returns the document with another value here."""
         required = self.schema.get("required", ())
         members = [Member(name, (name, item), name in required) for name, item in self.value.items()]
         strange = [Member(STRANGE_NAME, (STRANGE_NAME, 0))]
@@ -82,7 +82,7 @@ def places(value: Any, schema: Schema, path: Path = ()) -> Iterator[Place]:
 
 
 def replaced(value: Any, path: Path, new: Any) -> Any:
-    """Return a copy of a value with another one at a place."""
+    """Return a copy of a value with another value at a place."""
     if not path:
         return new
     first, *rest = path
@@ -92,7 +92,7 @@ def replaced(value: Any, path: Path, new: Any) -> Any:
 
 
 def with_options(value: Any, schema: Schema) -> Iterator[tuple[Any, Place]]:
-    """Yield the value with one optional field more, for each that it lacks; and the place of that field."""
+    """Yield the value with one missing optional member added, for each; and the place of that member."""
     known = {place.field: place.value for place in places(value, schema) if isinstance(place.value, str)}
     for place in places(value, schema):
         if not isinstance(place.value, dict):
@@ -105,7 +105,7 @@ def with_options(value: Any, schema: Schema) -> Iterator[tuple[Any, Place]]:
 
 
 def _with_known(value: Any, known: dict[str, str]) -> Any:
-    """Return a value with the example's texts where names are equal: a frame, for instance, that the robot knows."""
+    """Return a value with the example's texts for members of the same name, such as a frame that the robot knows."""
     if not isinstance(value, dict):
         return value
     return {
@@ -115,7 +115,7 @@ def _with_known(value: Any, known: dict[str, str]) -> Any:
 
 
 def mutations(value: Any, schema: Schema) -> list[Mutation[bytes]]:
-    """Return every mutation of a valid value that is invalid on the wire."""
+    """Return all mutations of a valid value that are invalid once serialised."""
     made = [*_of_text(value), *_of_root(value), *_of_places(value, list(places(value, schema)))]
     for whole, place in with_options(value, schema):
         made += _of_places(whole, list(places(place.value, place.schema, place.path)))
@@ -124,7 +124,7 @@ def mutations(value: Any, schema: Schema) -> list[Mutation[bytes]]:
 
 
 def near_misses(value: Any, schema: Schema, number: Path) -> list[Mutation[bytes]]:
-    """Return mutations that a lenient reader would take for the valid value, which has a number at ``number``."""
+    """Return mutations that a lenient parser would read as the valid value, which has a number at ``number``."""
     nearly_all = json_text(value).encode()[:-1]
     made = [item for item in (*_of_text(value), *_of_root(value)) if nearly_all in item.made]
     for place in places(value, schema):
@@ -136,7 +136,7 @@ def near_misses(value: Any, schema: Schema, number: Path) -> list[Mutation[bytes
 
 
 def is_invalid(body: bytes, schema: Schema) -> bool:
-    """Return whether a body breaks the contract: by its octets, and not by the value that was meant."""
+    """Return whether the bytes of a body violate the contract."""
     text = read_json(body)
     return bool(text.problem) or bool(shape_of(schema).problem(text.value))
 
@@ -190,7 +190,7 @@ def _of_places(whole: Any, found: list[Place]) -> list[Mutation[bytes]]:
 
 
 def _writer(whole: Any, place: Place) -> Callable[[Any], bytes]:
-    """Return a function that writes the whole value with another one at a place."""
+    """Return a function that serialises the whole value with another value at a place."""
     return lambda new: json_text(replaced(whole, place.path, new)).encode()
 
 

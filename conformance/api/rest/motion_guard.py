@@ -1,4 +1,4 @@
-"""Random requests made harmless: what a robot accepts of them stays slow, near and seldom."""
+"""Keep random requests harmless: accepted commands stay slow, near and rare."""
 
 from collections import Counter
 from dataclasses import replace
@@ -20,7 +20,7 @@ _SLOW = 0.1
 
 
 class MotionGuard:
-    """Looks at every random request before it is sent.
+    """Examines and adapts random requests before they are sent.
 
     Args:
         api: the robot's REST interface.
@@ -31,7 +31,7 @@ class MotionGuard:
         self._valid: Counter[str] = Counter()
 
     def admit(self, item: GeneratedRequest) -> GeneratedRequest | None:
-        """Return the request as it may be sent; None where it may not."""
+        """Return the request as it may be sent, or None if it may not."""
         said = self._validity(item)
         operation = said.operation
         if operation is None:
@@ -48,7 +48,7 @@ class MotionGuard:
         return self._slow(item) if said.verdict == INVALID else None
 
     def count(self, item: GeneratedRequest, *, accepted: bool) -> None:
-        """Count what was accepted."""
+        """Count an accepted request."""
         operation = self._validity(item).operation
         if accepted and operation is not None and operation.motion:
             self._valid[operation.id] += 1
@@ -57,11 +57,11 @@ class MotionGuard:
         return validity(self._api.run.contract, item.method, item.target, item.media_type, item.body)
 
     def _may_reach(self, item: GeneratedRequest) -> bool:
-        """Return whether a request for no operation of the contract may be sent: a method that a resource lacks."""
+        """Return whether a request with a method that its resource does not support may be sent."""
         return self._api.run.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
 
     def _fitted(self, item: GeneratedRequest, operation: Operation) -> GeneratedRequest | None:
-        """Return a valid request of a moving operation with values that fit this robot; None after a few."""
+        """Return a valid request of a moving operation with sensible values; None after a few of them."""
         if self._valid[operation.id] >= _ACCEPTED:
             return None
         if not self._api.device.is_known:

@@ -1,4 +1,4 @@
-"""The same JSON with its numbers written otherwise, and integers at the ends of their range."""
+"""Equivalent JSON with numbers in another notation, and with integers at the ends of their range."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -11,7 +11,7 @@ _INT32_ENDS = (-(2**31), 2**31 - 1)
 
 
 def with_numbers(value: Any, write: Callable[[float], str]) -> bytes:
-    """Return JSON whose doubles are written by ``write``; integers and texts stay as they are."""
+    """Return JSON with floats written by ``write``; integers and texts stay unchanged."""
 
     def written(item: Any) -> Any:
         if isinstance(item, dict):
@@ -24,7 +24,7 @@ def with_numbers(value: Any, write: Callable[[float], str]) -> bytes:
 
 
 def at_integer_ends(value: Any, schema: Schema) -> Iterator[Any]:
-    """Yield the value with each int32 of its optional parts at either end of its range."""
+    """Yield the value with each int32 of its optional members at the minimum and maximum."""
     for whole, part in with_options(value, schema):
         for place in places(part.value, part.schema, part.path):
             if (place.schema.get("minimum"), place.schema.get("maximum")) == _INT32_ENDS:

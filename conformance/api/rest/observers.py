@@ -1,6 +1,6 @@
-"""The observer of REST: judges every exchange of every check, so that a failure in one of fifty responses is noticed.
+"""The REST observer: judges every exchange of every check, so that one failure in fifty responses is noticed.
 
-It judges only what applies to any such request; unusual requests are left to the checks that send them.
+It judges only what applies to every request of its kind; checks judge the responses to their unusual requests.
 """
 
 import re
@@ -30,7 +30,7 @@ _WELL_FRAMED = "well-framed HTTP"
 
 
 class Observer(Listener):
-    """Judges exchanges.
+    """Judges exchanges with the REST interface.
 
     Args:
         api: the robot's REST interface.
@@ -42,7 +42,7 @@ class Observer(Listener):
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
 
     def answered(self, exchange: Exchange) -> None:
-        """Judge one exchange, if the request went to this interface."""
+        """Judge one exchange if its request went to this interface."""
         api, answer = self._api, exchange.response
         context = self._seen(exchange.request)
         if context is None:
@@ -67,7 +67,7 @@ class Observer(Listener):
             declared.judge(api, exchange, answer, context)
 
     def unanswered(self, request: Unanswered) -> None:
-        """Judge a response that is no HTTP, where the request gave no reason for it."""
+        """Judge a response that is not HTTP, unless the request was malformed itself."""
         context = self._seen(request.request)
         if context is not None and context.usual and request.kind is NoAnswer.MALFORMED:
             expect(self._api.run.judge, "http/framing", request).that(
@@ -75,7 +75,7 @@ class Observer(Listener):
             )
 
     def _seen(self, request: Request) -> RequestContext | None:
-        """Return the request as the contract sees it; None where it went to another interface."""
+        """Return what the contract says about the request; None if it went to another interface."""
         api = self._api
         if request.url.split("?", 1)[0] in self._elsewhere:
             return None
@@ -109,7 +109,7 @@ class Observer(Listener):
         )
 
     def _judge_input(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
-        """Judge 5xx: for an invalid request it is never right, for a valid one it is not declared."""
+        """Judge a 5xx response: it is wrong for an invalid request, and undeclared for a valid one."""
         api, request = self._api, context.request
         media_type = next((value for name, value in request.headers if name.lower() == "content-type"), "")
         media_type = media_type.split(";", 1)[0].strip().lower()
@@ -134,9 +134,9 @@ def _is_conditional(request: Request) -> bool:
 
 
 def _other_charset(answer: Response) -> str:
-    """Return why the content is not in the charset that Content-Type names; empty where it is.
+    """Return why the body is not in the charset of Content-Type; empty if it is.
 
-    Without one, XML says its encoding itself, and plain text is UTF-8. A byte order mark is no part of the text.
+    Without charset, XML declares its encoding itself, and plain text is UTF-8. A byte order mark is ignored.
     """
     named = _CHARSET.search(answer.header("content-type") or "")
     if named is None and is_xml(answer.media_type):

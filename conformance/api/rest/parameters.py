@@ -1,4 +1,4 @@
-"""Texts that a parameter clearly does not allow (contract, fine print)."""
+"""Invalid texts for a parameter (contract, fine print)."""
 
 from dataclasses import dataclass
 
@@ -14,13 +14,12 @@ _TELLING = {"abc", "roaas-no-number", "1.5m"}
 
 @dataclass(frozen=True)
 class Wrong:
-    """One text that a robot must refuse.
+    """An invalid text for a parameter.
 
     Attributes:
         name: of the parameter.
         text: what to send.
         what: what is wrong with it.
-        shown: what a problem can name of it, or empty.
     """
 
     name: str
