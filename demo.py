@@ -1,4 +1,4 @@
-"""``make demo``: the whole job on this machine. A robot, its certification, a load test, and the reports."""
+"""``make demo``: start a robot, certify it, run a load test, and write the reports, all on this machine."""
 
 import argparse
 import json
@@ -27,9 +27,9 @@ _STATEMENT = Path(__file__).parent / "reference_robot" / "statement.toml"
 
 
 def main() -> int:
-    """Run the demo; the exit code is the certification's, or the load test's where the robot conforms.
+    """Run the demo; return the exit code of the certification, or of the load test if the robot conforms.
 
-    A measurement that carries no statement is no failure here: it says so, and tells of a busy machine.
+    A load test without a significant result does not fail the demo; it only means that the machine is busy.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for results and reports [out]")
@@ -55,7 +55,7 @@ def main() -> int:
 
 @contextmanager
 def _robot(domain: int) -> Iterator[tuple[str, str]]:
-    """The reference robot on free ports; yields its REST base URL and its publishers' WSDL."""
+    """Run the reference robot on free ports; yield the REST base URL and the WSDL URL of the publishers' service."""
     command = [*_ROAAS, "robot", "--rest-port", "0", "--soap-port", "0", "--domain-id", str(domain)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - ours
     # A robot that never gets ready must not keep the demo waiting.

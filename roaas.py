@@ -1,6 +1,7 @@
-"""The front door: the command ``roaas``, which hands each subcommand to its room.
+"""The command ``roaas``: finds each subcommand in its package ("room") and runs it.
 
-Rooms are imported when their command is used, so that ``roaas certify`` needs neither ROS nor Locust.
+The rooms are the packages conformance, loadtests, reference_robot and reports. A room is imported only when its command
+is used, so that ``roaas certify`` needs neither ROS nor Locust.
 """
 
 from __future__ import annotations
@@ -51,10 +52,10 @@ _INSTALLED = Path(__file__).with_name("roaas_rooms")
 
 
 def open_rooms() -> None:
-    """Let this process, and those that it starts, import the rooms.
+    """Make the packages of RoAAS importable in this process and in the processes that it starts.
 
-    In a checkout they lie beside this file. A wheel has them in a folder of its own, because nobody else's module
-    named `reports` or `conformance` should be shadowed by ours, nor ours by theirs.
+    In a checkout the packages are next to this file. A wheel installs them in the folder ``roaas_rooms``, so that names
+    such as `reports` and `conformance` do not collide with other installed packages.
     """
     folder = str(_INSTALLED)
     if folder in sys.path or not _INSTALLED.is_dir():
@@ -66,7 +67,7 @@ def open_rooms() -> None:
 
 
 class _Rooms(click.Group):
-    """A click group whose subcommands live in the rooms."""
+    """The click group of all subcommands; it imports a subcommand's module when the subcommand is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         return list(_COMMANDS)
@@ -96,11 +97,14 @@ class _Rooms(click.Group):
 
 
 class FrontDoor:
-    """What a room asks of another one."""
+    """Functions through which one package uses another without importing it.
+
+    Commands get this class as click's context object.
+    """
 
     @staticmethod
     def notary(key: Path) -> Any:
-        """Have the reports room read a private key before a run that is to be signed by it."""
+        """Return a signer that holds the private key in a file, read before the run whose results it will sign."""
         try:
             return import_module("reports.attestation.signing").Notary(key)
         except import_module("reports.errors").ReportError as error:
@@ -108,13 +112,13 @@ class FrontDoor:
 
     @staticmethod
     def render(written: Path, notary: Any = None) -> None:
-        """Have the reports room render, and sign, what a command wrote, also when it failed or was interrupted."""
+        """Write, and optionally sign, the reports for a result file, also after a failed or interrupted run."""
         for path in import_module("reports.rendering").render(written.parent, notary):
             click.echo(f"report: {path}")
 
     @staticmethod
     def compare(old: Path, new: Path, threshold: float) -> int:
-        """Have the reports room say what changed between two latency results; returns the exit code."""
+        """Print what changed between two latency result files; return the exit code."""
         pages = import_module("reports.cli.pages")
         try:
             code: int = pages.tell_change(old, new, threshold)
@@ -125,7 +129,7 @@ class FrontDoor:
 
     @staticmethod
     def history(folder: Path) -> None:
-        """Have the reports room write the history of the results that are stored in a folder."""
+        """Write the page with the history of the latency results stored in a folder."""
         try:
             for path in import_module("reports.latency.history").write_history(folder):
                 click.echo(f"history: {path}")
@@ -134,7 +138,7 @@ class FrontDoor:
 
     @staticmethod
     def known(pack: str | None) -> dict[str, Any]:
-        """Return what the installed suite knows of a contract pack: digest, requirement sets, profiles."""
+        """Return what the installed suite contains for a contract pack: digest, requirement sets, profiles."""
         try:
             known: dict[str, Any] = import_module("conformance.engine.suite").known(pack)
         except import_module("conformance.contract.locating").ContractError as error:
@@ -151,7 +155,7 @@ def main() -> None:
 
 
 def load_node() -> None:
-    """The command ``roaas-load-node``: a load test's master or one of its workers, on a machine of its own."""
+    """Run the command ``roaas-load-node``: the master or a worker of a load test that is spread over machines."""
     open_rooms()
     import_module("loadtests.node").main(sys.argv[1:])
 

@@ -1,4 +1,4 @@
-"""The command ``robot``: the simulated robot and its web services, or the web services alone."""
+"""The command ``roaas robot``: starts the simulated robot and its web services, or the web services alone."""
 
 import sys
 from importlib import import_module

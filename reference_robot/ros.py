@@ -1,4 +1,4 @@
-"""The ROS runtime that the simulation and the web services share: a context, nodes, one executor thread.
+"""The ROS runtime that the simulation and the web services share: a context, nodes and executor threads.
 
 ::
 
@@ -8,9 +8,9 @@
         ros.start()
         ...  # callbacks run in the runtime's thread until the block ends
 
-The context is the runtime's own and installs no signal handlers: those belong to the program. Set
-``ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`` in the environment before, where a robot is to be seen on
-this machine only. Where the environment names no profiles of Fast DDS, those in ``fastdds.xml`` are used.
+The runtime has its own ROS context and installs no signal handlers; signals are left to the program. To hide the robot
+from other machines, set ``ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`` in the environment first. If the environment
+names no Fast DDS profiles, the runtime uses those in ``fastdds.xml``.
 """
 
 import os
@@ -54,19 +54,19 @@ _HIGHEST_DOMAIN_ID: Final = 101  # higher ones put DDS's ports into Linux's ephe
 
 
 class RosArgumentsError(ValueError):
-    """ROS does not understand its arguments; the message has them, and what ROS says of them."""
+    """An error in the arguments after ``--ros-args``; the message contains the arguments and ROS's explanation."""
 
 
 class RosRuntime:
-    """One rclpy context with its nodes, spun in one thread but for those that are made ``apart``.
+    """One ROS context with its nodes. One thread runs all their callbacks, except for nodes that are created ``apart``.
 
     Args:
         domain_id: The ROS domain, 0 to 101; None takes ROS_DOMAIN_ID from the environment.
-        arguments: ROS's own (``--ros-args ...``): namespace, remappings, parameters, enclave, for all nodes.
+        arguments: ROS arguments (``--ros-args ...``) for all nodes: namespace, remappings, parameters, enclave.
 
     Raises:
         ValueError: The domain id is out of range.
-        RosArgumentsError: ROS does not understand the arguments.
+        RosArgumentsError: ROS rejects the arguments.
     """
 
     def __init__(self, domain_id: int | None = None, arguments: Sequence[str] = ()) -> None:
@@ -93,14 +93,15 @@ class RosRuntime:
         self._closing = threading.Event()
 
     def create_node(self, name: str, *, apart: bool = False, spun: bool = True) -> Node:
-        """Make a node that this runtime spins and destroys; ``apart``, in a thread of its own.
+        """Return a new node, which ``close`` destroys.
 
-        What comes to a node apart, however much, does not wait in one queue with what the other nodes have to do.
-        A node that is not spun has no callbacks of its own; ``watch`` tells that something waits at its subscriptions,
-        and ``taken`` takes it.
+        Args:
+            name: The node's name.
+            apart: Run the node's callbacks in a thread of its own, so that its messages do not delay other nodes.
+            spun: False for a node without callbacks: ``watch`` notices its messages and ``taken`` reads them.
 
         Raises:
-            RosArgumentsError: A parameter among ROS's arguments is none that a node can have.
+            RosArgumentsError: The ROS arguments contain a parameter that a node cannot have.
         """
         try:
             # Its parameter services would stand among the robot's own services.
@@ -116,10 +117,10 @@ class RosRuntime:
         return node
 
     def watch(self, subscription: Subscription, node: Node, callback: Callable[[], None], pause_s: float) -> None:
-        """Call back in a node's thread when something waits at a subscription of a node that is not spun.
+        """Call ``callback`` in a node's thread whenever messages wait at a subscription of a node that is not spun.
 
-        It is called at once when the first message comes, and then at most every ``pause_s``: who takes many messages
-        at a time is woken once for them. The runtime must not be started yet.
+        The first message triggers a call at once; later calls are at least ``pause_s`` seconds apart, so that each call
+        can read many messages. Call this method before ``start``.
         """
         executor = next(executor for executor in self._executors if node in executor.get_nodes())
         wake = rclpy_c.GuardCondition(self.context.handle)
@@ -127,7 +128,7 @@ class RosRuntime:
         self._watches.append((wake, threading.Thread(target=self._watch, args=arguments, name="ros", daemon=True)))
 
     def start(self) -> None:
-        """Run callbacks in threads of their own from now on; a second call does nothing."""
+        """Start the threads that run the callbacks; a second call does nothing."""
         if not self._threads:
             self._awake = [time.monotonic()] * len(self._executors)
             self._threads = [
@@ -139,15 +140,15 @@ class RosRuntime:
                 thread.start()
 
     def silence(self) -> float:
-        """Return for how many seconds a thread has been in one callback, or without a sign of life; 0.5 s is usual."""
+        """Return for how many seconds the least active thread has been in one callback or idle; 0.5 s is normal."""
         return time.monotonic() - min(self._awake, default=time.monotonic())
 
     def hangs(self) -> bool:
-        """Tell whether a thread hangs: what the nodes keep of the robot's state is then as old as the silence."""
+        """Return whether a thread has been silent for over 2 s; the robot's state in memory is then out of date."""
         return self.silence() > HUNG_S
 
     def close(self) -> None:
-        """Stop the threads, then tear down nodes and context; a second call does nothing."""
+        """Stop the threads and destroy the nodes and the context; a second call does nothing."""
         if self._closing.is_set():
             return
         self._closing.set()
@@ -202,7 +203,7 @@ class RosRuntime:
 
 
 def taken(subscription: Subscription) -> Iterator[bytes]:
-    """Take what waits at a subscription of a node that is not spun: the octets of each message, as ROS sent them."""
+    """Remove and yield the serialized messages that wait at a subscription of a node that is not spun."""
     handle = subscription.handle
     with handle:
         while (found := handle.take_message(subscription.msg_type, True)) is not None:  # noqa: FBT003 - rclpy's own

@@ -1,4 +1,4 @@
-"""The simulated robot as a child process, which ends with its parent, however that ends."""
+"""The simulated robot as a child process that ends with its parent process, even if the parent is killed."""
 
 import contextlib
 import os
@@ -17,13 +17,19 @@ _STOP: Final = 5.0  # seconds
 
 
 class SimulationError(RuntimeError):
-    """The simulation did not start, or ended by itself."""
+    """An error for a simulation that did not start or that ended unexpectedly."""
 
 
 class SimulatedRobot:
-    """The simulation in a process of its own, with a watch on its end; like a real robot where a seed says which.
+    """A simulated robot that runs in a child process, which is monitored.
 
-    What it has to say of goals and missions goes to the file ``log``; ``ros_arguments`` are for its nodes.
+    Args:
+        domain_id: The ROS domain.
+        time_scale: How many times faster than real time the robot moves.
+        config: The TOML file with the ROS names; None for the default names.
+        realistic_seed: Seed of a robot with imperfect wheels and odometry; None for a perfect robot.
+        log: The file for the simulation's log.
+        ros_arguments: ROS arguments for the simulation's nodes.
     """
 
     def __init__(
@@ -50,10 +56,10 @@ class SimulatedRobot:
 
     @contextlib.contextmanager
     def running(self) -> Iterator[None]:
-        """Run the simulation while the block runs; should it end by itself, the block is ended by SIGTERM.
+        """Run the simulation during the block; if the simulation ends first, SIGTERM is sent to this process.
 
         Raises:
-            SimulationError: It did not become ready, or ended by itself.
+            SimulationError: The simulation did not become ready, or ended unexpectedly.
         """
         self._log.parent.mkdir(parents=True, exist_ok=True)
         with (

@@ -1,7 +1,7 @@
-"""The simulated robot as a process of its own: ``python -m reference_robot.simulation``.
+"""The program that simulates the robot: ``python -m reference_robot.simulation``.
 
-Prints ``ready`` on stdout when the robot is up. SIGINT and SIGTERM end it with exit code 0, and so does
-the end of its standard input where that is a pipe: a robot does not outlive the program that started it.
+It prints ``ready`` on stdout when the robot is running. It ends with exit code 0 on SIGINT and SIGTERM. If its standard
+input is a pipe, it also ends when the pipe closes, so that the simulation never outlives the program that started it.
 """
 
 import contextlib
@@ -41,7 +41,7 @@ def main(
     seed: int,
     ros_arguments: tuple[str, ...],
 ) -> None:
-    """Run the simulated robot until it is told to stop."""
+    """Run the simulated robot until SIGINT, SIGTERM or the end of standard input."""
     # Seen on this machine only, unless the user wants it otherwise.
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     try:
@@ -61,11 +61,11 @@ def main(
 
 
 def _give_way() -> None:
-    """Let the web services and their client go first: of a processor's time, and when a message wakes this process.
+    """Lower this process's scheduling priority, so that the web services and their clients run first.
 
-    A batch process waits until whoever runs has nothing to do or has had its turn (sched(7)). Otherwise each publish of
-    the web services would hand over the processor on which a client waits for the answer. Whoever gave it another
-    policy, such as real time, is obeyed.
+    Under the batch policy (sched(7)) a process that a message wakes does not interrupt the running one. Otherwise each
+    message that the web services publish would take the processor from a client waiting for its response. If a user has
+    set another policy, such as real time, the policy is kept.
     """
     os.nice(_NICENESS)
     with contextlib.suppress(AttributeError, OSError):  # a system that has none, or that does not allow it

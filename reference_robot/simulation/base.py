@@ -1,4 +1,4 @@
-"""The base: takes velocity commands, moves the body, reports odometry, and stops when commands cease."""
+"""The robot's base: obeys velocity commands, moves the body, reports odometry, and stops when commands cease."""
 
 import math
 import time
@@ -31,12 +31,13 @@ for _axis, _variance in ((0, 1e-4), (7, 1e-4), (35, 1e-3)):
 
 
 class Base:
-    """A differential-drive base on the ROS graph; ``time_scale`` makes it up to 25 times faster than real time.
+    """A ROS node's differential-drive base that subscribes to velocity commands and publishes odometry.
 
-    With ``realism`` its wheels slip, and its odometry is what a real robot would believe.
+    ``time_scale`` makes the base up to 25 times faster than real time. With ``realism`` the wheels slip, and the
+    odometry is as inexact as a real robot's.
 
     Attributes:
-        motion: The body's pose and velocity now.
+        motion: The true pose and velocity of the body at present.
     """
 
     def __init__(self, node: Node, names: RosNames, time_scale: float = 1.0, realism: Realism | None = None) -> None:

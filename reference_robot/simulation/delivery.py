@@ -1,12 +1,13 @@
-"""The paper's delivery application: a request on a topic makes the robot drive a mission.
+"""The paper's delivery application: each delivery request on a topic makes the robot drive a mission.
 
-A mission goes source → destination → depot, each leg a NavigateToPose goal. It waits while navigation
-has somebody else's goal. A leg that is refused or cannot be driven fails its mission, and the next one begins,
-and so does a leg whose navigation is gone; a leg that is cancelled or displaced from outside fails its mission
-and drops the queue, and so does cancelling somebody else's goal while missions wait: an operator who stops the
-robot wants it to stay stopped.
+A mission has three legs, each a NavigateToPose goal: to the source, the destination and the depot. Missions wait in a
+queue while the navigation follows another client's goal.
 
-It drives any robot with Nav2's action, for it asks for nothing else.
+- The navigation refuses a leg, gives it up, or disappears: the mission fails, and the next mission begins.
+- Another client cancels or displaces a leg: the mission fails, and all waiting missions are dropped. So are they when
+  another client's goal is cancelled while missions wait. An operator who stops the robot wants it to stay stopped.
+
+The application works with every robot that offers Nav2's NavigateToPose action.
 """
 
 import itertools
@@ -42,7 +43,7 @@ _REMEMBERED: Final = 100  # legs, and goals of others that were cancelled
 
 
 class Delivery:
-    """Runs missions."""
+    """The delivery application: receives requests, drives one mission after another, publishes their states."""
 
     def __init__(self, node: Node, requests: DeliveryRequests, names: RosNames) -> None:
         self._node = node
@@ -81,7 +82,7 @@ class Delivery:
         self._changed()
 
     def _note_goals(self) -> None:
-        """Take up what the navigation tells of its goals, others' among them."""
+        """Process a status report of the navigation's goals, including those of other clients."""
         canceled = [
             goal.identity
             for goal in self._goals.reported
@@ -101,11 +102,11 @@ class Delivery:
         self._begin()
 
     def _is_busy(self) -> bool:
-        """Tell whether navigation has somebody else's goal."""
+        """Return whether the navigation follows another client's goal."""
         return any(goal.identity not in self._own for goal in self._goals.active())
 
     def _begin(self) -> None:
-        """Begin the next mission, if there is one and navigation is free for it."""
+        """Begin the next waiting mission, provided that the navigation is running and not busy."""
         self._begin_later.cancel()
         if self._is_busy():
             return
@@ -160,7 +161,7 @@ class Delivery:
             self._changed()
 
     def _fail(self, reason: str) -> None:
-        """Give the mission up, and begin the next one soon."""
+        """End the active mission as failed, and begin the next one after a pause."""
         self._leg = ""
         self._missions.finish(MissionState.FAILED, reason)
         self._changed()
@@ -168,7 +169,7 @@ class Delivery:
         self._begin_later.reset()
 
     def _changed(self) -> None:
-        """Report what changed: at once, or when the last report is old enough."""
+        """Publish the missions that changed, at most 20 times a second."""
         if time.monotonic() - self._reported_at >= _REPORT_PERIOD_S:
             self._report()
         elif not self._report_is_due:

@@ -1,4 +1,4 @@
-"""What the robot tells of its frames and its map (REP 105): map → odom → base, and the office as an occupancy grid."""
+"""Publishers of the robot's frames (REP 105: map → odom → base) and of the office's map as an occupancy grid."""
 
 import array
 import math
@@ -23,7 +23,7 @@ _TRANSFORMS: Final = 100  # depth, as tf2's broadcaster has it
 
 
 class FramePublisher:
-    """Publishes the transform of the base at 10 Hz, and once, latched, that map and odometry coincide."""
+    """A publisher of the transform odom → base at 10 Hz and, once and latched, of the identity map → odom."""
 
     def __init__(self, node: Node, names: RosNames) -> None:
         self._base = TransformStamped(child_frame_id=names.frames.base)
@@ -38,7 +38,7 @@ class FramePublisher:
         self._static.publish(TFMessage(transforms=[identity]))
 
     def tell(self, stamp: tuple[int, int], motion: Motion) -> None:
-        """Publish where the body is at a time (seconds, nanoseconds), unless the last transform is that young."""
+        """Publish the transform of the base at a time (seconds, nanoseconds), at most ten times a second."""
         now = time.monotonic()
         if now - self._told_at < _PERIOD_S:
             return
@@ -51,7 +51,7 @@ class FramePublisher:
 
 
 class MapServer:
-    """Publishes the office's map once, latched, as Nav2's map_server does."""
+    """A publisher of the office's map: one latched OccupancyGrid, as from Nav2's map_server."""
 
     def __init__(self, node: Node, names: RosNames) -> None:
         west, south, east, north = OFFICE.bounds

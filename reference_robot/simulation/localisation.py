@@ -1,4 +1,4 @@
-"""Where the robot is, as its odometry says."""
+"""The robot's present pose, read from its odometry topic."""
 
 from collections.abc import Callable
 
@@ -12,9 +12,9 @@ from reference_robot.simulation.planner import Pose
 
 
 class Localisation:
-    """The robot's last known pose in the map frame, with which the odometry frame coincides.
+    """A subscriber that knows the robot's latest pose in the map frame, which coincides with the odometry frame.
 
-    Odometry comes as octets, and is read when somebody asks: nobody does while the robot has nothing to do.
+    Odometry is kept serialized and is only deserialized in ``pose``, which nobody calls while the robot is idle.
 
     Attributes:
         on_update: Called after each odometry message.
@@ -26,10 +26,10 @@ class Localisation:
         node.create_subscription(Odometry, names.topics.odom, self._take, 1, raw=True)
 
     def pose(self) -> Pose:
-        """Return x, y (m) and yaw (rad).
+        """Return the robot's x, y (m) and yaw (rad).
 
         Raises:
-            PoseError: No odometry has come yet.
+            PoseError: No odometry has been received yet.
         """
         if not self._octets:
             raise PoseError("the robot does not know yet where it is")

@@ -1,4 +1,4 @@
-"""Between ROS messages and the simulation's plain values."""
+"""Conversions between ROS messages and the plain values of the simulation."""
 
 import math
 from typing import Any, Final
@@ -30,25 +30,25 @@ MISSION_REPORTS: Final = QoSProfile(
 
 
 class PoseError(ValueError):
-    """A pose cannot be used; the message names the offending value."""
+    """An error for a pose that cannot be used; the message names the invalid value."""
 
 
 def yaw_of(quaternion: Quaternion) -> float:
-    """Return the rotation about z in radians."""
+    """Return the rotation of a quaternion about the z axis, in radians."""
     x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def quaternion_of(yaw: float) -> Quaternion:
-    """Return the unit quaternion that turns by yaw radians about z."""
+    """Return the unit quaternion of a rotation by ``yaw`` radians about the z axis."""
     return Quaternion(x=0.0, y=0.0, z=math.sin(yaw / 2), w=math.cos(yaw / 2))
 
 
 def pose_of(stamped: PoseStamped, frames: Frames) -> Pose:
-    """Return x, y (m) and yaw (rad) in the map frame, with which the odometry frame coincides.
+    """Return x, y (m) and yaw (rad) of a PoseStamped in the map or odometry frame, which coincide.
 
     Raises:
-        PoseError: The frame is unknown, or the orientation no unit quaternion.
+        PoseError: The frame is unknown, or the orientation is not a unit quaternion.
     """
     known = (frames.map, frames.odom)
     if stamped.header.frame_id not in known:
@@ -61,7 +61,7 @@ def pose_of(stamped: PoseStamped, frames: Frames) -> Pose:
 
 
 def stamped_pose(pose: Pose, header: Header) -> PoseStamped:
-    """Return the PoseStamped of x, y (m), yaw (rad)."""
+    """Return a PoseStamped with the given x, y (m), yaw (rad) and header."""
     message = PoseStamped(header=header)
     message.pose.position.x, message.pose.position.y = float(pose[0]), float(pose[1])
     message.pose.orientation = quaternion_of(float(pose[2]))
@@ -69,12 +69,12 @@ def stamped_pose(pose: Pose, header: Header) -> PoseStamped:
 
 
 def path_message(poses: Floats, header: Header) -> Path:
-    """Return the Path of (k, 3) poses, each in the header's frame."""
+    """Return a Path message for a (k, 3) array of x, y, yaw; every pose gets the same header."""
     return Path(header=header, poses=[stamped_pose((x, y, yaw), header) for x, y, yaw in poses])
 
 
 def plain(stamped: PoseStamped) -> dict[str, Any]:
-    """Return a PoseStamped as JSON-ready values under its ROS field names."""
+    """Return a PoseStamped as nested dicts with its ROS field names, ready for JSON."""
     stamp, position, turn = stamped.header.stamp, stamped.pose.position, stamped.pose.orientation
     return {
         "header": {"stamp": {"sec": stamp.sec, "nanosec": stamp.nanosec}, "frame_id": stamped.header.frame_id},

@@ -1,8 +1,8 @@
-"""Navigation: Nav2's NavigateToPose action, driven through cmd_vel.
+"""Navigation: an action server for Nav2's NavigateToPose that drives the robot through the topic cmd_vel.
 
-Goals are refused with a reason when no path leads there. Of two goals the newer one drives, and the
-displaced one ends ABORTED, as Nav2 has it. Two latched topics tell the rest of the robot what an action
-client cannot see: the active goal, whoever sent it, and why the last refused one was refused.
+The server refuses a goal to which no path leads. A newer goal displaces the active one, which ends as ABORTED, as in
+Nav2. Two latched topics publish what action clients cannot see: the active goal, whichever client sent it, and the
+reason for the last refusal.
 """
 
 import json
@@ -31,23 +31,22 @@ _FAILED_TO_MAKE_PROGRESS: Final = 105  # nav2_msgs/FollowPath's code, which Nav2
 
 
 class _DeferringActionServer(ActionServer):
-    """An action server whose goals are executing without a task of their own until they end.
+    """An action server that starts a goal's task only when the goal's result is available.
 
-    rclpy resumes a task that awaits something again and again until it is done, which takes a whole
-    core; so a goal gets its task only when its result is there.
+    rclpy polls a task that awaits something until it is done, which keeps a processor core busy.
     """
 
     def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
-        """Note that a goal is executing, and nothing more."""
+        """Do nothing when a goal starts executing; the base class would start a task here."""
 
     def finish(self, goal_handle: Any, result: Any) -> None:
-        """Hand out the result of a goal that is in a final state."""
+        """Send the result of a goal that has reached a final state."""
         super().notify_execute(goal_handle, lambda _: result)
 
 
 @dataclass
 class _Drive:
-    """A goal on its way: its handle, its path, and what progress it makes."""
+    """The goal that the robot is driving to: its handle, its path, and the progress made."""
 
     handle: Any
     pursuit: Pursuit
@@ -58,7 +57,7 @@ class _Drive:
 
 
 class Navigation:
-    """Serves NavigateToPose; each update of the localisation is one step of control."""
+    """The NavigateToPose action server; each odometry message triggers one control step."""
 
     def __init__(
         self,
@@ -118,7 +117,7 @@ class Navigation:
         self._tell_current_goal()
 
     def _step(self) -> None:
-        """Control once; runs after each odometry message."""
+        """Execute one control step for the active goal; runs after each odometry message."""
         drive = self._drive
         if drive is None:
             return

@@ -1,7 +1,7 @@
-"""Shortest paths around walls: A* over a visibility graph of the office's corners.
+"""Shortest paths around obstacles: A* on a visibility graph of the corners of the office's boxes.
 
-A shortest path among boxes turns at corners only, so a graph of some hundred corners that see each
-other gives exact paths in about a millisecond, with no grid and no smoothing afterwards.
+A shortest path among boxes turns only at corners. A graph of about a hundred corners gives exact paths in about a
+millisecond, without a grid and without smoothing.
 """
 
 import heapq
@@ -22,7 +22,7 @@ _BESIDE: Final = 1e-3  # m by which corners stand off the grown boxes, so that p
 
 
 class PlanFailure(IntEnum):
-    """Why there is no path; the numbers are those of nav2_msgs/ComputePathToPose (Jazzy)."""
+    """The reasons why no path was found, with the error codes of nav2_msgs/ComputePathToPose (Jazzy)."""
 
     START_OUTSIDE_MAP = 204
     GOAL_OUTSIDE_MAP = 205
@@ -32,7 +32,7 @@ class PlanFailure(IntEnum):
 
 
 class PlanError(ValueError):
-    """There is no path; the message names the offending pose."""
+    """An error for a path that does not exist; the message names the pose that is the reason."""
 
     def __init__(self, failure: PlanFailure, message: str) -> None:
         super().__init__(message)
@@ -40,7 +40,7 @@ class PlanError(ValueError):
 
 
 class Planner:
-    """Plans paths in one office."""
+    """A path planner for one office."""
 
     def __init__(self, office: Office) -> None:
         self._walls = office
@@ -65,14 +65,14 @@ class Planner:
         ]
 
     def plan(self, start: Pose, goal: Pose, tolerance: float = 0.0) -> Floats:
-        """Plan from a pose to a pose (x and y in m, yaw in rad).
+        """Return the shortest path from a pose to a pose (x and y in m, yaw in rad).
 
-        A start nearer to a wall than the clearance is left by the shortest way; a goal that is too near
-        to a wall is moved away from it by up to ``tolerance`` metres.
+        If the start is closer to a wall than the clearance, the path first leads away from the wall. If the goal is too
+        close to a wall, it is moved away by up to ``tolerance`` metres.
 
         Returns:
-            A (k, 3) array of poses, k >= 2: the first is the start, the last the goal, in between at
-            most STEP apart and facing along the path.
+            A (k, 3) array of poses, k >= 2, from the start to the goal. Poses in between are at most STEP metres apart
+            and face along the path.
 
         Raises:
             PlanError: There is no path.
@@ -101,7 +101,7 @@ class Planner:
             raise PlanError(PlanFailure.START_OCCUPIED, f"the start ({start[0]:g}, {start[1]:g}) is in a wall")
 
     def _escape(self, x: float, y: float) -> tuple[float, float] | None:
-        """Return the nearest point with full clearance in straight reach, or None in a wall."""
+        """Return the nearest point with full clearance that is reachable straight; None for a point in a wall."""
         if self._grown.is_free(x, y):
             return x, y
         if not self._walls.is_free(x, y):
@@ -122,7 +122,7 @@ class Planner:
         return None
 
     def _shortest(self, begin: Floats, end: Floats) -> list[tuple[float, float]] | None:
-        """Find the turning points from begin to end, both included."""
+        """Return the turning points of the shortest path, including both ends, or None if there is no path."""
         if self._grown.free_lines(begin[None], end[None])[0]:
             return [_point(begin), _point(end)]
         count = len(self._corners)

@@ -1,4 +1,4 @@
-"""Plans on request: the nav_msgs/GetPlan service of the paper and Nav2's ComputePathToPose action."""
+"""Path planning for clients: the nav_msgs/GetPlan service of the paper and Nav2's ComputePathToPose action."""
 
 import time
 from typing import Any
@@ -19,7 +19,7 @@ from reference_robot.simulation.planner import PlanError, Planner, Pose
 
 
 class Planning:
-    """Answers requests for plans without driving; one that names no start starts where the robot is."""
+    """A ROS service and an action server that return paths without driving; the default start is the robot's pose."""
 
     def __init__(self, node: Node, names: RosNames, planner: Planner, localisation: Localisation) -> None:
         self._node = node
@@ -37,9 +37,9 @@ class Planning:
         )
 
     def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
-        """Answer with a path, or with an empty one where there is none.
+        """Fill the response with the path in the goal's frame, or with an empty path if there is none.
 
-        A start without a frame_id means the robot's own pose; the plan is in the goal's frame.
+        A start without a frame_id stands for the robot's own pose.
         """
         try:
             start = self._start(request.start if request.start.header.frame_id else None)

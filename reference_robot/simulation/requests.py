@@ -1,8 +1,8 @@
-"""The delivery requests that come on the topic, taken many at a time.
+"""The delivery requests that arrive on the ROS topic, read in batches.
 
-To wake a thread of Python for each message costs this process 40 µs, and whoever sent it a processor meanwhile: on the
-machine of a small robot that is the processor of the client that waits for its answer. So the first that comes wakes
-one, and what comes in the next 5 ms waits for their end. Fast DDS keeps it, and acknowledges it, until then.
+Waking a Python thread for each message costs this process 40 µs and takes a processor from the sender. On a small
+robot's machine that is the processor of the client that waits for its response. So the first message wakes a thread,
+and messages of the next 5 ms are read together. Until then Fast DDS stores and acknowledges them.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,7 +25,7 @@ _MOST: Final = 5000  # that Fast DDS keeps; more come only while these are taken
 
 
 class DeliveryRequests:
-    """What has come, to be taken."""
+    """A subscription to the topic of delivery requests that is read in batches."""
 
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self._ros = ros
@@ -35,9 +35,9 @@ class DeliveryRequests:
         )
 
     def tell(self, node: Node, callback: Callable[[], None]) -> None:
-        """Have it called in a node's thread when some wait."""
+        """Call ``callback`` in a node's thread whenever requests are waiting to be read."""
         self._ros.watch(self._subscription, node, callback, _PAUSE_S)
 
     def taken(self) -> Iterator[DeliveryRequest]:
-        """Take what waits, oldest first."""
+        """Yield the waiting requests, oldest first, and remove them from the subscription's queue."""
         return map(DeliveryRequest.of, islice(taken(self._subscription), _MOST))

@@ -1,6 +1,7 @@
-"""What the robot senses besides its own odometry: laser scan, inertial measurement, battery.
+"""The robot's simulated sensors besides odometry: laser scanner, inertial measurement unit, battery.
 
-Nothing is measured while nobody listens, as image_transport has it: the scan alone would take 1 % of a processor.
+A sensor measures only while its topic has subscribers, as in image_transport. The laser alone would take 1 % of a
+processor.
 """
 
 import array
@@ -36,7 +37,7 @@ _EMPTY_V: Final = 14.0
 
 
 class Sensors:
-    """Publishes what the body senses."""
+    """The publishers of laser scans, inertial measurements and battery state for the body's true motion."""
 
     def __init__(self, node: Node, names: RosNames, motion: Callable[[], Motion]) -> None:
         self._clock = node.get_clock()
@@ -107,7 +108,7 @@ class Sensors:
 def _sensor(
     node: Node, kind: type, topic: str, qos: QoSProfile, period_s: float, measure: Callable[[], None]
 ) -> Publisher:
-    """Return a publisher for whose subscribers ``measure`` is called once in a period, and for nobody else."""
+    """Return a publisher; ``measure`` is called once per period while the publisher has subscribers."""
     timer = node.create_timer(period_s, measure, autostart=False)
 
     def note_subscribers(change: Any) -> None:
