@@ -1,4 +1,4 @@
-"""How the layers hang together: one pair of ROS nodes, handed down to every resource and web method (paper)."""
+"""The assembly of the web services: all resources and web methods share one pair of ROS nodes, as in the paper."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -35,7 +35,7 @@ _STATE_DEADLINE: Final = 1.0  # seconds for a managed node to say its state
 
 @dataclass(frozen=True)
 class Endpoints:
-    """Where the two interfaces listen: scheme, host, and the ports that were really bound."""
+    """The addresses of the REST and SOAP interfaces: scheme, host, and the ports that were bound."""
 
     scheme: str
     host: str
@@ -60,9 +60,9 @@ def interfaces(
     endpoints: Endpoints,
     listening: Listening,
 ) -> tuple[RestInterface, SoapInterface, Velocity]:
-    """Return both interfaces, which share the nodes and everything that is known about the robot.
+    """Return the REST interface, the SOAP interface and the Velocity object that both use.
 
-    The third is what drives: to be closed when nobody is served any more, so that the robot stops.
+    Close the Velocity object after the interfaces have stopped, so that the robot stops.
     """
     frames = configuration.frames
     executor, nodes = publishers.node.executor, configuration.nodes

@@ -1,4 +1,4 @@
-"""The endpoint publisher: both interfaces on their own ports, in one process and one event loop.
+"""The endpoint publisher: serves REST and SOAP on a port each, in one process and one event loop.
 
 The robot publishes its endpoints itself, without an application server (paper, "Purpose").
 """
@@ -14,14 +14,14 @@ from reference_robot.webservices.http.server import serve
 
 
 class PortInUseError(OSError):
-    """A port cannot be bound; the message names it and says why."""
+    """An error for a port that cannot be bound; the message names the port and the reason."""
 
 
 def bound(host: str, port: int) -> socket.socket:
-    """Return a TCP socket bound to host and port; port 0 takes a free one.
+    """Return a TCP socket that listens on a host and port; port 0 selects a free port.
 
     Raises:
-        PortInUseError: The address cannot be had.
+        PortInUseError: The address cannot be bound.
     """
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
@@ -34,13 +34,13 @@ def bound(host: str, port: int) -> socket.socket:
 
 
 class EndpointPublisher:
-    """Serves interfaces until it is told to stop.
+    """A server for several interfaces, each on its own socket.
 
     Args:
-        interfaces: Each with the socket on which it listens.
-        limits: What clients may use of each interface; what is kept for them, of all together.
-        proxies: Whose word on what was asked is taken.
-        context: What is needed for TLS; None for HTTP without.
+        interfaces: Each interface with its listening socket.
+        limits: What clients may use of each interface; the limit on memory applies to all interfaces together.
+        proxies: The proxies whose X-Forwarded fields are trusted.
+        context: The TLS settings; None for plain HTTP.
     """
 
     def __init__(
@@ -56,7 +56,10 @@ class EndpointPublisher:
         self._context = context
 
     async def serve(self, stop: asyncio.Event, started: asyncio.Event) -> None:
-        """Answer requests, setting ``started``, until ``stop`` is set; answers under way are finished then."""
+        """Serve requests until ``stop`` is set; set ``started`` once all interfaces are ready.
+
+        Requests in progress are finished before the method returns.
+        """
         held = Held()
         async with asyncio.TaskGroup() as group:
             listening = []

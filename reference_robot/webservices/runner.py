@@ -1,4 +1,4 @@
-"""RobotWebServiceNodesRunner: starts nodes and endpoints, and stops them (paper; apart from the endpoint itself)."""
+"""RobotWebServiceNodesRunner (paper): starts and stops the ROS nodes and the endpoints."""
 
 import asyncio
 import contextlib
@@ -28,11 +28,11 @@ _DISCOVERY_STEP: Final = 0.05
 
 
 class RobotNotFoundError(RuntimeError):
-    """The robot that was started did not appear on the ROS graph."""
+    """An error for a robot that was started but did not appear on the ROS graph."""
 
 
 class RobotWebServiceNodesRunner:
-    """Runs the web services of one robot; ``ros_arguments`` are for its nodes."""
+    """The web services of one robot with their ROS nodes; ``ros_arguments`` are passed to these nodes."""
 
     def __init__(
         self,
@@ -47,11 +47,11 @@ class RobotWebServiceNodesRunner:
         self._ros_arguments = ros_arguments
 
     def run(self, ready: Callable[[Endpoints], None], *, wait_for_robot: bool) -> None:
-        """Serve until SIGINT or SIGTERM; ``ready`` is called once, when both interfaces answer.
+        """Serve until SIGINT or SIGTERM; call ``ready`` once, when both interfaces accept requests.
 
         Raises:
-            PortInUseError: A port cannot be had.
-            RobotNotFoundError: ``wait_for_robot``, and none came in time.
+            PortInUseError: A port cannot be bound.
+            RobotNotFoundError: ``wait_for_robot`` is set and no robot appeared in time.
         """
         configuration = self._configuration
         _raise_descriptor_limit()

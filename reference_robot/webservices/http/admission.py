@@ -1,4 +1,4 @@
-"""Who is let in: requests for this robot, from no foreign page, with a token where tokens are asked for."""
+"""Access control by the head of a request: host name, bearer token and scope, and origin of a web page."""
 
 from collections.abc import Iterable
 from typing import Final, Protocol
@@ -14,19 +14,19 @@ _SHOWN: Final = 100  # characters of a client's own word
 
 
 class Scoped(Protocol):
-    """What knows the scope that a request needs."""
+    """An interface that knows which token scope a request needs."""
 
     def needed(self, request: Request) -> Scope | None:
-        """Return it; None for what any token may do."""
+        """Return the scope that a request needs; None if any valid token is sufficient."""
 
 
 class Admission:
-    """Judges a request by its head.
+    """The access check for the head of every request.
 
     Args:
-        authorization: Who may do what.
-        hosts: The names that the robot answers to.
-        origins: Web origins (RFC 6454) whose pages may command the robot, besides the one that was asked.
+        authorization: The valid tokens and their scopes.
+        hosts: The host names by which clients may address the robot.
+        origins: Web origins (RFC 6454), besides the robot's own, whose pages may send commands to the robot.
     """
 
     def __init__(self, authorization: Authorization, hosts: AllowedHosts, origins: Iterable[str] = ()) -> None:
@@ -35,7 +35,7 @@ class Admission:
         self._origins = frozenset(origin.encode() for origin in origins)
 
     def check(self, request: Request, scoped: Scoped) -> None:
-        """Raise the Problem 421, 401 or 403 for a request that is not let in."""
+        """Raise the Problem 421, 401 or 403 for a request with a wrong host, token or origin."""
         if not self._allows(request.authority):
             host = request.authority.decode("latin-1")[:_SHOWN]
             raise Problem(421, f"this robot is not {host!a}; started with --allowed-host NAME, it answers to NAME too")
@@ -45,10 +45,10 @@ class Admission:
             self._require_own_origin(request)
 
     def _require_own_origin(self, request: Request) -> None:
-        """Refuse what a page of another origin has a browser send: cross-site request forgery.
+        """Raise the Problem 403 for a command from a web page of another origin (cross-site request forgery).
 
-        Browsers ask before they send what this robot takes (PUT, DELETE, POST of text/xml), and get no leave. This
-        holds where a browser, or something between, forgets to ask.
+        Browsers send a preflight request before PUT, DELETE and POST of text/xml, and get no permission. This check
+        also stops browsers or intermediaries that omit the preflight.
         """
         origin = request.headers[b"origin"]
         asked_by = origin.partition(b"://")[2].lower()  # nothing, where the origin is null

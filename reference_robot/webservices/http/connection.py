@@ -1,16 +1,16 @@
-"""One connection: octets in, requests answered in their order, octets out.
+"""One HTTP connection: parses requests and enforces limits; the base class writes the responses in order.
 
-An ``asyncio.Protocol`` on httptools' parser. The content is complete before a resource sees its request. What keeps
-strangers from using the robot up:
+The class is an ``asyncio.Protocol`` on httptools' parser. A resource gets a request only when its body is complete.
+These limits keep clients from exhausting the robot:
 
-- sizes: of the target, of the head, of the content, of what is read and dropped after a refusal; and of all that
-  clients make the robot keep: half a request, one that waits, an answer that nobody reads;
-- times: ``due`` is when the client must have moved on, whatever it is about: sending a request, reading answers, asking
-  for something. There is no state of a connection without it but one: the robot works on an answer;
-- turns: so many requests may wait on a connection; then no more is read from it, nor while the client does not read.
+- Sizes: of the request target, the head, the body, the data dropped after a refusal, and all data that is kept for
+  clients: incomplete requests, waiting requests, and responses that a client does not read.
+- Times: ``due`` is the deadline for the client's next step, such as sending a request or reading responses. Only while
+  the robot works on a response is there no deadline.
+- Waiting requests: when too many wait on a connection, or while the client does not read, nothing more is read.
 
-Answers and turns are in ``answering``. A base class and not an object of its own: a call through one would be made
-several times for each request.
+``answering`` contains the base class. Inheritance is used because calls to a separate object, several for each request,
+would cost time.
 """
 
 import asyncio
@@ -43,7 +43,7 @@ _CONTINUE: Final = b"HTTP/1.1 100 Continue\r\n\r\n"
 
 
 class HttpConnection(AnsweringConnection):
-    """A connection to one port, and the half of it that makes requests of octets."""
+    """A connection to one port that parses requests and answers them."""
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
@@ -64,7 +64,7 @@ class HttpConnection(AnsweringConnection):
     # The transport's side
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Start the clock: a client that connects must also ask."""
+        """Register the connection and start the deadline for its first request; refuse one connection too many."""
         self._transport = cast("asyncio.Transport", transport)
         self._transport.set_write_buffer_limits(_UNREAD)
         self._is_proxied = self._port.proxies.include(transport.get_extra_info("peername"))
@@ -73,7 +73,7 @@ class HttpConnection(AnsweringConnection):
             self._refuse(not_yet("too many connections"))
 
     def data_received(self, data: bytes) -> None:
-        """Take octets."""
+        """Feed received bytes to the parser; answer invalid requests with an error."""
         if self._leaving:
             return
         if self._in_head:
@@ -94,24 +94,24 @@ class HttpConnection(AnsweringConnection):
     # The parser's side: an exception is the way out of its callbacks
 
     def on_message_begin(self) -> None:
-        """Start the clock for a request."""
+        """Start the deadline for receiving the request that begins."""
         self._has_begun = True
         if not self._stalled:
             self.due = self._now() + self._port.patience
 
     def on_url(self, url: bytes) -> None:
-        """Bound the request target."""
+        """Store a part of the request target; raise the Problem 414 if the target is too long."""
         self._target += url
         if len(self._target) > TARGET_LIMIT:
             raise Problem(414, f"the request target exceeds {TARGET_LIMIT} octets")
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """Keep a field, unless it is a trailer."""
+        """Store a header field; trailer fields are ignored."""
         if self._in_head:
             self._fields.append((name.lower(), value.rstrip()))
 
     def on_headers_complete(self) -> None:
-        """Refuse what can be refused by its head; else ask for the content if the client waits for that."""
+        """Refuse a request with an invalid head; otherwise send 100 Continue if the client waits for that status."""
         fields = self._fields
         if self._head_octets > HEAD_LIMIT:
             require_short_head(fields)
@@ -136,7 +136,7 @@ class HttpConnection(AnsweringConnection):
             self._transport.write(_CONTINUE)
 
     def on_body(self, body: bytes) -> None:
-        """Keep content, or drop what nobody wants."""
+        """Store a part of the body, or drop it if the request has been refused."""
         request = self._request
         if request is None or self._is_refused:
             self._dropped += len(body)
@@ -157,7 +157,7 @@ class HttpConnection(AnsweringConnection):
             self._refuse_one(request, problem)
 
     def on_message_complete(self) -> None:
-        """Hand the request over, and be ready for the next."""
+        """Answer or queue the complete request, and prepare for the next one."""
         request, refused = self._request, self._is_refused
         self._has_begun = self._is_refused = False
         self._in_head = True
@@ -181,13 +181,13 @@ class HttpConnection(AnsweringConnection):
     # The ends
 
     def _refuse_one(self, request: Request, problem: Problem) -> None:
-        """Refuse a request whose content is still to come."""
+        """Answer a request with an error before its body is complete; the rest of the body will be dropped."""
         self._is_refused = True
         self._content = b""
         self._queue(request, described(problem, request.headers.get(b"accept")))
 
     def _refuse(self, problem: Problem) -> None:
-        """Refuse what is no request, or too long a one, and read no more."""
+        """Answer bytes that are not a valid request with an error, and read nothing more."""
         if self._leaving:
             return
         if self._is_refused:  # it has its answer
@@ -198,7 +198,7 @@ class HttpConnection(AnsweringConnection):
         self._leaving = True
 
     def expire(self) -> None:
-        """End what is overdue; a client that is still sending is told so by a 408 (RFC 9110 15.5.9)."""
+        """End the connection because ``due`` has passed; answer 408 if a request is incomplete (RFC 9110 15.5.9)."""
         if self._transport.is_closing() or self._stalled:
             self._reset()
         elif self._has_begun and not self._leaving:
@@ -207,7 +207,7 @@ class HttpConnection(AnsweringConnection):
             self._close()
 
     def _hold_arriving(self) -> None:
-        """Count what there is of a request that is not complete."""
+        """Count the memory of the incomplete request; refuse the request if its head is too large or memory is full."""
         if self._in_head:
             if not self._head_octets:  # it began in the middle of a segment
                 self._head_octets = len(self._target) + sum(len(name) + len(value) for name, value in self._fields)

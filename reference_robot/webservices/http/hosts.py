@@ -1,8 +1,8 @@
-"""The names by which a robot is asked: what is not one of them is somebody's trick, or a mistake.
+"""The host names by which clients may address the robot; other names are rejected as DNS rebinding or a mistake.
 
-DNS rebinding: a page of evil.example lets its name point to the robot, and the browser takes the robot for the page's
-own server. The Host field is what gives it away, for it still says evil.example. An address in its place is no trick:
-whoever is asked by an address is at that address.
+In DNS rebinding, a page of evil.example changes its DNS entry to the robot's address, so that the browser treats the
+robot as the page's own server. The Host field reveals the attack, because it still contains evil.example. A Host field
+with an IP address is safe, because no DNS entry is involved.
 """
 
 import ipaddress
@@ -22,10 +22,10 @@ _LOCALHOST: Final = "localhost"
 
 
 class AllowedHosts:
-    """Tells whether the robot answers to a host: loopback's names, any address, and the given names.
+    """The set of host names that the robot accepts: localhost, every IP address, and the given names.
 
     Args:
-        names: Further names; ``.example.org`` stands for all names below example.org, ``*`` for all there are.
+        names: Further names; ``.example.org`` stands for all names below example.org, ``*`` for all names.
     """
 
     def __init__(self, names: Iterable[str] = ()) -> None:
@@ -48,18 +48,18 @@ class AllowedHosts:
 
 
 def is_host_pattern(text: str) -> bool:
-    """Tell whether a text is what ``AllowedHosts`` takes: a name, a domain with a dot before it, or an asterisk."""
+    """Return whether a text is valid for ``AllowedHosts``: a host name, a domain after a dot, or an asterisk."""
     return text == ANY or _NAME.fullmatch(text) is not None
 
 
 def own_names() -> list[str]:
-    """Return the names that this machine gives itself: its own, and that of multicast DNS (RFC 6762)."""
+    """Return this machine's host names: its own, and the multicast DNS name (RFC 6762)."""
     name = socket.gethostname()
     return [name] if "." in name else [name, f"{name}.local"]
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether all addresses of a host are this machine's alone."""
+    """Return whether all addresses of a host are loopback addresses, which other machines cannot reach."""
     try:
         found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except OSError:

@@ -1,4 +1,4 @@
-"""The server of one port: listens, keeps the clock, and stops in order."""
+"""The HTTP server of one port: accepts connections, ends overdue ones, and shuts down in order."""
 
 import asyncio
 import contextlib
@@ -23,14 +23,14 @@ async def serve(
     stop: asyncio.Event,
     context: ssl.SSLContext | None = None,
 ) -> None:
-    """Answer requests, setting ``started``, until ``stop`` is set; answers under way are finished then.
+    """Serve requests until ``stop`` is set; requests in progress are finished, for at most two seconds.
 
     Args:
-        port: What is behind the listener.
-        listener: A socket that listens.
-        started: Is set once requests are answered.
-        stop: Ends it.
-        context: What is needed for TLS; None for connections without.
+        port: The interface behind the listener, with its connections and limits.
+        listener: A listening socket.
+        started: An event that is set once requests are served.
+        stop: The event that ends the server.
+        context: The TLS settings; None for plain HTTP.
     """
     listener.listen(_BACKLOG)
     end_listening: Callable[[], object]

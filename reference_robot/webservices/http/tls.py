@@ -1,4 +1,4 @@
-"""TLS: the certificate that a server shows, and connections until both sides have agreed."""
+"""TLS: the server's certificate, and the handshakes of new connections."""
 
 import asyncio
 import contextlib
@@ -17,22 +17,22 @@ _PAUSE: Final = 0.1  # seconds, where no more connections can be had
 
 
 class TlsFileError(ValueError):
-    """The certificate or its key cannot be used; the message names the file and says why."""
+    """An error for a certificate or key that cannot be used; the message names the file and the reason."""
 
 
 class _EncryptedKeyError(Exception):
-    """The key asks for a password."""
+    """An error for a private key that is encrypted with a password."""
 
 
 def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
-    """Return what a server needs for TLS 1.2 and 1.3.
+    """Return the TLS settings of a server for TLS 1.2 and 1.3.
 
     Args:
-        certificate: PEM, the server's own first and then those that lead to an authority.
-        key: PEM, the private key of the first; not encrypted, for nobody is there to be asked for a password.
+        certificate: A PEM file with the server's certificate first, and then its chain.
+        key: A PEM file with the private key of the first certificate, without a password.
 
     Raises:
-        TlsFileError: A file cannot be read or holds something else, or the two do not belong together.
+        TlsFileError: A file cannot be read or has other contents, or key and certificate do not belong together.
     """
     for option, path in (("--tls-cert", certificate), ("--tls-key", key)):
         try:
@@ -69,9 +69,9 @@ def _reason(error: ssl.SSLError) -> str:
 
 
 async def accept(port: Port, listener: socket.socket, context: ssl.SSLContext) -> None:
-    """Take connections until it is cancelled; while both sides agree, they count among the port's already.
+    """Accept connections and perform their TLS handshakes until cancelled; handshakes count as connections of the port.
 
-    ``create_server(ssl=...)`` would do, if it told anybody of those that never get so far.
+    ``create_server(ssl=...)`` does not count connections whose handshake is not complete.
     """
     handshakes: set[asyncio.Task[None]] = set()
     try:

@@ -1,4 +1,4 @@
-"""Where the odometry frame lies in the map, as the robot's localisation tells it (REP 105)."""
+"""The transform from the map to the odometry frame, as the robot's localisation publishes it (REP 105)."""
 
 from typing import Any, Final
 
@@ -14,13 +14,14 @@ _STATIC: Final = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOC
 
 
 class MapTransform:
-    """Keeps the transform from the map to the odometry frame, in the executor's thread.
+    """A subscriber that keeps the latest transform from the map to the odometry frame.
 
-    No tf2 listener: one transform is asked for, of the tens that a robot tells a hundred times a second. So messages
-    come as octets, and one is read only if the map's name stands in it, which costs a hundredth.
+    Only one transform is needed out of the many that a robot publishes up to a hundred times a second. So there is no
+    tf2 listener: a message is deserialized only if its bytes contain the map's frame id, which takes a hundredth of the
+    time.
 
     Attributes:
-        latest: The geometry_msgs/Transform told last; None where nobody tells it.
+        latest: The last geometry_msgs/Transform; None before the first.
     """
 
     def __init__(self, node: Node, names: RosNames) -> None:

@@ -1,4 +1,4 @@
-"""ROS messages as JSON, XML and text, and back: shapes, strict reading, writing.
+"""Conversion between ROS messages and JSON, XML and text: shapes, strict reading, writing.
 
-Between ROS and the wire stands *plain data*: dicts by field name, lists, str, int, float and bool.
+All conversions pass through *plain data*: dicts by field name, lists, str, int, float and bool.
 """

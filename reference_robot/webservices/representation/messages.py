@@ -1,4 +1,4 @@
-"""Between ROS messages and plain data."""
+"""Conversion between ROS messages and plain data (dicts, lists, str, int, float, bool)."""
 
 import math
 from collections.abc import Callable
@@ -10,10 +10,10 @@ from reference_robot.webservices.representation.shapes import Record, Series, Sh
 
 
 def reader_of(message: Any) -> Callable[[Any], dict[str, Any]]:
-    """Return a function from a message of this class to plain data.
+    """Return a function that converts messages of a ROS class to plain data.
 
-    The function raises the Problem 503, naming the field, for a value that is not finite: such a one never leaves the
-    robot (contract, REST).
+    The function raises the Problem 503 for a value that is not finite, and names its field: such values must not be
+    sent to clients (contract, REST).
     """
     shape = shape_of(message)
     read = _reader(shape)
@@ -39,7 +39,7 @@ def _require_finite(plain: Any, where: str) -> None:
 
 
 def message_from(shape: Record, plain: dict[str, Any]) -> Any:
-    """Return the ROS message that checked plain data stands for; fields left out keep ROS's defaults."""
+    """Return the ROS message for plain data of a checked shape; missing fields keep ROS's defaults."""
     return shape.message(**{name: _value(shape.field(name), value) for name, value in plain.items()})
 
 

@@ -1,4 +1,4 @@
-"""Request bodies as plain data: strict JSON (RFC 8259) and XML in the form that the robot sends."""
+"""Parsing of request bodies into plain data: strict JSON (RFC 8259), and XML in the form that the robot sends."""
 
 import codecs
 import json
@@ -28,7 +28,7 @@ _XML_SPACE: Final = " \t\r\n"
 
 
 class _Beyond:
-    """A JSON number that no double holds; prints as it was sent."""
+    """A JSON number that is too large for a double; its repr is the text that the client sent."""
 
     def __init__(self, lexeme: str) -> None:
         self.lexeme = lexeme
@@ -38,10 +38,10 @@ class _Beyond:
 
 
 def read(body: bytes, content_type: bytes | None, shape: Record) -> dict[str, Any]:
-    """Return a request body, its size already bounded, as plain data of the given shape.
+    """Return a request body as plain data of the given shape; the caller has limited the body's size.
 
     Raises:
-        Problem: 415 for another media type, 400 for what is no JSON or XML at all, 422 for the wrong shape or value.
+        Problem: 415 for another media type, 400 for a body that is not JSON or XML, 422 for a wrong shape or value.
     """
     media_type, charset = parsed_content_type(content_type)
     if media_type == JSON:
@@ -58,7 +58,7 @@ def read(body: bytes, content_type: bytes | None, shape: Record) -> dict[str, An
 
 @lru_cache(maxsize=256)
 def parsed_content_type(field: bytes | None) -> tuple[str, str | None]:
-    """Return media type and charset in lower case (RFC 9110 8.3.1); the charset is None where none is given."""
+    """Return media type and charset of a Content-Type in lower case (RFC 9110 8.3.1); the charset may be None."""
     media_type, *parameters = (field or b"").decode("latin-1").lower().split(";")
     for parameter in parameters:
         name, _, value = parameter.partition("=")
@@ -68,11 +68,11 @@ def parsed_content_type(field: bytes | None) -> tuple[str, str | None]:
 
 
 def read_json(body: bytes) -> Any:
-    """Return a JSON text as plain data; a number that no double holds stays an object of its own.
+    """Return a JSON text as plain data; numbers too large for a double become ``_Beyond`` objects.
 
     Raises:
-        Problem: 400 for a byte order mark, octets that are not UTF-8, what is no JSON (NaN and Infinity among it) and
-            nesting too deep to be read; 422 for a name that occurs twice in one object.
+        Problem: 400 for a byte order mark, invalid UTF-8, invalid JSON (including NaN and Infinity) and too deep
+            nesting; 422 for a name that occurs twice in one object.
     """
     if body.startswith(codecs.BOM_UTF8):
         raise Problem(400, "the body begins with a byte order mark (RFC 8259 8.1)")
@@ -114,7 +114,7 @@ def _whole(lexeme: str) -> int | _Beyond:
 
 
 def _from_element(element: etree._Element, shape: Any, where: str) -> Any:
-    """Return an element as plain data; what does not fit stays text and is refused by the check of shapes."""
+    """Return an XML element as plain data; values of a wrong type remain text, which the shape check refuses."""
     if element.attrib:
         raise Problem(422, f"unknown attribute {shown(next(iter(element.attrib)))} of {where}")
     if isinstance(shape, Record):

@@ -1,4 +1,4 @@
-"""What a representation consists of: shapes, taken from ROS message classes or declared by hand."""
+"""Shapes, which describe the fields and value ranges of plain data; most are derived from ROS message classes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rosidl_parser.definition import AbstractNestedType, AbstractString, Array, 
 
 @dataclass(frozen=True)
 class Real:
-    """A finite IEEE 754 double (ROS float32 and float64)."""
+    """The shape of a finite IEEE 754 double (ROS float32 and float64)."""
 
 
 @dataclass(frozen=True)
 class Whole:
-    """An integer within the bounds of its ROS type, both inclusive."""
+    """The shape of an integer between the bounds of its ROS type, both inclusive."""
 
     lowest: int
     highest: int
@@ -25,7 +25,7 @@ class Whole:
 
 @dataclass(frozen=True)
 class Text:
-    """A string whose length in characters lies within the bounds, both inclusive."""
+    """The shape of a string with a minimum and a maximum length in characters, both inclusive."""
 
     shortest: int = 0
     longest: int | None = None
@@ -33,12 +33,12 @@ class Text:
 
 @dataclass(frozen=True)
 class Truth:
-    """A boolean."""
+    """The shape of a boolean."""
 
 
 @dataclass(frozen=True)
 class Series:
-    """A list of items; ``length`` is set for ROS arrays of fixed size."""
+    """The shape of a list of items; ``length`` is set for ROS arrays of fixed size."""
 
     item: Shape
     length: int | None = None
@@ -46,9 +46,9 @@ class Series:
 
 @dataclass(frozen=True)
 class Record:
-    """Fields by name, in the order of the ROS definition.
+    """The shape of an object with named fields, in the order of the ROS definition.
 
-    ``optional`` fields may be left out in input; ``message`` is the ROS class, where there is one.
+    ``optional`` names the fields that input may omit; ``message`` is the ROS class, if there is one.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Record:
     message: Any = field(default=None, compare=False)
 
     def field(self, name: str) -> Shape | None:
-        """Return the shape of a field, or None where the record has no such field."""
+        """Return the shape of a field; None if the record has no such field."""
         return dict(self.fields).get(name)
 
 
@@ -75,10 +75,10 @@ _OPTIONAL: Final = {"std_msgs/Header": frozenset({"stamp"})}
 
 @cache
 def shape_of(message: Any) -> Record:
-    """Return the shape of a message class that rosidl generated.
+    """Return the shape of a ROS message class that rosidl generated.
 
     Raises:
-        TypeError: The class has a field of a type that no web service carries (wide characters, long double).
+        TypeError: A field has a type that the web services do not support (wide characters, long double).
     """
     names = tuple(message.get_fields_and_field_types())
     shapes = tuple(_shape(slot) for slot in message.SLOT_TYPES)

@@ -1,12 +1,12 @@
-"""XML from outside, parsed so that nothing in it can reach beyond itself.
+"""Safe parsing of XML from clients.
 
-No entity is resolved, nothing is fetched, no DTD is loaded, the tree stays within libxml2's ordinary limits (depth
-256), and a document with a DOCTYPE or a processing instruction is refused (WS-I Basic Profile 1.1 R1008, R1009).
-The size is bounded before a body comes here.
+No entity is resolved, nothing is fetched, no DTD is loaded, and libxml2's usual limits apply (depth 256). A document
+with a DOCTYPE or a processing instruction is refused (WS-I Basic Profile 1.1 R1008, R1009). The caller has limited the
+document's size.
 
-libxml2 keeps every name that it has met for as long as the thread lives that met it. So documents with new names are
-parsed in a thread of their own once there have been many: strangers cannot fill the robot's memory with names. A few
-names are learnt again and again, so that after such strangers a client with a prefix of its own is soon known.
+libxml2 keeps every name that a thread has parsed until that thread ends. A client that sends ever new names could fill
+the robot's memory. So the main thread learns only a limited number of names, which slowly grows; a document with more
+new names is parsed in a thread of its own.
 """
 
 import codecs
@@ -40,12 +40,12 @@ _NEW_NAMES: Final = 32  # that one document may teach; a client's own messages h
 
 
 class KnownNames:
-    """The names that the main thread's parser has met, and what it may still learn.
+    """The XML names that the main thread's parser has stored, and a budget for new ones.
 
     Args:
-        at_once: How many may be learnt at once.
-        interval: Seconds after which one more may be learnt: some 0.9 MB a day, should strangers take them all.
-        clock: Where the time comes from, in seconds.
+        at_once: The largest budget of new names.
+        interval: Seconds after which the budget grows by one name: at most some 0.9 MB a day.
+        clock: The source of the time in seconds.
     """
 
     def __init__(
@@ -59,7 +59,10 @@ class KnownNames:
         self._counted_at = clock()
 
     def has_all(self, text: bytes) -> bool:
-        """Tell whether a document brings no new names, or few enough to learn them."""
+        """Return whether the main thread may parse a document: its new names, if any, are within the budget.
+
+        The new names then count as known.
+        """
         names = _ELEMENT_NAME.findall(text)
         # What precedes an equals sign names an attribute; words of a text may be among it, which does no harm.
         for before in text.split(b"=")[:-1]:
@@ -95,11 +98,11 @@ _PARSER: Final = _new_parser()
 
 
 def parsed(body: bytes, charset: str | None = None) -> etree._Element:
-    """Return the root element; the media type's charset outranks the document's own word (RFC 7303 3.2).
+    """Return the root element of an XML document; the media type's charset overrides its declaration (RFC 7303 3.2).
 
     Raises:
-        Problem: 400 where the document is malformed, 415 where its encoding is neither UTF-8 nor UTF-16, and 400
-            where it has a DOCTYPE or a processing instruction, or far too many attributes.
+        Problem: 400 for a malformed document, a DOCTYPE, a processing instruction or too many attributes; 415 for an
+            encoding other than UTF-8 and UTF-16.
     """
     text = _as_utf8(body, charset)
     if b"<!DOCTYPE" in text and _DOCTYPE.match(text):
@@ -140,7 +143,7 @@ def _as_utf8(body: bytes, charset: str | None) -> bytes:
 
 
 def _own_encoding(body: bytes) -> str:
-    """Return what the document says of itself (XML 1.0 appendix F): byte order mark, first octets, declaration."""
+    """Return a document's encoding from its byte order mark, first bytes or declaration (XML 1.0 appendix F)."""
     if body[:1] == b"<" and body[1:2] not in b"?\0":
         return "utf-8"  # as almost all of them
     if body.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

@@ -1,4 +1,4 @@
-"""The delivery application's resources: the paper's PUT, and the list of what was accepted."""
+"""The delivery application's resources: the paper's PUT request, and the list of accepted deliveries."""
 
 import re
 from typing import Final
@@ -25,7 +25,7 @@ _NUMBER: Final = re.compile(NUMBER.encode())
 
 
 class Delivery(Resource):
-    """PUT publishes one DeliveryRequestMsg. The only resource with values in its path."""
+    """The resource whose PUT publishes one DeliveryRequestMsg; its path contains the message's values."""
 
     path = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in PATH_NAMES)
 
@@ -34,11 +34,11 @@ class Delivery(Resource):
 
     @staticmethod
     def owns(path: bytes) -> bool:
-        """Tell whether a raw path has this resource's form, whatever its values."""
+        """Return whether a raw path has the form of this resource, whatever its values."""
         return _ANY.fullmatch(path) is not None
 
     def put(self, request: Request) -> Response:
-        """Accept a delivery, 204; a body is ignored. 422 for codes other than 3 and 4 and for bad numbers."""
+        """Publish a delivery and return 204; raise the Problem 422 for an unknown code or an invalid number."""
         match = _WELL_FORMED.fullmatch(request.path)
         sent = _spelled_out(request.path) if match is None else match.groups()
         try:
@@ -50,7 +50,7 @@ class Delivery(Resource):
 
 
 class DeliveryList(Resource):
-    """The requests accepted last, newest first, with their state: an extension of the contract."""
+    """The resource that lists the latest accepted deliveries with their states: an extension of the contract."""
 
     path = _PREFIX
 
@@ -58,12 +58,12 @@ class DeliveryList(Resource):
         self._deliveries = deliveries
 
     def get(self, request: Request) -> Response:
-        """Return the list."""
+        """Return the list of deliveries, newest first."""
         return represented(self._deliveries.listed(), "Deliveries", wanted_format(request))
 
 
 def _spelled_out(path: bytes) -> tuple[bytes, ...]:
-    """Return the values one by one, percent-decoded; what is no number is refused by its name."""
+    """Return the percent-decoded values of a delivery path; raise the Problem 422 that names an invalid value."""
     match = _ANY.fullmatch(path)
     if match is None:
         raise Problem(404, "no such delivery")

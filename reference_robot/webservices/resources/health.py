@@ -1,4 +1,4 @@
-"""/robot/health/: what is there and how old, an extension of this robot's."""
+"""/robot/health/: which parts of the robot are available, and how old their data is; an extension of this robot."""
 
 from typing import Any, Final
 
@@ -28,7 +28,7 @@ _SCHEMA: Final = {
 
 
 class Health(Resource):
-    """The robot's health; it is answered 200 whatever it says, for the question has been answered."""
+    """The robot's health; the status is 200 even if the robot is unhealthy."""
 
     path = "/robot/health/"
     # As it stands under its path in an OpenAPI description.
@@ -57,6 +57,6 @@ class Health(Resource):
         self._health = health
 
     async def get(self, request: Request) -> Response:
-        """Return the report."""
+        """Return the health report in the format that the client prefers."""
         media_type = wanted_format(request)
         return represented(await self._health.report(), "Health", media_type)

@@ -1,4 +1,4 @@
-"""The delivery application as both interfaces see it: hand a request to ROS, remember it, tell what became of it."""
+"""Delivery requests from REST and SOAP: publishing them to ROS, and listing them with their states."""
 
 import math
 import time
@@ -20,7 +20,7 @@ _NANOSECONDS: Final = 10**9
 
 
 class UnusableFieldError(ValueError):
-    """A field of the message has a value that no delivery may have; the rule says what it must be."""
+    """An error for a field with an invalid value; ``rule`` says what the value must be."""
 
     def __init__(self, field: str, rule: str) -> None:
         super().__init__(f"{field} {rule}")
@@ -28,7 +28,7 @@ class UnusableFieldError(ValueError):
         self.rule = rule
 
     def refusal(self, name: str, sent: str) -> Problem:
-        """Return the 422 in the words of an interface: its own name of the field, and the text that came in it."""
+        """Return the Problem 422 with the interface's own name of the field and the text that the client sent."""
         return Problem(422, f"{name} {self.rule}, not {shown(sent)}")
 
 
@@ -36,7 +36,7 @@ Sender = Literal["rest", "soap"]
 
 
 class Deliveries:
-    """Takes delivery requests from both interfaces."""
+    """The publisher and the list of delivery requests from both interfaces."""
 
     def __init__(self, publishers: RobotPublishersNode, subscribers: RobotSubscribersNode) -> None:
         self._publishers = publishers
@@ -46,12 +46,12 @@ class Deliveries:
         self._accepted: deque[tuple[DeliveryRequest, int, Sender]] = deque(maxlen=_REMEMBERED)
 
     def accept(self, request: DeliveryRequest, interface: Sender) -> None:
-        """Publish a request: exactly one message.
+        """Publish a delivery request as exactly one ROS message.
 
         Raises:
-            UnusableFieldError: The code is no delivery's, or a coordinate is not finite.
-            Problem: 503, when no delivery application listens, for the message would be lost, and while those that
-                listen are behind by thousands.
+            UnusableFieldError: The message code is unknown, or a coordinate is not finite.
+            Problem: 503, if no delivery application subscribes, so that the message would be lost, or if the
+                subscribers are thousands of messages behind.
         """
         _require_usable(request)
         if len(self._reports) > _REPORTS:
@@ -64,7 +64,7 @@ class Deliveries:
         self._accepted.append((request, at, interface))
 
     def listed(self) -> list[dict[str, Any]]:
-        """Return the requests accepted last, newest first, with the state that the application reports, and why."""
+        """Return the latest accepted requests, newest first, with the states and reasons reported for them."""
         self._catch_up()
         find = self._missions.finder()
         listed = []

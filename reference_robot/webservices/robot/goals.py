@@ -1,4 +1,4 @@
-"""The life of a goal: sent, repeated, preempted, cancelled, ended. One goal is current at a time, or none."""
+"""The life of a navigation goal: sent, repeated, displaced, cancelled, ended. At most one goal is current at a time."""
 
 import asyncio
 import contextlib
@@ -44,9 +44,13 @@ _REASON_STEP: Final = 0.02
 
 @dataclass(frozen=True)
 class _Goal:
-    """A goal that the robot accepted from us; ``handle`` is rclpy's, which follows its status.
+    """A goal that the robot accepted from these web services.
 
-    ``losses`` is how many action servers had gone when it was accepted.
+    Attributes:
+        identity: The goal's UUID in ROS, 16 bytes.
+        described: The goal as a plain MoveBaseActionGoal.
+        handle: rclpy's ClientGoalHandle, which follows the goal's status.
+        losses: How many action servers had disappeared when the goal was accepted.
     """
 
     identity: bytes
@@ -61,7 +65,7 @@ class _Goal:
 
 
 class Goals:
-    """The goal resource's life cycle, on the event loop's thread; ``frames`` are those in which poses are taken."""
+    """The goals of the goal resource, on the event loop's thread; target poses must be in one of ``frames``."""
 
     def __init__(
         self,
@@ -87,7 +91,7 @@ class Goals:
         """Return the active goal as a plain MoveBaseActionGoal with its status, or None.
 
         Raises:
-            Problem: 503 while ROS's thread hangs: what the robot does now is not known then.
+            Problem: 503 while the ROS thread hangs, because the robot's present state is unknown.
         """
         if self._subscribers.hangs():
             raise not_yet(f"ROS has not been heard of for {self._subscribers.silence():.1f} s: the goal is not known")
@@ -97,19 +101,19 @@ class Goals:
         return self._foreign()
 
     def is_active(self) -> bool:
-        """Tell whether the robot follows a goal, whoever sent it."""
+        """Return whether the robot follows a goal of any client."""
         return self.current() is not None
 
     async def send(self, wanted: dict[str, Any]) -> tuple[int, dict[str, Any]]:
-        """Send a plain MoveBaseActionGoal of the right shape, unless it is the current one already.
+        """Send a plain MoveBaseActionGoal of valid shape to the navigation, unless it is the current goal already.
 
         Returns:
-            The HTTP status and the goal as the robot holds it: 200 for a repeat, 201 for a new goal, 202 where it
-            displaces another one.
+            The HTTP status and the goal as the robot holds it: 200 for a repeat, 201 for a new goal, 202 if it
+                displaces another goal.
 
         Raises:
-            Problem: 422 for a pose that cannot be taken or a goal that the robot refuses, 409 for the current goal's
-                id with another pose, 503 while no navigation is there.
+            Problem: 422 for an invalid pose or a goal that the robot refuses, 409 for the current goal's id with
+                another pose, 503 while no navigation is running.
         """
         require_pose(wanted["goal"]["target_pose"], self._frames, "goal.target_pose")
         cancels = self._cancels
@@ -133,10 +137,10 @@ class Goals:
         return (201 if current is None else 202), sent
 
     async def cancel(self) -> None:
-        """Cancel the active goal, whoever sent it, and one that is being sent; it waits for no other request.
+        """Cancel the active goal of any client, and a goal that is being sent; do not wait for other requests.
 
         Raises:
-            Problem: 404 when there is none, 409 when the robot will not cancel it, 503 when it does not answer.
+            Problem: 404 if there is no goal, 409 if the robot refuses to cancel it, 503 if the robot does not respond.
         """
         current, own, sending = self.current(), self._own, self._sending
         if current is None and not sending:
@@ -163,7 +167,7 @@ class Goals:
         return own
 
     def _foreign(self) -> dict[str, Any] | None:
-        """Return a goal that somebody else sent: a mission of the robot's own, or a goal of another client's."""
+        """Return the active goal that another client or a mission of the robot has sent, or None."""
         if not self._publishers.navigation_is_served():
             return None
         told = self._subscribers.current_goal
@@ -176,7 +180,7 @@ class Goals:
         return None if goal is None or goal["goal_id"]["id"] in self._known else goal
 
     def _filled_in(self, wanted: dict[str, Any]) -> dict[str, Any]:
-        """Return the goal with what the client may leave out: stamps mean now, the id is a new one."""
+        """Return the goal with optional fields added: the present time for stamps, and a new id."""
         seconds, nanoseconds = self._publishers.node.get_clock().now().seconds_nanoseconds()
         now = {"stamp": {"sec": seconds, "nanosec": nanoseconds}}
         target = wanted["goal"]["target_pose"]
@@ -187,7 +191,16 @@ class Goals:
         }
 
     async def _accepted(self, described: dict[str, Any], cancels: int) -> _Goal:
-        """Have the navigation take a goal, unless there was a DELETE after the first ``cancels`` of them."""
+        """Return the goal after the navigation has accepted it.
+
+        Args:
+            described: The goal as a plain MoveBaseActionGoal.
+            cancels: The number of DELETE requests when the goal's request arrived.
+
+        Raises:
+            Problem: 409 if a DELETE request has arrived since; 422 if the navigation refuses the goal; 503 without a
+                navigation.
+        """
         if not self._publishers.navigation_is_served():
             raise not_yet("the robot has no navigation that takes goals")
         identity = uuid.uuid4().bytes  # ROS's own: an id of the web may come again for another goal
@@ -216,7 +229,7 @@ class Goals:
             raise Problem(409, "the goal was cancelled, by a DELETE, before the navigation had taken it")
 
     async def _reason(self, target: dict[str, Any]) -> str:
-        """Return why the robot refused a goal, which ours tells on a topic of its own; Nav2 does not."""
+        """Return why the robot refused a goal; the reference robot publishes the reason on a topic, Nav2 does not."""
         for _ in range(round(_REASON_COMES_WITHIN / _REASON_STEP)):
             try:
                 told = json.loads(self._subscribers.last_rejection or "{}")

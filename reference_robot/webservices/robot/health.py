@@ -1,4 +1,4 @@
-"""What of the robot is there, and how old what is known of it is."""
+"""The health report: which parts of the robot are available, and how old their data is."""
 
 import asyncio
 from typing import Any
@@ -10,7 +10,7 @@ from reference_robot.webservices.robot.odometry import OLDEST, LatestOdometry
 
 
 class Health:
-    """Looks at everything that requests depend on."""
+    """A reporter on all parts of the robot that requests depend on."""
 
     def __init__(
         self,
@@ -27,10 +27,10 @@ class Health:
         self._planner = planner
 
     async def report(self) -> dict[str, Any]:
-        """Return a record for each part with ``available`` in it, ages in seconds, and ``healthy`` for all together.
+        """Return a dict with ``available``, and ages in seconds, for each part, and ``healthy`` for the whole robot.
 
-        A robot is healthy while its odometry is younger than a second and ROS's threads run: without a navigation or
-        a delivery application it is a robot still.
+        A robot is healthy if its odometry is less than a second old and the ROS threads run; navigation and the
+        delivery application are not required.
         """
         publishers, subscribers = self._publishers, self._subscribers
         hangs = subscribers.hangs()

@@ -1,9 +1,8 @@
-"""The odometry received last: where the robot is and how fast it moves, as it measures itself.
+"""The latest odometry of the robot, deserialized and written as JSON, XML and text.
 
-What a message says, and what is written of it, is worked out when somebody asks: an idle robot does nothing for its
-fifty messages a second. But where message after message is asked for, the next one is worked out when it comes, in
-ROS's thread. Otherwise one answer in two of a client that asks a hundred times a second would take that time, and the
-other would not.
+Messages are converted when a client requests them: an idle robot does nothing for its fifty messages a second. But if
+clients requested the last two messages, the next one is converted on arrival, in the ROS thread. Otherwise a client
+with a hundred requests a second would wait for the conversion in every second response.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _NOBODY: Final[frozenset[Writer]] = frozenset()
 
 
 class LatestOdometry:
-    """Tells what the robot measures."""
+    """The latest odometry message, with its age and its representations."""
 
     def __init__(self, subscribers: RobotSubscribersNode) -> None:
         self._subscribers = subscribers
@@ -38,26 +37,26 @@ class LatestOdometry:
         subscribers.on_odometry = self._foresee
 
     def message(self) -> Odometry:
-        """Return the message received last.
+        """Return the latest odometry message.
 
-        Its age is counted from its arrival, by this machine's clock: a robot's own clock may be another one.
+        The message's age is measured from its arrival by this machine's clock, because the robot's clock may differ.
 
         Raises:
-            Problem: 503 before the first, and while the last is older than a second, be it that the robot fell silent
-                or that ROS's thread in this process hangs.
+            Problem: 503 before the first message, and if the latest is over a second old, because the robot stopped
+                publishing or the ROS thread of this process hangs.
         """
         return self._latest().message
 
     def age(self) -> float | None:
-        """Return how many seconds ago the last message came; None before the first."""
+        """Return how many seconds ago the latest message arrived; None before the first."""
         octets, received = self._subscribers.odometry
         return None if octets is None else monotonic() - received
 
     def written(self, writer: Callable[[dict[str, Any]], T]) -> T:
-        """Return what a writer makes of the message received last: made once for each, however often it is asked for.
+        """Return the result of a writer for the latest message; each writer is called at most once per message.
 
         Raises:
-            Problem: As ``message``; the 503 also where a value in it is not finite.
+            Problem: 503 as ``message``, and for a value that is not finite.
         """
         told = self._latest()
         told.asked.add(writer)
@@ -78,9 +77,9 @@ class LatestOdometry:
         return told
 
     def _foresee(self, octets: bytes) -> None:
-        """Work a message out that has just come, for those who asked for the last two; in ROS's thread.
+        """Convert a message that has just arrived, if clients requested the last two; runs in the ROS thread.
 
-        Should the event loop's thread do the same meanwhile, one of the two was in vain.
+        The event loop's thread may do the same conversion at the same time; then one of the two results is unused.
         """
         self._came += 1
         last = self._told
@@ -101,7 +100,7 @@ class LatestOdometry:
 
 
 class _Told:
-    """What one message says, what has been written of it, who asked for that, and who asked for the one before it."""
+    """An odometry message, its representations so far, and the writers used for it and for its predecessor."""
 
     def __init__(self, number: int, octets: bytes, message: Any, asked_before: frozenset[Writer]) -> None:
         self.number = number

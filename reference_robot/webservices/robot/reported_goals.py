@@ -1,4 +1,4 @@
-"""Goals that somebody else sent, described as ours are: by the robot's own word, or by the action's status alone."""
+"""Goals of other clients as plain MoveBaseActionGoals, from the robot's own report or from the action's status."""
 
 import json
 from typing import Any, Final
@@ -20,7 +20,7 @@ _ORIGIN: Final = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x
 
 
 def told_goal(report: str) -> dict[str, Any] | None:
-    """Return the goal of which a robot tells (``current_goal`` in ``names.toml``); a report amiss counts as none."""
+    """Return the goal in a report of the robot (``current_goal`` in ``names.toml``); None for an invalid report."""
     try:
         told = json.loads(report)
         code, pose = int(told["status"]), told["pose"]
@@ -36,10 +36,10 @@ def told_goal(report: str) -> dict[str, Any] | None:
 
 
 def untold_goal(goal: ReportedGoal) -> dict[str, Any]:
-    """Return an active goal of which only its action tells: that it is there, and not where it leads.
+    """Return an active goal whose target pose is unknown, because only the action's status reports the goal.
 
-    The representation has a pose all the same. It is in no frame (an empty ``frame_id``), so that nobody takes it for
-    a place, and the status says so in words.
+    The representation requires a pose. It is the origin in an empty ``frame_id``, so that no client takes it for a real
+    place, and the status text says that the target is not known.
     """
     header = {"stamp": {"sec": goal.seconds, "nanosec": goal.nanoseconds}, "frame_id": ""}
     return {

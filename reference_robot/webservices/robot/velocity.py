@@ -1,4 +1,4 @@
-"""The robot's velocity: what it measures, and what clients may ask for."""
+"""The robot's velocity: the measured one, and commands from clients."""
 
 import asyncio
 import time
@@ -20,7 +20,7 @@ _DISCOVERY_STEP: Final = 0.02
 
 
 class Velocity:
-    """Commands and measures velocity."""
+    """The measured velocity of the robot, and the sender of velocity commands."""
 
     def __init__(
         self,
@@ -39,19 +39,19 @@ class Velocity:
         self._watchdog = VelocityWatchdog(settings.hold, self._stop)
 
     def measured(self) -> dict[str, Any]:
-        """Return the measured velocity as a plain geometry_msgs/Twist; m/s and rad/s.
+        """Return the measured velocity as a plain geometry_msgs/Twist, in m/s and rad/s.
 
         Raises:
-            Problem: 503 without odometry of the last second.
+            Problem: 503, if there is no odometry of the last second.
         """
         return self._read(self._odometry.message().twist.twist)
 
     async def command(self, twist: dict[str, Any]) -> None:
-        """Publish a plain Twist once; it ends after the hold time, by the robot's own watchdog or by ours.
+        """Publish a plain Twist once; the robot's or this program's watchdog ends the velocity after the hold time.
 
         Raises:
-            Problem: 422 for a value beyond the limits or for a component that a differential drive cannot actuate,
-                409 while a goal is active, 503 when no robot takes velocities.
+            Problem: 422 for a value beyond the limits or a component that a differential drive cannot actuate, 409
+                while a goal is active, 503 if no robot subscribes to velocities.
         """
         self._check_limits(twist)
         if self._goal_is_active():
@@ -68,8 +68,8 @@ class Velocity:
     async def command_linear(self, linear: dict[str, float]) -> None:
         """Publish a velocity with a new linear part and the angular part that is in force.
 
-        What is in force is the angular part asked for within the hold time, or none: a robot that has stopped by
-        itself must not be made to turn again.
+        The angular part of the last command is in force during the hold time; afterwards it is zero. A robot that has
+        stopped must not start to turn again.
         """
         held = self._commanded
         if held is None or time.monotonic() - self._commanded_at >= self._settings.hold:
@@ -79,12 +79,12 @@ class Velocity:
         await self.command({"linear": linear, "angular": angular})
 
     def close(self) -> None:
-        """Stop the robot if a velocity of ours is in force: nobody will, once this process is gone."""
+        """Stop the robot if a velocity from these web services is in force, before this process ends."""
         self._watchdog.close()
         self._publishers.await_velocity_taken()
 
     def _stop(self) -> None:
-        """Publish zero, unless the robot follows a goal by now: then the velocities are the navigation's."""
+        """Publish zero velocity, unless the robot follows a goal: then the navigation controls the velocity."""
         try:
             if self._goal_is_active():
                 return

@@ -1,4 +1,4 @@
-"""RobotPublishersWebService: the web methods that make the robot act."""
+"""RobotPublishersWebService: the web methods that order deliveries."""
 
 from functools import partial
 from typing import Final
@@ -22,7 +22,7 @@ _CODE: Final = _ORDER.index("message_code")
 
 
 class PublishersWebService(SoapService):
-    """ExecuteDeliveryRequest and ExecuteCoffeeRequest: both return nothing (paper), the empty wrapper."""
+    """The operations ExecuteDeliveryRequest and ExecuteCoffeeRequest, which return an empty response (paper)."""
 
     scope = Scope.DELIVER
 
@@ -33,11 +33,13 @@ class PublishersWebService(SoapService):
         self._done = {name: self._empty_response(name) for name in codes}
 
     def _execute(self, operation: str, code: int | None, wrapper: etree._Element) -> Response:
-        """Hand over a request that is valid by the XSD, which allows ``INF``, ``NaN`` and a missing ``arg0``.
+        """Publish the delivery request in a schema-valid message; return the empty response.
+
+        The XSD allows ``INF``, ``NaN`` and a missing ``arg0``, so these are checked here.
 
         Raises:
-            Fault: Client, where ``arg0`` is missing: there is nothing to deliver.
-            Problem: As ``Deliveries.accept``; 422 for what no delivery may have.
+            Fault: Client, if ``arg0`` is missing.
+            Problem: 422 for an invalid field; 503 as ``Deliveries.accept``.
         """
         if not len(wrapper):
             raise client_fault("arg0 is missing: it holds the delivery request")

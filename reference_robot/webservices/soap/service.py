@@ -1,4 +1,4 @@
-"""One SOAP service: its operations by the element that asks for them, and how a message becomes an answer."""
+"""A SOAP service: dispatches a message to its operation and returns the response."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ _SERVERS_FAULT: Final = 500
 
 
 class SoapService:
-    """A service: a subclass gives the operations by local name.
+    """A SOAP service; subclasses pass their operations by the local name of the request element.
 
-    An operation takes the wrapper element, valid by the XSD, and returns the answer: ``answered`` with its envelope.
+    An operation gets the schema-valid request element and returns the response, which ``answered`` makes of an
+    envelope.
 
     Attributes:
-        scope: What a token must be good for to send it messages.
+        scope: The token scope that clients need to send messages.
     """
 
     scope: Scope
@@ -43,11 +44,11 @@ class SoapService:
         self._operations = {f"{{{namespace}}}{name}": operation for name, operation in operations.items()}
 
     def post(self, request: Request) -> Response | Awaitable[Response]:
-        """Answer a message: 200, or 500 with a fault (WS-I BP R1126).
+        """Return the response to a message: 200, or 500 with a fault (WS-I BP R1126).
 
         Raises:
-            Problem: 415 for another media type, 400 for what is no XML and for a DOCTYPE or processing instruction:
-                without a fault, for there was no message.
+            Problem: 415 for another media type; 400 for invalid XML, a DOCTYPE or a processing instruction. These
+                responses have no fault, because there was no SOAP message.
         """
         media_type, charset = parsed_content_type(request.headers.get(b"content-type"))
         if media_type != _MEDIA_TYPE:
@@ -73,7 +74,7 @@ class SoapService:
 
 
 def answered(envelope: bytes) -> Response:
-    """Return an operation's answer."""
+    """Return the 200 response with an envelope as its body."""
     return content(200, _MEDIA_TYPE, envelope)
 
 

@@ -1,4 +1,4 @@
-"""RobotSubscribersWebService: the web methods that tell the robot's state, each as its REST resource does."""
+"""RobotSubscribersWebService: the web methods that return the robot's state, each equal to its REST resource."""
 
 from collections.abc import Callable
 from functools import partial
@@ -22,7 +22,7 @@ PATH: Final = "/turtlesim_subscriber_ws"
 
 
 class SubscribersWebService(SoapService):
-    """GetPose, GetVelocity, GetSensors, GetNavigationServices, GetGoal and GetPlan."""
+    """The operations GetPose, GetVelocity, GetSensors, GetNavigationServices, GetGoal and GetPlan."""
 
     scope = Scope.READ
 
@@ -53,7 +53,7 @@ class SubscribersWebService(SoapService):
         return self._response(operation, values())
 
     def _get_pose(self, _wrapper: etree._Element) -> Response:
-        """Return the odometry, written once for each message as REST's is."""
+        """Return the latest odometry; each message is serialized to XML at most once."""
         return self._odometry.written(self._write_pose)
 
     async def _get_plan(self, wrapper: etree._Element) -> Response:
@@ -64,7 +64,7 @@ class SubscribersWebService(SoapService):
         return self._response("GetPlan", [await self._planner.plan(PlanQuery(**given))])
 
     def _response(self, operation: str, returned: list[Any]) -> Response:
-        """Return an envelope with one unqualified ``return`` element for each value."""
+        """Return a response envelope with one unqualified ``return`` element for each value."""
         namespace = self.description.namespace
         root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
         wrapper = etree.SubElement(
@@ -75,7 +75,7 @@ class SubscribersWebService(SoapService):
 
 
 def _finite(name: str, text: str) -> float:
-    """Read a valid xs:double; INF and NaN never enter (contract, REST)."""
+    """Return a schema-valid xs:double as float; raise a Client fault for INF and NaN (contract, REST)."""
     number = float(text)
     if number - number != 0:
         raise client_fault(f"{name} must be finite, not {shown(text)}")
