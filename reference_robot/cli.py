@@ -14,7 +14,7 @@ _HIGHEST_DOMAIN_ID: Final = 101
 _FILE: Final = click.Path(exists=True, dir_okay=False, path_type=Path)
 _PORT: Final = click.IntRange(0, 65535)
 
-# What must be importable, and where it comes from.
+# Modules that the robot imports, and how to install them.
 _NEEDED: Final = {
     "rclpy": "ROS 2 Jazzy: pip install 'roaas[ros]', or apt's ros-jazzy-rclpy and `source /opt/ros/jazzy/setup.bash`",
     "mybot_delivery_app.msg": "the interface package: pip install reference_robot/interfaces/mybot_delivery_app",
@@ -91,6 +91,6 @@ def robot(**options: object) -> None:
         except ImportError as error:
             click.echo(f"roaas robot needs {module}, which cannot be imported ({error}). Install {remedy}", err=True)
             sys.exit(ExitCode.USAGE)
-    # Only now: it imports ROS and the web server.
+    # Imported only here, because the module imports ROS and the web server.
     launch = import_module("reference_robot.launch")
     launch.run(launch.Options(**options))

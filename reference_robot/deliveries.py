@@ -40,7 +40,7 @@ class DeliveryRequest(NamedTuple):
         Raises:
             rclpy's RMWError: The bytes are not a DeliveryRequestMsg.
         """
-        if len(octets) == _CDR.size and octets.startswith(_LITTLE_ENDIAN[:2]):  # the last two say nothing of a message
+        if len(octets) == _CDR.size and octets.startswith(_LITTLE_ENDIAN[:2]):  # the last two bytes are options
             return cls._make(_CDR.unpack(octets)[1:])
         return cls._make(_FIELDS_OF(deserialize_message(octets, DeliveryRequestMsg)))
 

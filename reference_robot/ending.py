@@ -26,5 +26,5 @@ class Ending:
 
     def bring(self) -> None:
         """Make ``wait`` return; may be called from any thread."""
-        with contextlib.suppress(BlockingIOError):  # the pipe is full: it has come
+        with contextlib.suppress(BlockingIOError):  # the pipe is full, so `wait` returns anyway
             os.write(self._tell, b"\0")

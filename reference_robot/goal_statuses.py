@@ -36,7 +36,7 @@ class GoalStatuses:
         self.reported: tuple[ReportedGoal, ...] = ()
         self.losses = 0
         self._on_change = on_change
-        self._is_of_newest = True  # what is reported came from the server that came last
+        self._is_of_newest = True  # the newest server has sent a report
         node.create_subscription(
             GoalStatusArray,
             f"{action}/_action/status",

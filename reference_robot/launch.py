@@ -103,7 +103,7 @@ def run(options: Options) -> None:
     try:
         configuration = load_configuration(options.config)
         listening = _listening(options)
-        RosRuntime(options.domain_id, options.ros_arguments).close()  # whether ROS takes them, before anything starts
+        RosRuntime(options.domain_id, options.ros_arguments).close()  # raises if the arguments are bad
         runner = RobotWebServiceNodesRunner(configuration, listening, options.domain_id, options.ros_arguments)
         with contextlib.suppress(_Stopped), _stopped_by_signals(), _simulation(options):
             runner.run(ready, wait_for_robot=not options.attach)
@@ -174,7 +174,7 @@ def _stopped_by_signals() -> Iterator[None]:
 def _simulation(options: Options) -> contextlib.AbstractContextManager[None]:
     if options.attach:
         return contextlib.nullcontext()
-    # A simulated robot is no affair of other machines on the network, unless the environment says so.
+    # The simulated robot is visible on this machine only, unless the environment says otherwise.
     os.environ.setdefault(_DISCOVERY_RANGE, "LOCALHOST")
     seed = options.seed if options.realistic else None
     log = get_logging_directory() / f"robot-{os.getpid()}.log"

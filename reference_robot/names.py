@@ -83,5 +83,5 @@ def load_names(path: Path | None = None) -> RosNames:
     """
     source = path or DEFAULT_NAMES_FILE
     tables = read_tables(source)
-    tables.pop("web", None)  # the web services' own, which they read and check
+    tables.pop("web", None)  # read and checked by the web services
     return fit(tables, RosNames, str(source))

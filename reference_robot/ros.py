@@ -36,14 +36,14 @@ from rclpy.subscription import Subscription
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor as RosExecutor
-except ImportError:  # a Jazzy from before its backport
+except ImportError:  # an early Jazzy, without the backport
     from rclpy.executors import SingleThreadedExecutor as RosExecutor
 
 # Measured with 50 Hz odometry, two action servers and a dozen subscriptions in one process:
 # EventsExecutor 2.2 % of a core, SingleThreadedExecutor, which builds its wait set anew for every
 # message, 6 %.
 
-# Read once in a process, when its first participant is made; a user's own file counts instead.
+# Fast DDS reads the file once per process. A file that the user has set takes precedence.
 _FAST_DDS_PROFILES: Final = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _OUR_PROFILES: Final = Path(__file__).with_name("fastdds.xml")
 
@@ -86,7 +86,7 @@ class RosRuntime:
         except (rclpy_c.RCLError, rclpy_c.RCLInvalidROSArgsError, rclpy_c.UnknownROSArgsError) as error:
             raise RosArgumentsError(f"ROS does not take {' '.join(arguments)}: {error}") from error
         self._executors = [RosExecutor(context=self.context)]
-        self._awake: list[float] = []  # for each thread, when it last had nothing or one thing less to do
+        self._awake: list[float] = []  # for each thread: when its last callback or wait ended
         self._nodes: list[Node] = []
         self._threads: list[threading.Thread] = []
         self._watches: list[tuple[rclpy_c.GuardCondition, threading.Thread]] = []
@@ -104,7 +104,7 @@ class RosRuntime:
             RosArgumentsError: The ROS arguments contain a parameter that a node cannot have.
         """
         try:
-            # Its parameter services would stand among the robot's own services.
+            # Parameter services would appear among the robot's own services.
             node = Node(name, context=self.context, start_parameter_services=False)
         except ParameterException as error:
             raise RosArgumentsError(f"a node does not take its parameter: {error}") from error
@@ -154,14 +154,14 @@ class RosRuntime:
         self._closing.set()
         for wake, _ in self._watches:
             wake.trigger_guard_condition()
-        # In this order, or the process may end in "terminate called without an active exception".
+        # Any other order may crash the process: "terminate called without an active exception".
         give_up = time.monotonic() + _CLOSING_S
         for executor in self._executors:
             executor.shutdown(timeout_sec=max(0.0, give_up - time.monotonic()))
         for thread in self._threads:
             thread.join(max(0.0, give_up - time.monotonic()))
         for node in reversed(self._nodes):
-            # destroy_node leaves actions alone, and one that is left keeps its node on the graph.
+            # destroy_node does not destroy actions; a remaining action keeps the node on the graph.
             for entity in list(node.waitables):
                 if isinstance(entity, ActionClient | ActionServer):
                     entity.destroy()
@@ -177,7 +177,7 @@ class RosRuntime:
         self.close()
 
     def _spin(self, number: int, executor: RosExecutor) -> None:
-        # Not executor.spin(): EventsExecutor's own loop takes a whole core off the main thread.
+        # Not executor.spin(): outside the main thread, EventsExecutor's loop uses a whole core.
         while not self._closing.is_set() and self.context.ok():
             self._awake[number] = time.monotonic()
             try:

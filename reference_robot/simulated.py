@@ -66,10 +66,10 @@ class SimulatedRobot:
             self._log.open("w", encoding="utf-8") as log,
             subprocess.Popen(  # noqa: S603 - our own program, and arguments that click has checked
                 self._command,
-                stdin=subprocess.PIPE,  # its end tells the child that the parent is gone, even if that was killed
+                stdin=subprocess.PIPE,  # closes when the parent ends, even if killed; the child notices
                 stdout=subprocess.PIPE,
                 stderr=log,
-                start_new_session=True,  # so that Ctrl-C reaches the parent alone, which stops the child in order
+                start_new_session=True,  # so that Ctrl-C reaches the parent only, which then stops the child
             ) as process,
         ):
             try:

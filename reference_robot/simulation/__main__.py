@@ -23,7 +23,7 @@ from reference_robot.ros_arguments import RosCommand
 from reference_robot.simulation.realism import Realism
 from reference_robot.simulation.runner import Simulation
 
-_NICENESS: Final = 5  # the web layer answers first: a real robot's motors do not wait for this machine
+_NICENESS: Final = 5  # the web services run first: on a real robot they share no processor with the motors
 
 
 @click.command(cls=RosCommand)
@@ -42,7 +42,7 @@ def main(
     ros_arguments: tuple[str, ...],
 ) -> None:
     """Run the simulated robot until SIGINT, SIGTERM or the end of standard input."""
-    # Seen on this machine only, unless the user wants it otherwise.
+    # The robot is visible on this machine only, unless the environment says otherwise.
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     try:
         names = load_names(names_file)
@@ -54,7 +54,7 @@ def main(
         threading.Thread(target=_await_end_of_stdin, args=(ending,), daemon=True).start()
     with RosRuntime(domain_id, ros_arguments) as ros:
         Simulation(ros, names, time_scale, Realism(seed) if realistic else None)
-        gc.freeze()  # what lives as long as the robot is not looked at again
+        gc.freeze()  # excludes permanent objects from garbage collection
         ros.start()
         click.echo("ready")
         ending.wait()
@@ -68,7 +68,7 @@ def _give_way() -> None:
     set another policy, such as real time, the policy is kept.
     """
     os.nice(_NICENESS)
-    with contextlib.suppress(AttributeError, OSError):  # a system that has none, or that does not allow it
+    with contextlib.suppress(AttributeError, OSError):  # the system has no such policy, or forbids it
         if os.sched_getscheduler(0) == os.SCHED_OTHER:
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 

@@ -16,13 +16,13 @@ from reference_robot.simulation.odometry import OdometryOctets
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE
 from reference_robot.simulation.realism import Delayed, Realism
 
-HOLD_S: Final = 1.0  # a setpoint is good for this long, by the wall clock whatever the time scale
+HOLD_S: Final = 1.0  # how long a setpoint is valid, by the wall clock at every time scale
 _PERIOD_S: Final = 0.02  # 50 Hz of simulated time
-_SHORTEST_PERIOD_S: Final = 0.004  # of real time: a time scale beyond 5 makes the steps longer instead
+_SHORTEST_PERIOD_S: Final = 0.004  # of real time; above a time scale of 5 the steps become longer instead
 _NANOSECONDS: Final = 10**9
-_LONGEST_STEP_S: Final = 0.1  # of simulated time: a robot whose process was held up does not jump ahead
+_LONGEST_STEP_S: Final = 0.1  # of simulated time: after a delay of the process the robot does not jump ahead
 
-# Variances (m², rad²) of x, y and yaw as a wheeled base with encoders has them; the rest cannot move.
+# Variances (m², rad²) of x, y and yaw, typical for a wheeled base with encoders; other coordinates are fixed.
 _POSE_COVARIANCE: Final = [0.0] * 36
 _TWIST_COVARIANCE: Final = [0.0] * 36
 for _axis, _variance in ((0, 1e-4), (7, 1e-4), (35, 1e-3)):

@@ -35,11 +35,11 @@ from reference_robot.simulation.missions import Missions, MissionState
 from reference_robot.simulation.requests import DeliveryRequests
 
 _CODES: Final = frozenset({COURIER, COFFEE})
-_REPORT_PERIOD_S: Final = 0.05  # at least this between two reports, however fast requests come
-_RETRY_PERIOD_S: Final = 0.2  # after a refused leg, and while navigation's action server is not there
+_REPORT_PERIOD_S: Final = 0.05  # shortest time between two reports
+_RETRY_PERIOD_S: Final = 0.2  # after a refused leg, and while the navigation is not running
 
 _CANCELED: Final = frozenset({GoalStatus.STATUS_CANCELING, GoalStatus.STATUS_CANCELED})
-_REMEMBERED: Final = 100  # legs, and goals of others that were cancelled
+_REMEMBERED: Final = 100  # goal ids of legs, and of other clients' cancelled goals
 
 
 class Delivery:
@@ -51,7 +51,7 @@ class Delivery:
         self._frames = names.frames
         self._missions = Missions()
         self._legs: list[tuple[float, float, float]] = []
-        self._leg = ""  # the id of the goal that is being driven
+        self._leg = ""  # the id of the active goal
         self._own: deque[str] = deque(maxlen=_REMEMBERED)
         self._seen_canceled: deque[str] = deque(maxlen=_REMEMBERED)
         self._knows_goals = False
@@ -89,8 +89,8 @@ class Delivery:
             if goal.status in _CANCELED and goal.identity not in self._own and goal.identity not in self._seen_canceled
         ]
         self._seen_canceled.extend(canceled)
-        # A leg of ours that is cancelled drops the queue when it ends. What the first report has as cancelled was so
-        # before any request, though a request may be taken before the report is.
+        # A cancelled leg drops the queue when it ends (`_leg_ended`). Goals that the first report shows as cancelled were
+        # cancelled before any request, even if a request was read before that report.
         if canceled and self._knows_goals and self._missions.active is None:
             self._missions.abandon()
             self._changed()
@@ -141,7 +141,7 @@ class Delivery:
     def _leg_answered(self, leg: str, answer: Any) -> None:
         handle = answer.result()
         if leg != self._leg:
-            return  # its navigation was given up
+            return  # the leg has been given up
         if handle.accepted:
             handle.get_result_async().add_done_callback(partial(self._leg_ended, leg))
         else:
@@ -154,7 +154,7 @@ class Delivery:
         outcome = answer.result()
         if outcome.status == GoalStatus.STATUS_SUCCEEDED:
             self._next_leg()
-        elif outcome.result.error_code:  # as Nav2 has it; a goal that was displaced has none
+        elif outcome.result.error_code:  # as in Nav2; a displaced goal has no error code
             self._fail(f"the navigation gave a leg up: {outcome.result.error_msg or outcome.result.error_code}")
         else:
             self._missions.abandon()
@@ -165,7 +165,7 @@ class Delivery:
         self._leg = ""
         self._missions.finish(MissionState.FAILED, reason)
         self._changed()
-        # An impossible mission is planned in vain; a queue of them is not to keep the planner busy.
+        # After a pause, so that a queue of impossible missions does not keep the planner busy.
         self._begin_later.reset()
 
     def _changed(self) -> None:

@@ -17,9 +17,9 @@ from reference_robot.simulation.messages import LATCHED, quaternion_of
 from reference_robot.simulation.office import OFFICE
 
 _RESOLUTION_M: Final = 0.05
-_OCCUPIED: Final = 100  # nav_msgs/OccupancyGrid: a probability in percent
-_PERIOD_S: Final = 0.1  # between transforms, which tf2 interpolates: at 50 Hz they would cost as much as the odometry
-_TRANSFORMS: Final = 100  # depth, as tf2's broadcaster has it
+_OCCUPIED: Final = 100  # probability in percent (nav_msgs/OccupancyGrid)
+_PERIOD_S: Final = 0.1  # between transforms; tf2 interpolates, and 50 Hz would cost as much time as the odometry
+_TRANSFORMS: Final = 100  # queue depth, as in tf2's broadcaster
 
 
 class FramePublisher:
@@ -32,7 +32,7 @@ class FramePublisher:
         self._told_at = -math.inf
         self._moving = node.create_publisher(TFMessage, names.topics.tf, _TRANSFORMS)
         self._static = node.create_publisher(TFMessage, names.topics.tf_static, LATCHED)
-        identity = TransformStamped(child_frame_id=names.frames.odom)  # a quaternion's default turns nothing
+        identity = TransformStamped(child_frame_id=names.frames.odom)  # the default quaternion is the identity
         identity.header.stamp = node.get_clock().now().to_msg()
         identity.header.frame_id = names.frames.map
         self._static.publish(TFMessage(transforms=[identity]))

@@ -11,8 +11,8 @@ from typing import Final
 _STRAIGHT: Final = 1e-6  # rad turned in a step; below it an arc's radius is numerically meaningless
 
 
-# What the drive can do. The accelerations let any permitted velocity follow any other within 0.45 s, which is inside
-# the 0.6 s settle time that the robot declares.
+# The limits of the drive. With these accelerations every permitted velocity is reached from every other within 0.45 s,
+# which is less than the declared settle time of 0.6 s.
 MAX_LINEAR: Final = 0.7  # m/s
 MAX_ANGULAR: Final = 2.5  # rad/s
 

@@ -12,18 +12,18 @@ from reference_robot.names import Frames
 from reference_robot.simulation.office import Floats
 from reference_robot.simulation.planner import Pose
 
-_UNIT_TOLERANCE: Final = 1e-3  # of a quaternion's length, as the contract has it
+_UNIT_TOLERANCE: Final = 1e-3  # of a quaternion's length, as in the contract
 
-# For how long an action's result can be asked for, as Nav2 has it; rclpy's 900 s make every change of a
-# goal's state slower, because each one reports all goals that are remembered.
+# How long an action server keeps a goal's result, as in Nav2. rclpy's default of 900 s slows every change of a goal's
+# state down, because each status report contains all goals that are kept.
 RESULT_TIMEOUT_S: Final = 10
 
-# State that late subscribers get at once: the last message, kept by the publisher.
+# For state: the publisher keeps its last message, and late subscribers receive it at once.
 LATCHED: Final = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 
-# Each report tells what changed, so late subscribers get the last hundred.
+# Each report contains only changes, so late subscribers receive the last hundred reports.
 MISSION_REPORTS: Final = QoSProfile(
     depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
@@ -55,7 +55,7 @@ def pose_of(stamped: PoseStamped, frames: Frames) -> Pose:
         raise PoseError(f"frame_id {stamped.header.frame_id!r} is unknown; known are {', '.join(known)}")
     turn = stamped.pose.orientation
     length = math.hypot(turn.x, turn.y, turn.z, turn.w)
-    if not abs(length - 1.0) <= _UNIT_TOLERANCE:  # so written, NaN fails as well
+    if not abs(length - 1.0) <= _UNIT_TOLERANCE:  # in this form NaN fails too
         raise PoseError(f"the orientation's length is {length:g}, not 1")
     return stamped.pose.position.x, stamped.pose.position.y, yaw_of(turn)
 

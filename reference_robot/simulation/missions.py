@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from reference_robot.deliveries import DeliveryRequest
 
-_REMEMBERED: Final = 100  # changes between two reports
+_REMEMBERED: Final = 100  # changes kept between two reports
 
 
 class MissionState(StrEnum):

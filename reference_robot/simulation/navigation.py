@@ -27,7 +27,7 @@ from reference_robot.simulation.progress import PATIENCE_S, Progress
 from reference_robot.simulation.pursuit import CRUISE, EXACT, Command, Pursuit
 
 _FEEDBACK_PERIOD_S: Final = 0.2
-_FAILED_TO_MAKE_PROGRESS: Final = 105  # nav2_msgs/FollowPath's code, which Nav2's navigator hands on
+_FAILED_TO_MAKE_PROGRESS: Final = 105  # code of nav2_msgs/FollowPath, which Nav2's navigator passes on
 
 
 class _DeferringActionServer(ActionServer):
@@ -75,7 +75,7 @@ class Navigation:
         self._time_scale = time_scale
         self._tolerances = tolerances
         self._drive: _Drive | None = None
-        self._path: Any = None  # of the goal that was accepted last and has not begun
+        self._path: Any = None  # of the last accepted goal, until it begins
         self._stamped = names.velocity.message == "TwistStamped"
         velocity = TwistStamped if self._stamped else Twist
         self._velocities = node.create_publisher(velocity, names.topics.cmd_vel, 1)
@@ -100,7 +100,7 @@ class Navigation:
             self._path = self._planner.plan(self._localisation.pose(), target)
         except (PlanError, PoseError) as error:
             self._node.get_logger().info(f"refused a goal: {error}", throttle_duration_sec=1.0)
-            # Told before the refusal goes out, so that whoever is refused can look up why.
+            # Published before the refusal is sent, so that the client can look up the reason.
             told = {"pose": plain(goal.pose), "reason": str(error)}
             self._rejections.publish(String(data=json.dumps(told)))
             return GoalResponse.REJECT

@@ -13,13 +13,13 @@ from rclpy.serialization import serialize_message
 
 from reference_robot.simulation.kinematics import Motion
 
-# CDR (OMG DDS-RTPS 2.3, 10): four octets of encapsulation, of which the second's last bit says little endian; then the
-# stamp, two strings of any length, and doubles to the end: pose and 36 covariances, twist and 36 covariances.
+# CDR (OMG DDS-RTPS 2.3, 10): four bytes of encapsulation, with the little-endian flag in the second's last bit; then
+# the stamp, two strings of any length, and doubles to the end: pose and 36 covariances, twist and 36 covariances.
 _STAMP_AT: Final = 4
 _LITTLE_ENDIAN: Final = 1
 _POSE: Final = "7d"  # x, y, z; x, y, z, w
 _TWIST: Final = "6d"  # x, y, z; x, y, z
-_COVARIANCE: Final = 36 * 8  # octets
+_COVARIANCE: Final = 36 * 8  # bytes
 
 
 class OdometryOctets:

@@ -60,7 +60,7 @@ _BOXES: Final[list[Box]] = [
     *_wall_along_y(78.0, _CORRIDOR_NORTH, _NORTH),
     *_wall_along_y(59.0, _SOUTH, _CORRIDOR_SOUTH),
     *_wall_along_y(77.5, _SOUTH, _CORRIDOR_SOUTH),
-    # A lift shaft: free inside, and no way in
+    # A lift shaft: free inside, but without an entrance
     *_wall_along_x(45.5, 80.5, _EAST),
     *_wall_along_y(80.5, 45.5, _NORTH),
     # Furniture: the lobby's reception desk and desks in offices

@@ -16,9 +16,9 @@ from reference_robot.simulation.office import Floats, Office
 
 Pose: TypeAlias = tuple[float, float, float]
 
-CLEARANCE: Final = 0.33  # m that a path keeps from walls: the body's radius and what pursuit cuts off corners
-STEP: Final = 0.2  # m between a path's poses, at most
-_BESIDE: Final = 1e-3  # m by which corners stand off the grown boxes, so that paths along walls are free
+CLEARANCE: Final = 0.33  # m between a path and walls: the body's radius and how far pursuit cuts corners
+STEP: Final = 0.2  # largest distance between poses of a path, m
+_BESIDE: Final = 1e-3  # distance of corners from the grown boxes, m, so that paths along walls are free
 
 
 class PlanFailure(IntEnum):
@@ -82,7 +82,7 @@ class Planner:
             raise PlanError(PlanFailure.GOAL_OUTSIDE_MAP, f"the goal ({goal[0]:g}, {goal[1]:g}) is outside the map")
         end = self._escape(goal[0], goal[1])
         moved = math.inf if end is None else math.dist(end, goal[:2])
-        if end is None or (moved and not moved <= tolerance):  # so written, a tolerance of NaN permits nothing
+        if end is None or (moved and not moved <= tolerance):  # in this form a tolerance of NaN permits nothing
             raise PlanError(
                 PlanFailure.GOAL_OCCUPIED, f"the goal ({goal[0]:g}, {goal[1]:g}) is in or too near to a wall"
             )
@@ -109,7 +109,7 @@ class Planner:
         x_min, y_min, x_max, y_max = self._grown.grown(_BESIDE).boxes.T
         holding = (x_min < x) & (x < x_max) & (y_min < y) & (y < y_max)
         sides = [*x_min[holding], *x_max[holding]], [*y_min[holding], *y_max[holding]]
-        # One side of a box is enough along a wall; two at once in a corner between walls.
+        # Along a wall it is enough to move beyond one side of a box; in a corner between walls, two sides.
         ways = [
             *((side, y) for side in sides[0]),
             *((x, side) for side in sides[1]),
@@ -132,7 +132,7 @@ class Planner:
         gone = np.hypot(*(self._corners - begin).T)
         best = {int(corner): float(gone[corner]) for corner in np.flatnonzero(from_begin)}
         came_from: dict[int, int] = {}
-        finish = count  # the end's number among the corners
+        finish = count  # the index of the end point
         frontier = [(length + float(left[corner]), corner) for corner, length in best.items()]
         heapq.heapify(frontier)
         settled: set[int] = set()
@@ -177,6 +177,6 @@ def _poses(turns: list[tuple[float, float]], start_yaw: float, goal_yaw: float) 
         )
     if len(rows) == 1:  # start and goal are one point: the robot only turns
         rows.append((*turns[-1], goal_yaw))
-    # The ends are exact; interpolation rounds.
+    # Set the end exactly, because interpolation rounds.
     rows[-1] = (*turns[-1], goal_yaw)
     return np.array(rows)

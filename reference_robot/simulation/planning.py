@@ -75,7 +75,7 @@ class Planning:
         poses = self._planner.plan(start, pose_of(goal, self._frames), tolerance)
         path = path_message(poses, self._header(goal.header.frame_id))
         if not tolerance or _same_point(path.poses[-1], goal):
-            path.poses[-1].pose = goal.pose  # to the last bit, which a yaw there and back is not
+            path.poses[-1].pose = goal.pose  # exactly; converting to yaw and back would round
         return path
 
     def _header(self, frame_id: str) -> Header:

@@ -7,8 +7,8 @@ from typing import Final
 
 PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time
 _NEARER_M: Final = 0.05
-# A step of control comes with each odometry message, 50 a second. What takes longer held the robot's processes up, and
-# a robot that is held up fails at nothing.
+# A control step follows each odometry message, 50 times a second. A longer interval means that the processes were
+# delayed, which must not count as a lack of progress.
 _STEP_S: Final = 0.1
 
 

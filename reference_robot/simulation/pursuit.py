@@ -13,9 +13,9 @@ CRUISE: Final = 0.6  # m/s, below the base's limit
 _TURN: Final = 1.8  # rad/s
 _LOOKAHEAD: Final = 0.4  # m
 EXACT: Final = (0.03, 0.02)  # m, rad
-_DRIFT: Final = 0.1  # m off the goal at which a robot that turns on the spot goes back to driving
-_TURN_ON_SPOT: Final = 0.6  # rad off the course beyond which it stops to turn
-_SEARCH_AHEAD: Final = 8  # path poses in which the nearest one is sought
+_DRIFT: Final = 0.1  # m from the goal beyond which a robot that turns on the spot drives again
+_TURN_ON_SPOT: Final = 0.6  # rad off the course beyond which the robot stops and turns
+_SEARCH_AHEAD: Final = 8  # path poses among which the nearest is searched
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Pursuit:
         angular = within(3.0 * course, _TURN)
         if abs(course) > _TURN_ON_SPOT:
             return Command(0.0, angular, remaining, arrived=False)
-        # Slower towards the end, so that it stops there, and off the course, so that it cuts no corner.
+        # Slower near the goal, so that the robot stops there, and off the course, so that it cuts no corners.
         linear = min(CRUISE, 1.5 * off + 0.02) * math.cos(course) ** 4
         return Command(linear, angular, remaining, arrived=False)
 

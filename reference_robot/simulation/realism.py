@@ -12,20 +12,20 @@ from typing import Final
 
 from reference_robot.simulation.kinematics import Accelerations, Motion, wrap
 
-# A command takes so long from the web services to the wheels, s.
+# Shortest and longest delay of a command between the web services and the wheels, s.
 _EARLIEST_S: Final = 0.05
 _LATEST_S: Final = 0.2
-# Standard deviations at rest: m, rad, m/s, rad/s; in motion a share of the speed comes on top of the last two.
+# Standard deviations at rest; in motion a share of the speed is added to those of the velocities.
 _POSITION_M: Final = 0.003
 _HEADING_RAD: Final = 0.003
 _LINEAR_M_S: Final = 0.004
 _ANGULAR_RAD_S: Final = 0.01
 _IN_MOTION: Final = 0.01
-# Localisation puts the pose right once in so long, s, and then is off by this, m.
+# The mean time between two corrections of the pose by localisation, s, and the remaining error, m.
 _SELDOM_S: Final = 30.0
 _AFTER_JUMP_M: Final = 0.03
 
-# How near to a goal navigation has to come that is told of the robot's place so seldom and so late: m, rad.
+# The tolerances at a goal (m, rad) of a navigation whose odometry is this slow and late.
 NEAR_ENOUGH: Final = (0.08, 0.06)
 
 _ACCELERATIONS: Final = Accelerations(linear=2.0, angular=8.0)
@@ -55,7 +55,7 @@ class Realism:
     """
 
     def __init__(self, seed: int) -> None:
-        self._random = random.Random(seed)  # noqa: S311 - no secret
+        self._random = random.Random(seed)  # noqa: S311 - not for cryptography
         draw = self._random.uniform
         self.character = Character(odometry_hz=draw(5.0, 20.0), slip=draw(0.0, 0.03), drift=draw(-0.02, 0.02))
         self.accelerations = _ACCELERATIONS

@@ -17,11 +17,11 @@ from reference_robot.deliveries import DeliveryRequest
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime, taken
 
-# No request is lost: what has not been taken yet is kept, and a publisher that keeps all as well is held back.
+# No request is lost: unread messages are kept, and a publisher with KEEP_ALL waits when the queue is full.
 _QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
-# Many messages at once keep a processor: those of 50 ms for 3 ms, those of 5 for 0.3.
+# A batch occupies a processor: the messages of 50 ms for 3 ms, the messages of 5 ms for 0.3 ms.
 _PAUSE_S: Final = 0.005
-_MOST: Final = 5000  # that Fast DDS keeps; more come only while these are taken
+_MOST: Final = 5000  # messages that Fast DDS keeps; others may arrive while a batch is read
 
 
 class DeliveryRequests:

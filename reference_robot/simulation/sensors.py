@@ -65,7 +65,7 @@ class Sensors:
         for message in (self._scan, self._imu, self._battery):
             message.header.frame_id = names.frames.base
         self._switched_on = time.monotonic()
-        self._before: tuple[float, float] = (0.0, self._switched_on)  # m/s and when
+        self._before: tuple[float, float] = (0.0, self._switched_on)  # the last speed (m/s) and its time
         topics, usual = names.topics, qos_profile_sensor_data
         self._scans = _sensor(node, LaserScan, topics.scan, usual, _SCAN_PERIOD_S, self._look)
         self._imus = _sensor(node, Imu, topics.imu, usual, _IMU_PERIOD_S, self._feel)
@@ -77,7 +77,7 @@ class Sensors:
         motion = self._motion()
         ranges = OFFICE.distances(motion.x, motion.y, self._angles + motion.yaw, _RANGE_MAX_M)
         self._scan.header.stamp = self._clock.now().to_msg()
-        # rclpy takes an array of C floats as it is, where it checks a list number by number.
+        # rclpy copies an array of C floats, but checks every number of a list.
         self._scan.ranges = array.array("f", ranges.astype(np.float32).tobytes())
         self._scans.publish(self._scan)
 

@@ -30,7 +30,7 @@ from reference_robot.webservices.soap.interface import SoapInterface
 from reference_robot.webservices.soap.publishers import PublishersWebService
 from reference_robot.webservices.soap.subscribers import SubscribersWebService
 
-_STATE_DEADLINE: Final = 1.0  # seconds for a managed node to say its state
+_STATE_DEADLINE: Final = 1.0  # seconds for a managed node to report its state
 
 
 @dataclass(frozen=True)

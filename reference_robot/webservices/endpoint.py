@@ -25,11 +25,11 @@ def bound(host: str, port: int) -> socket.socket:
     """
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
-        # It listens already, so that a port in use is found out at once.
+        # create_server also listens, so that a port in use is detected at once.
         listener = socket.create_server(address, family=family, dualstack_ipv6=family == socket.AF_INET6)
     except OSError as error:
         raise PortInUseError(f"cannot listen on {host} port {port}: {error}") from error
-    listener.settimeout(0)  # never blocks: the event loop is who waits
+    listener.settimeout(0)  # non-blocking: the event loop waits
     return listener
 
 

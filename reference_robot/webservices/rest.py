@@ -40,7 +40,7 @@ class RestInterface(Interface):
         handlers = self._fixed.get(request.path)
         if handlers is None:
             if request.method == "PUT" and request.path.startswith(_DELIVERY_PATHS):
-                return self._delivery.put(request)  # the one that has to be fast; it refuses what is not its path
+                return self._delivery.put(request)  # must be fast; refuses an invalid path
             handlers = self._with_values(request.path)
         handler = handlers.get(request.method)
         if handler is not None:

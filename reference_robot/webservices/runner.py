@@ -22,7 +22,7 @@ from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
 _DESCRIPTORS: Final = 8192  # connections and ROS together; the usual soft limit of 1,024 is soon reached
-_TLS_CONNECTIONS: Final = 500  # of each interface: each keeps 280 kB once it has carried something
+_TLS_CONNECTIONS: Final = 500  # per interface; each takes 280 kB once used
 _DISCOVERY: Final = 20.0  # seconds in which a robot that has been started must appear on the graph
 _DISCOVERY_STEP: Final = 0.05
 
@@ -55,8 +55,8 @@ class RobotWebServiceNodesRunner:
         """
         configuration = self._configuration
         _raise_descriptor_limit()
-        # Fast DDS's default, and no user's setting: the sender's own thread of the asynchronous mode holds a lock that
-        # each publish waits for, which makes one answer in ten 3 ms slower. Other middleware ignores it.
+        # This is Fast DDS's default, and overrides a user's setting. In asynchronous mode each publish waits for a lock
+        # of the sender's thread, which delays one response in ten by 3 ms. Other middleware ignores the variable.
         os.environ["RMW_FASTRTPS_PUBLICATION_MODE"] = "SYNCHRONOUS"
         listening = self._listening
         host = listening.host
@@ -78,7 +78,7 @@ class RobotWebServiceNodesRunner:
                 listening.proxies,
                 listening.tls,
             )
-            gc.freeze()  # what lives as long as the robot is not looked at again: that takes 80 ms
+            gc.freeze()  # excludes permanent objects from garbage collection, which would take 80 ms
             with contextlib.closing(velocity):
                 uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
 

@@ -10,7 +10,7 @@ from reference_robot.webservices.representation.problems import Problem
 
 SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})  # RFC 9110 9.2.1
 
-_SHOWN: Final = 100  # characters of a client's own word
+_SHOWN: Final = 100  # characters of a client's text in error messages
 
 
 class Scoped(Protocol):
@@ -51,7 +51,7 @@ class Admission:
         also stops browsers or intermediaries that omit the preflight.
         """
         origin = request.headers[b"origin"]
-        asked_by = origin.partition(b"://")[2].lower()  # nothing, where the origin is null
+        asked_by = origin.partition(b"://")[2].lower()  # empty if the origin is null
         if not (asked_by and asked_by == request.authority.lower()) and origin not in self._origins:
             told = origin.decode("latin-1")[:_SHOWN]
             raise Problem(403, f"a page of {told!a} may not command this robot; --public-url names the robot's own")

@@ -22,11 +22,11 @@ from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.http.reading import full
 
-FIELD_OCTETS: Final = 200  # that a field takes besides its own: two objects, and where they are
+FIELD_OCTETS: Final = 200  # bytes of memory per field besides its text: two Python objects and their references
 NEVER: Final = math.inf
 
-_LINGER: Final = 2.0  # seconds in which what a refused client still sends is read and dropped
-_PIPELINED: Final = 16  # requests that may wait on a connection before no more is read from it
+_LINGER: Final = 2.0  # seconds for which data from a refused client is read and dropped
+_PIPELINED: Final = 16  # waiting requests at which reading from the connection pauses
 _NO_LINGER: Final = struct.pack("ii", 1, 0)  # SO_LINGER: closing resets the connection
 
 
@@ -43,22 +43,22 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         self._now = port.loop.time
         self._transport: asyncio.Transport
         self.due = NEVER
-        self._has_begun = False  # a request arrives
-        # Those that have arrived, and how they end
+        self._has_begun = False  # a request is being received
+        # The requests that have been received, and the end of the connection
         self._waiting: deque[tuple[Request, Response | None, int]] = deque()
         self._task: asyncio.Task[Response] | None = None
-        self._held = 0  # octets of what waits, of what arrives, and of what is not read
-        self._unread = 0  # of them, those of answers
+        self._held = 0  # bytes of waiting and incomplete requests and unread responses
+        self._unread = 0  # bytes of unread responses among them
         self._reading = True
-        self._stalled = False  # the client does not read
-        self._ended = False  # the client sends no more
-        self._leaving = False  # nor is anything more read from it
+        self._stalled = False  # the client does not read its responses
+        self._ended = False  # the client has closed its side
+        self._leaving = False  # nothing more is read from the client
 
     @abstractmethod
     def expire(self) -> None:
         """End the connection because ``due`` has passed."""
 
-    # The transport's side
+    # Callbacks of the transport
 
     def connection_lost(self, _error: Exception | None) -> None:
         """Discard the waiting requests; the request in progress is still completed."""
@@ -89,7 +89,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         self._unread = 0
         self._advance()
 
-    # Answers, in the order of the requests
+    # Responses, in the order of the requests
 
     def _is_busy(self) -> bool:
         return self._task is not None or self._stalled or bool(self._waiting)
@@ -97,10 +97,9 @@ class AnsweringConnection(asyncio.Protocol, ABC):
     def _queue(self, request: Request, response: Response | None) -> None:
         """Answer a request now or put it into the queue; ``response`` is set for a request that is refused."""
         if self._leaving:
-            return  # it follows one that was to be the last
-        if (
-            self._task is None and not self._stalled and not self._waiting
-        ):  # as a rule, so it is not _is_busy that says so
+            return  # the previous request was the last of the connection
+        # Not _is_busy(): this is the usual case, and a call costs time.
+        if self._task is None and not self._stalled and not self._waiting:
             self._serve(request, response)
             return
         weight = _weight(request)
@@ -174,7 +173,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         elif not self._has_begun and not self._stalled:
             self.due = self._now() + self._port.keep_alive
 
-    # The ends
+    # The end of the connection
 
     def _leave(self) -> None:
         """Close the connection after all writes; a client that is still sending gets time to read its response.
@@ -185,7 +184,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         self._leaving = True
         self._waiting.clear()
         if lingers:
-            if self._transport.can_write_eof():  # TLS cannot: there the client goes, or its time is up
+            if self._transport.can_write_eof():  # not under TLS: there the client closes, or `due` passes
                 self._transport.write_eof()
             self.due = self._now() + _LINGER
         else:
@@ -209,7 +208,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
 
     def _reset(self) -> None:
         """Reset the connection, so that the kernel frees its send buffer at once although the client does not read."""
-        with contextlib.suppress(OSError):  # it may be closed, but for the word of it
+        with contextlib.suppress(OSError):  # the socket may be closed already
             self._transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
         self._transport.abort()
 

@@ -14,7 +14,7 @@ _CHALLENGE: Final = ((b"www-authenticate", _REALM),)
 _INVALID: Final = ((b"www-authenticate", _REALM + b', error="invalid_token"'),)
 
 _TOKEN: Final = re.compile(r"[!-~]+")  # printable ASCII without spaces
-_COMMENT: Final = "# "  # no token has a space in it
+_COMMENT: Final = "# "  # cannot be the start of a token, because tokens contain no space
 
 
 class Scope(StrEnum):
@@ -54,7 +54,7 @@ class Authorization:
         if scheme.lower() != b"bearer":
             raise Problem(401, "this robot asks for a bearer token in the Authorization field", _CHALLENGE)
         sent, granted = sent.strip(), None
-        for token, scopes in self._tokens:  # all of them, so that the time tells nothing
+        for token, scopes in self._tokens:  # compare with all, so that the time reveals nothing
             if hmac.compare_digest(sent, token):
                 granted = scopes
         if granted is None:

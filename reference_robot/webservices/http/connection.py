@@ -37,8 +37,8 @@ from reference_robot.webservices.http.reading import (
 )
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
-_DRAINED: Final = 16 * BODY_LIMIT  # octets of refused content that are dropped before the line is cut
-_UNREAD: Final = 16 * 1024  # octets of answers that wait for the client before it counts as one that does not read
+_DRAINED: Final = 16 * BODY_LIMIT  # bytes of a refused body that are dropped before the connection is closed
+_UNREAD: Final = 16 * 1024  # bytes of unread responses at which a client counts as not reading
 _CONTINUE: Final = b"HTTP/1.1 100 Continue\r\n\r\n"
 
 
@@ -49,19 +49,19 @@ class HttpConnection(AnsweringConnection):
         super().__init__(port)
         self._admit = port.interface.admit
         self._parser = HttpRequestParser(self)
-        self._is_proxied = False  # by a proxy that is trusted
-        # The request that arrives
+        self._is_proxied = False  # the peer is a trusted proxy
+        # The request that is being received
         self._in_head = True
         self._head_octets = 0
         self._target = b""
         self._fields: list[Field] = []
         self._request: Request | None = None
         self._content: bytes | bytearray = b""
-        self._is_refused = False  # it has its answer, and its content is dropped
+        self._is_refused = False  # the error response is sent, and the rest of the body is dropped
         self._dropped = 0
-        self._arriving = 0  # octets that are held for it
+        self._arriving = 0  # bytes kept for this request
 
-    # The transport's side
+    # Callbacks of the transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Register the connection and start the deadline for its first request; refuse one connection too many."""
@@ -91,7 +91,7 @@ class HttpConnection(AnsweringConnection):
             if self._has_begun:
                 self._hold_arriving()
 
-    # The parser's side: an exception is the way out of its callbacks
+    # Callbacks of the parser; an exception stops it
 
     def on_message_begin(self) -> None:
         """Start the deadline for receiving the request that begins."""
@@ -127,7 +127,7 @@ class HttpConnection(AnsweringConnection):
             if b"host" not in headers:
                 require_old_version(parser.get_http_version())
             self._admit(request)
-            if b"content-length" in headers:  # digits only: the parser has seen to that
+            if b"content-length" in headers:  # digits only: the parser has checked that
                 require_bounded(int(headers[b"content-length"]))
         except Problem as problem:
             self._refuse_one(request, problem)
@@ -144,7 +144,7 @@ class HttpConnection(AnsweringConnection):
                 raise Problem(413, f"the content exceeds {BODY_LIMIT} octets")
             return
         if not self._content:
-            self._content = body  # all of it, as a rule
+            self._content = body  # usually the whole body
         else:
             if isinstance(self._content, bytes):
                 self._content = bytearray(self._content)
@@ -178,7 +178,7 @@ class HttpConnection(AnsweringConnection):
             self._content = b""
         self._queue(request, None)
 
-    # The ends
+    # The end of the connection
 
     def _refuse_one(self, request: Request, problem: Problem) -> None:
         """Answer a request with an error before its body is complete; the rest of the body will be dropped."""
@@ -190,7 +190,7 @@ class HttpConnection(AnsweringConnection):
         """Answer bytes that are not a valid request with an error, and read nothing more."""
         if self._leaving:
             return
-        if self._is_refused:  # it has its answer
+        if self._is_refused:  # the error response has been sent
             self._leave()
             return
         self._has_begun = True
@@ -209,7 +209,7 @@ class HttpConnection(AnsweringConnection):
     def _hold_arriving(self) -> None:
         """Count the memory of the incomplete request; refuse the request if its head is too large or memory is full."""
         if self._in_head:
-            if not self._head_octets:  # it began in the middle of a segment
+            if not self._head_octets:  # the head began in the middle of a segment
                 self._head_octets = len(self._target) + sum(len(name) + len(value) for name, value in self._fields)
             if self._head_octets > HEAD_LIMIT:
                 self._refuse(head_too_large())

@@ -36,7 +36,7 @@ class AllowedHosts:
         self.allows = lru_cache(maxsize=256)(self._allows)
 
     def _allows(self, authority: bytes) -> bool:
-        if self._is_open or not authority:  # HTTP/1.0 names none; browsers do not speak it
+        if self._is_open or not authority:  # HTTP/1.0 has no Host field; browsers do not use HTTP/1.0
             return True
         told = AUTHORITY.fullmatch(authority.decode("latin-1"))
         if told is None:
@@ -63,7 +63,7 @@ def is_loopback(host: str) -> bool:
     try:
         found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except OSError:
-        return False  # whoever binds it says what is wrong
+        return False  # binding the address will report the error
     return all(ipaddress.ip_address(str(address[0])).is_loopback for *_, address in found)
 
 

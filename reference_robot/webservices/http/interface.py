@@ -42,7 +42,7 @@ class Interface(ABC):
         """Return the response to an admitted request, or a coroutine if ROS must be waited for; never raises."""
         try:
             outcome = self.answer(request)
-        except Exception as error:  # noqa: BLE001 - whatever went wrong, the client gets an answer
+        except Exception as error:  # noqa: BLE001 - after any error the client gets a response
             return _failed(request, error)
         return outcome if isinstance(outcome, Response) else _awaited(request, outcome)
 

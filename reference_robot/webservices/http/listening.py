@@ -114,7 +114,7 @@ def trusted_proxies(given: Iterable[str]) -> TrustedProxies:
 def _is_base_url(text: str) -> bool:
     try:
         url = urlsplit(text)
-        url.port  # noqa: B018 - raises for what is no port
+        url.port  # noqa: B018 - raises for an invalid port
     except ValueError:
         return False
     return (

@@ -9,7 +9,7 @@ from httptools import parse_url
 
 from reference_robot.webservices.representation.problems import Problem
 
-BODY_LIMIT: Final = 1024 * 1024  # octets; the contract allows 64 KiB to 10 MiB
+BODY_LIMIT: Final = 1024 * 1024  # bytes; the contract allows 64 KiB to 10 MiB
 
 Field = tuple[bytes, bytes]
 
@@ -47,7 +47,7 @@ class Request:
         self.scheme = ""
         if target[0] == _SLASH and b"#" not in target:
             self.path, _, self.query = target.partition(b"?")
-        else:  # the absolute form, the asterisk, or a fragment, which has no business here
+        else:  # the absolute form, the asterisk, or an invalid fragment
             url = parse_url(target)
             self.path, self.query = url.path or b"/", url.query or b""
             if url.host:

@@ -20,7 +20,7 @@ class TrustedProxies:
         if not self._networks or not peer:
             return False
         address = ip_address(str(peer[0]).partition("%")[0])
-        # A socket of both families shows clients of IPv4 in addresses of IPv6 (RFC 4291 2.5.5.2).
+        # A dual-stack socket reports IPv4 clients as IPv4-mapped IPv6 addresses (RFC 4291 2.5.5.2).
         address = getattr(address, "ipv4_mapped", None) or address
         return any(address in network for network in self._networks)
 

@@ -6,10 +6,10 @@ from typing import Final
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
-TARGET_LIMIT: Final = 8000  # octets (RFC 9110 4.1 asks for at least that)
-HEAD_LIMIT: Final = 64 * 1024  # octets: request line and fields (RFC 6585 5)
+TARGET_LIMIT: Final = 8000  # bytes (RFC 9110 4.1 requires at least that)
+HEAD_LIMIT: Final = 64 * 1024  # bytes: request line and fields (RFC 6585 5)
 
-# Fields of which a request has at most one (RFC 9110 5.3; 9112 3.2 for Host).
+# Fields that may occur only once in a request (RFC 9110 5.3; 9112 3.2 for Host).
 _SINGLE: Final = frozenset({b"host", b"content-type", b"content-length", b"authorization"})
 
 _SERVED: Final = (b"GET ", b"PUT ", b"POST ", b"DELETE ", b"HEAD ", b"OPTIONS ")

@@ -11,9 +11,9 @@ from reference_robot.webservices.http.connection import HttpConnection
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.http.tls import accept
 
-_BACKLOG: Final = 1024  # connections that may arrive at once
+_BACKLOG: Final = 1024  # connections that may wait to be accepted
 _TICK: Final = 0.5  # seconds
-_LAST_WORDS: Final = 2.0  # seconds for answers under way when the robot stops
+_LAST_WORDS: Final = 2.0  # seconds for pending responses when the robot stops
 
 
 async def serve(

@@ -12,8 +12,8 @@ from reference_robot.webservices.http.connection import HttpConnection
 from reference_robot.webservices.http.port import Port
 
 _LOGGER: Final = logging.getLogger(__name__)
-_SHUTDOWN: Final = 2.0  # seconds for the other side's goodbye
-_PAUSE: Final = 0.1  # seconds, where no more connections can be had
+_SHUTDOWN: Final = 2.0  # seconds for the client's close_notify
+_PAUSE: Final = 0.1  # seconds after a failed accept
 
 
 class TlsFileError(ValueError):
@@ -41,10 +41,10 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
             raise TlsFileError(f"{option} {path} cannot be read: {error.strerror}") from error
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
-    context.options |= ssl.OP_NO_RENEGOTIATION  # a client could make the robot compute for ever
+    context.options |= ssl.OP_NO_RENEGOTIATION  # repeated renegotiation could occupy the robot's processor
     context.set_alpn_protocols(["http/1.1"])
     try:
-        # By itself first: the error of both together does not say which it was.
+        # Load the certificate alone first: load_cert_chain's error does not say which file is wrong.
         ssl.create_default_context().load_verify_locations(certificate)
     except ssl.SSLError as error:
         raise TlsFileError(f"--tls-cert {certificate} holds no certificate in PEM: {_reason(error)}") from error
@@ -78,12 +78,12 @@ async def accept(port: Port, listener: socket.socket, context: ssl.SSLContext) -
         while True:
             try:
                 client, _ = await port.loop.sock_accept(listener)
-            except OSError as error:  # no descriptor is left, or the client has gone
+            except OSError as error:  # no file descriptor is left, or the client has disconnected
                 _LOGGER.warning("cannot take a connection: %s", error)
                 await asyncio.sleep(_PAUSE)
                 continue
             if not port.has_room_for(len(handshakes) + 1):
-                client.close()  # there is no way yet to say why
+                client.close()  # no response is possible before the handshake
                 continue
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             handshake = port.loop.create_task(_agree(port, client, context))
@@ -96,7 +96,7 @@ async def accept(port: Port, listener: socket.socket, context: ssl.SSLContext) -
 
 
 async def _agree(port: Port, client: socket.socket, context: ssl.SSLContext) -> None:
-    # What fails is no TLS, none that both speak, or none in time: the line is cut by then.
+    # The handshake fails if the client does not use TLS, shares no version, or is too slow; the socket is then closed.
     with contextlib.suppress(OSError):
         await port.loop.connect_accepted_socket(
             lambda: HttpConnection(port),

@@ -36,7 +36,7 @@ class RosCalls:
 
         def settle(outcome: Any, error: BaseException | None) -> None:
             if answer.done():
-                return  # too late: nobody waits any more
+                return  # too late: the deadline has passed
             if error is not None:
                 answer.set_exception(error)
             else:
@@ -49,7 +49,7 @@ class RosCalls:
         def start() -> None:
             try:
                 future = begin()
-            except Exception as error:  # noqa: BLE001 - it belongs to the caller, not to the executor's thread
+            except Exception as error:  # noqa: BLE001 - raised in the caller, not in the executor's thread
                 hand_over(None, error)
                 return
             future.add_done_callback(

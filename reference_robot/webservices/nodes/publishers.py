@@ -18,15 +18,15 @@ from reference_robot.deliveries import DeliveryRequest
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 
-# Each accepted request is exactly one message (contract, ROS side): nothing gives way before it is acknowledged.
+# Each accepted request is exactly one message (contract, ROS side): keep every message until it is acknowledged.
 _DELIVERY_QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-# A KEEP_ALL writer of Fast DDS holds 5,000 messages. At the next it asks its readers what they have, which takes
-# milliseconds; with one that has fallen behind, publish holds the event loop for 0.1 s, and fails. Then it is left
-# alone for so many seconds. Not asked beforehand by wait_for_all_acked: unasked, readers acknowledge every 3 s.
+# A KEEP_ALL writer of Fast DDS holds 5,000 messages. If it is full, publish waits for acknowledgements. That takes
+# milliseconds or, with a reader that has fallen behind, blocks the event loop for 0.1 s and fails. Publishing then
+# pauses for so many seconds. wait_for_all_acked does not help: readers acknowledge only every 3 s on their own.
 _RECOVERY: Final = 0.5
-# Of velocities the newest alone counts: one that waited would drive the robot by yesterday's wish.
+# Only the newest velocity counts; an older one that waited in a queue must not drive the robot.
 _VELOCITY_QOS: Final = QoSProfile(depth=1)
-_LAST_WORD: Final = Duration(seconds=0.5)  # for a robot to take its last velocity
+_LAST_WORD: Final = Duration(seconds=0.5)  # time for a robot to receive its last velocity
 _VELOCITY_TYPES: Final[dict[str, Any]] = {
     "geometry_msgs/msg/Twist": Twist,
     "geometry_msgs/msg/TwistStamped": TwistStamped,
@@ -40,8 +40,8 @@ class RobotPublishersNode:
         self.node = ros.create_node("robot_publishers")
         self._names = names
         self._delivery = self.node.create_publisher(DeliveryRequestMsg, names.topics.delivery, _DELIVERY_QOS)
-        # rclpy's Publisher does no more than this, but for keeping itself from being destroyed meanwhile: 0.4 µs each
-        # time. Ours is destroyed when nobody is served any more.
+        # rclpy's Publisher does the same, but takes 0.4 µs more per call to guard against its own destruction. This
+        # publisher is destroyed only after all serving has ended.
         self._count_readers = self._delivery.handle.get_subscription_count
         self._publish_octets = self._delivery.handle.publish_raw
         self._behind_until = 0.0

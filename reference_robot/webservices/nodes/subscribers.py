@@ -44,7 +44,7 @@ class RobotSubscribersNode:
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self.node = ros.create_node("robot_subscribers")
         self._ros = ros
-        self._namespace = self.node.get_namespace().rstrip("/") + "/"  # several robots may be on one graph
+        self._namespace = self.node.get_namespace().rstrip("/") + "/"  # a graph may contain several robots
         self.odometry: tuple[bytes | None, float] = (None, 0.0)
         self.on_odometry: Callable[[bytes], None] = lambda _: None
         self.mission_reports: deque[str] = deque(maxlen=_MISSION_REPORTS)
@@ -98,7 +98,7 @@ class RobotSubscribersNode:
             if name.startswith(self._namespace)
             and types[0].partition("/")[0] in _NAVIGATION_PACKAGES
             and "/_" not in name
-            and self.node.count_services(name)  # a name that only a client waits for is no service
+            and self.node.count_services(name)  # a service name without a server has only clients
         ]
 
     # Planning

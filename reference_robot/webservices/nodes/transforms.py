@@ -28,7 +28,7 @@ class MapTransform:
         self.latest: Any = None
         self._parent = names.frames.map
         self._child = names.frames.odom
-        self._mark = self._parent.encode() + b"\0"  # as strings end in CDR
+        self._mark = self._parent.encode() + b"\0"  # CDR strings end with a zero byte
         node.create_subscription(TFMessage, names.topics.tf, self._take, _MOVING, raw=True)
         node.create_subscription(TFMessage, names.topics.tf_static, self._take, _STATIC, raw=True)
 

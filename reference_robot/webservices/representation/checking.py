@@ -46,7 +46,7 @@ def _real(_shape: Real, plain: Any, where: str) -> float:
 
 
 def _whole(shape: Whole, plain: Any, where: str) -> int:
-    # JSON knows one kind of number: 4.0 is 4.
+    # JSON has only one kind of number: 4.0 equals 4.
     number = int(plain) if type(plain) is float and plain.is_integer() else plain
     if type(number) is int and shape.lowest <= number <= shape.highest:
         return number

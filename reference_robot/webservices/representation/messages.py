@@ -59,6 +59,6 @@ def _reader(shape: Shape) -> Callable[[Any], Any]:
         if isinstance(shape.item, (Record, Series)):
             read_item = _reader(shape.item)
             return lambda items: [read_item(item) for item in items]
-        # NumPy arrays and array.array hold ROS's numeric arrays; both hand out Python numbers.
+        # ROS's numeric arrays are NumPy arrays or array.array; tolist of both returns Python numbers.
         return lambda items: items.tolist() if hasattr(items, "tolist") else list(items)
     return lambda value: value

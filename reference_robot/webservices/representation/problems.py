@@ -10,7 +10,7 @@ from reference_robot.webservices.representation.writing import text_of, write_js
 PROBLEM_JSON: Final = "application/problem+json"
 PROBLEM_XML: Final = "application/problem+xml"
 
-_NAMESPACE: Final = "urn:ietf:rfc:7807"  # RFC 9457 appendix B keeps RFC 7807's
+_NAMESPACE: Final = "urn:ietf:rfc:7807"  # RFC 9457 appendix B keeps the namespace of RFC 7807
 
 
 class Problem(Exception):  # noqa: N818 - RFC 9457's own name for it

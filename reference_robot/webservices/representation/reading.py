@@ -18,12 +18,12 @@ from reference_robot.webservices.representation.xml_input import parsed
 
 ACCEPTED: Final = (JSON, XML)
 
-# The contract's grammar of a number, in paths, queries and XML alike; ASCII digits only. Possessive, for what follows a
-# number is never part of one.
+# The contract's grammar of a number in paths, queries and XML; ASCII digits only. The quantifiers are
+# possessive, because the text after a number never belongs to it.
 NUMBER: Final = r"[+-]?+(?:[0-9]++(?:\.[0-9]++)?+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+"
 _REAL: Final = re.compile(NUMBER)
-_WHOLE: Final = re.compile(r"[+-]?[0-9]{1,40}")  # far beyond 64 bits; Python refuses to read 5,000 digits
-_DIGITS_READ: Final = 400  # an integer with more is beyond every double
+_WHOLE: Final = re.compile(r"[+-]?[0-9]{1,40}")  # more than 64 bits; Python refuses 5,000 digits
+_DIGITS_READ: Final = 400  # an integer with more digits exceeds every double
 _XML_SPACE: Final = " \t\r\n"
 
 

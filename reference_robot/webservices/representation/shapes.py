@@ -69,7 +69,7 @@ _WHOLE_NUMBERS: Final = {
     for bits in (8, 16, 32, 64)
 } | {"octet": Whole(0, 255)}
 
-# The contract's fine print: a stamp may be left out everywhere in input, and then means now.
+# The contract's fine print: input may omit every stamp; the present time is used instead.
 _OPTIONAL: Final = {"std_msgs/Header": frozenset({"stamp"})}
 
 

@@ -15,11 +15,11 @@ JSON: Final = "application/json"
 XML: Final = "application/xml"
 TEXT: Final = "text/plain"
 
-# XML 1.0 2.2 "Char": what is outside cannot stand in a document, not even as a character reference.
+# XML 1.0 2.2 "Char": other characters are invalid in a document, even as character references.
 _NO_XML_CHARACTER: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _REPLACEMENT: Final = "\N{REPLACEMENT CHARACTER}"
 
-# A list at the root has no field name for its items.
+# Names of the item elements of lists at the root, which have no field name.
 _ITEM_NAMES: Final = {"Sensors": "sensor", "NavigationServices": "service", "Deliveries": "delivery"}
 
 

@@ -20,23 +20,23 @@ from lxml import etree
 
 from reference_robot.webservices.representation.problems import Problem
 
-# The XML declaration; and a DOCTYPE that nothing but white space, comments and instructions precedes. Both match
-# possessively, so that no document makes them backtrack.
+# The XML declaration, and a DOCTYPE after only white space, comments and processing instructions. Possessive
+# quantifiers prevent slow backtracking.
 _DECLARED: Final = re.compile(rb"<\?xml\s")
 _DECLARATION: Final = re.compile(rb"""\A<\?xml\s[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]++)["']""")
 _DOCTYPE: Final = re.compile(rb"\A(?:\s++|<\?(?s:.*?)\?>|<!--(?s:.*?)-->)*+<!DOCTYPE")
 
-# WS-I R1012 and XML 1.0 4.3.3: every receiver reads UTF-8 and UTF-16. ASCII is part of UTF-8.
+# WS-I R1012 and XML 1.0 4.3.3: every receiver must read UTF-8 and UTF-16. ASCII is a subset of UTF-8.
 _UTF8: Final = frozenset({"utf-8", "ascii"})
 _UTF16: Final = frozenset({"utf-16", "utf-16-le", "utf-16-be"})
 
-# Attributes that one document may have in all. libxml2 before 2.12 compares those of an element pairwise.
+# The largest number of attributes in a document. libxml2 before 2.12 compares an element's attributes pairwise.
 _MOST_ATTRIBUTES: Final = 1000
 _LEAST_ATTRIBUTE: Final = len(' a=""')
 
-_ELEMENT_NAME: Final = re.compile(rb"<([^\x00-\x20/>!?]++)")  # \s would be looked up for each octet
-_LONGEST_NAME: Final = 100  # octets
-_NEW_NAMES: Final = 32  # that one document may teach; a client's own messages have fewer
+_ELEMENT_NAME: Final = re.compile(rb"<([^\x00-\x20/>!?]++)")  # faster than \s, which needs a table look-up per byte
+_LONGEST_NAME: Final = 100  # bytes
+_NEW_NAMES: Final = 32  # new names per document; ordinary messages have fewer
 
 
 class KnownNames:
@@ -64,7 +64,7 @@ class KnownNames:
         The new names then count as known.
         """
         names = _ELEMENT_NAME.findall(text)
-        # What precedes an equals sign names an attribute; words of a text may be among it, which does no harm.
+        # The word before an equals sign is an attribute's name, or harmlessly a word of a text.
         for before in text.split(b"=")[:-1]:
             names += before.rsplit(None, 1)[-1:]
         return self._known.issuperset(names) or self._learns(set(names) - self._known)
@@ -85,12 +85,12 @@ _known_names: Final = KnownNames()
 
 def _new_parser() -> etree.XMLParser:
     return etree.XMLParser(
-        encoding="utf-8",  # decided before parsing, whatever the declaration says
+        encoding="utf-8",  # the text has been converted; the declaration is ignored
         resolve_entities=False,
         no_network=True,
         load_dtd=False,
         huge_tree=False,
-        remove_comments=True,  # so that a value with a comment in it is one text
+        remove_comments=True,  # otherwise a comment would split a value into two texts
     )
 
 
@@ -145,7 +145,7 @@ def _as_utf8(body: bytes, charset: str | None) -> bytes:
 def _own_encoding(body: bytes) -> str:
     """Return a document's encoding from its byte order mark, first bytes or declaration (XML 1.0 appendix F)."""
     if body[:1] == b"<" and body[1:2] not in b"?\0":
-        return "utf-8"  # as almost all of them
+        return "utf-8"  # the usual case
     if body.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
     if body.startswith(b"<\0"):

@@ -13,7 +13,7 @@ from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, wanted_format
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
 
-# The values of the path, in the order of the message's fields and by the path template's names.
+# The path template's names of the values, in the order of the message's fields.
 _NAMES: Final = ("code", *PATH_NAMES)
 _PREFIX: Final = "/robot/app/delivery/"
 _ANY: Final = re.compile((f"{_PREFIX}([^/]*)" + "".join(f"/{name}/([^/]*)" for name in PATH_NAMES)).encode())

@@ -31,7 +31,7 @@ class Health(Resource):
     """The robot's health; the status is 200 even if the robot is unhealthy."""
 
     path = "/robot/health/"
-    # As it stands under its path in an OpenAPI description.
+    # The entry for this path in the OpenAPI description.
     described: Final[dict[str, Any]] = {
         "get": {
             "operationId": "getHealth",

@@ -14,8 +14,8 @@ from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.robot.missions import MissionTable
 
 _CODES: Final = frozenset({COURIER, COFFEE})
-_REMEMBERED: Final = 100  # the contract asks for the last 50
-_REPORTS: Final = 50  # on missions, that may wait to be read
+_REMEMBERED: Final = 100  # the contract requires the last 50
+_REPORTS: Final = 50  # mission reports that may wait to be read
 _NANOSECONDS: Final = 10**9
 
 
@@ -42,7 +42,7 @@ class Deliveries:
         self._publishers = publishers
         self._reports = subscribers.mission_reports
         self._missions = MissionTable()
-        # Each with the time in nanoseconds and the interface; plain, for one is made with each request.
+        # Each with its time in nanoseconds and its interface. Plain tuples, because each request creates one.
         self._accepted: deque[tuple[DeliveryRequest, int, Sender]] = deque(maxlen=_REMEMBERED)
 
     def accept(self, request: DeliveryRequest, interface: Sender) -> None:
@@ -55,10 +55,10 @@ class Deliveries:
         """
         _require_usable(request)
         if len(self._reports) > _REPORTS:
-            self._missions.note(self._reports.popleft())  # one: all at once would hold up who comes next
+            self._missions.note(self._reports.popleft())  # all at once would delay the next request
         if not self._publishers.delivery_is_served():
             raise not_yet("no delivery application listens on the robot")
-        at = time.time_ns()  # before a mission can begin
+        at = time.time_ns()  # before publishing, so that no mission is older than its request
         if not self._publishers.publish_delivery(request):
             raise not_yet("the delivery application cannot keep up with the requests")
         self._accepted.append((request, at, interface))
@@ -88,7 +88,7 @@ def _require_usable(request: DeliveryRequest) -> None:
     if request.message_code not in _CODES:
         raise UnusableFieldError("message_code", "must be 3 (courier) or 4 (coffee)")
     if not math.isfinite(sum(request)):
-        # Finite doubles may add up to an infinity; so look closer before refusing.
+        # The sum of finite doubles may be infinite, so check each value before refusing.
         for field, value in request._asdict().items():
             if not math.isfinite(value):
                 raise UnusableFieldError(field, "must be finite")

@@ -26,7 +26,7 @@ from reference_robot.webservices.robot.reported_goals import STATUS_TEXTS, told_
 from reference_robot.webservices.robot.target_poses import require_pose
 
 _GOAL_ID: Final = Record("GoalID", (("stamp", shape_of(Time)), ("id", Text(1, 255))), optional=frozenset({"stamp"}))
-# move_base_msgs/MoveBaseActionGoal, a type of ROS 1 that only the web interface still knows.
+# move_base_msgs/MoveBaseActionGoal, a ROS 1 type that only the web interface uses.
 GOAL: Final = Record(
     "MoveBaseActionGoal",
     (
@@ -38,7 +38,7 @@ GOAL: Final = Record(
 )
 
 _REMEMBERED: Final = 100
-_REASON_COMES_WITHIN: Final = 0.3  # seconds after a refusal in which its reason may still arrive
+_REASON_COMES_WITHIN: Final = 0.3  # seconds to wait for the reason of a refusal
 _REASON_STEP: Final = 0.02
 
 
@@ -61,7 +61,7 @@ class _Goal:
     @property
     def status(self) -> int:
         reported: int = self.handle.status
-        return reported or GoalStatus.STATUS_ACCEPTED  # 0: accepted, and no status has come yet
+        return reported or GoalStatus.STATUS_ACCEPTED  # 0: accepted, but no status received yet
 
 
 class Goals:
@@ -81,9 +81,9 @@ class Goals:
         self._navigator = navigator
         self._frames = frames
         self._own: _Goal | None = None
-        self._sending = 0  # how many goals the navigation is being asked to take, or will be next
+        self._sending = 0  # goals that are being sent, or wait to be sent
         self._cancels = 0
-        # Goals that are ours, or were cancelled: what the robot tells of its current goal may lag behind.
+        # Ids of our own and of cancelled goals, because the robot's report of its goal may lag behind.
         self._known: deque[str] = deque(maxlen=_REMEMBERED)
         self._one_at_a_time = asyncio.Lock()
 
@@ -132,7 +132,7 @@ class Goals:
                 raise Problem(409, f"goal_id.id {identity!a} is the current goal's, which has another target_pose")
             return 200, current
         own = self._own = await self._accepted(self._filled_in(wanted), cancels)
-        # A goal where the robot already stands may have ended by now: then it is no longer current.
+        # A goal at the robot's present pose may have ended already; then there is no current goal.
         sent = self.current() or own.described | {"status": {"code": 1, "text": "accepted"}}
         return (201 if current is None else 202), sent
 
@@ -146,12 +146,12 @@ class Goals:
         if current is None and not sending:
             raise Problem(404, "the robot follows no goal")
         self._cancels += 1
-        # All of them: another one may have displaced the goal that we know of a moment ago.
+        # Cancel all goals: another goal may have displaced the known one a moment ago.
         doomed = [goal.identity for goal in self._subscribers.goals.active()]
         reply = await self._calls.result(self._publishers.cancel_all_goals, "the navigation's cancel service")
         if current is not None and reply.return_code == CancelGoal.Response.ERROR_REJECTED:
             raise Problem(409, f"the navigation refuses to cancel goal {current['goal_id']['id']!a}")
-        # Cancelled, unknown or ended: in each case it is current no longer.
+        # The goal is cancelled, unknown or ended: in each case no longer current.
         if self._own is own:
             self._own = None
         self._known.extend(doomed if current is None else [*doomed, current["goal_id"]["id"]])
@@ -159,7 +159,7 @@ class Goals:
     def _active_own(self) -> _Goal | None:
         own = self._own
         if own is None or not self._publishers.navigation_is_served():
-            return None  # without a navigation, nobody follows it
+            return None  # without a navigation no goal is followed
         goals = self._subscribers.goals
         is_lost = own.losses != goals.losses and own.identity.hex() not in {goal.identity for goal in goals.active()}
         if is_lost or own.status not in STATUS_TEXTS:
@@ -172,7 +172,7 @@ class Goals:
             return None
         told = self._subscribers.current_goal
         if told == "":
-            return None  # it says itself that it follows none
+            return None  # the robot reports that it follows no goal
         goal = told_goal(told) if told else None
         if goal is None:
             unknown = [goal for goal in self._subscribers.goals.active() if goal.identity not in self._known]
@@ -203,7 +203,7 @@ class Goals:
         """
         if not self._publishers.navigation_is_served():
             raise not_yet("the robot has no navigation that takes goals")
-        identity = uuid.uuid4().bytes  # ROS's own: an id of the web may come again for another goal
+        identity = uuid.uuid4().bytes  # not the client's id, which may be reused for another goal
         self._known.append(identity.hex())
         losses = self._subscribers.goals.losses
         pose = message_from(shape_of(PoseStamped), described["goal"]["target_pose"])
@@ -212,13 +212,13 @@ class Goals:
             handle = await self._calls.result(lambda: self._publishers.send_goal(identity, pose), "the navigation")
         except Problem:
             with contextlib.suppress(ValueError):
-                self._known.remove(identity.hex())  # should it be taken yet, it is nobody's that we know of
+                self._known.remove(identity.hex())  # if it is accepted later, it counts as another client's
             raise
         if not handle.accepted:
             await self._navigator.require_active()
             reason = await self._reason(described["goal"]["target_pose"])
             raise Problem(422, f"goal.target_pose is refused by the navigation: {reason}")
-        if self._cancels != cancels:  # it may have been taken after the DELETE had reached the navigation
+        if self._cancels != cancels:  # the goal may have been accepted after the DELETE
             cancel = self._publishers.cancel_goal
             await self._calls.result(lambda: cancel(identity), "the navigation's cancel service")
         self._require_wanted(cancels)

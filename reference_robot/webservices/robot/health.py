@@ -36,7 +36,7 @@ class Health:
         hangs = subscribers.hangs()
         age = self._odometry.age()
         is_current = age is not None and age <= OLDEST
-        # Without ROS's threads, nobody's answer would come.
+        # While a ROS thread hangs, no response would arrive.
         navigator, planner = (
             ("unknown", "unknown") if hangs else await asyncio.gather(self._navigator.state(), self._planner.state())
         )

@@ -30,7 +30,7 @@ class _Report(msgspec.Struct):
     missions: list[_Told]
 
 
-# A report of a hundred missions is read in 0.1 ms, which other requests wait for; with json and checks of our own, 0.3.
+# msgspec reads a report of a hundred missions in 0.1 ms, json and checks in Python in 0.3 ms; other requests wait.
 _REPORT: Final = msgspec.json.Decoder(_Report)
 
 
@@ -47,7 +47,7 @@ class MissionTable:
     """The last 300 missions that the delivery application reported."""
 
     def __init__(self) -> None:
-        self._missions: dict[tuple[int, int], Mission] = {}  # by time and number, oldest first
+        self._missions: dict[tuple[int, int], Mission] = {}  # by time and number, oldest report first
 
     def note(self, report: str) -> None:
         """Add the missions of a report (JSON, see ``names.toml``); an invalid report is ignored."""
@@ -55,7 +55,7 @@ class MissionTable:
             found = [_mission(told) for told in _REPORT.decode(report).missions]
         except (msgspec.DecodeError, TypeError):
             return
-        for key, mission in reversed(found):  # which are told newest first
+        for key, mission in reversed(found):  # a report lists the newest first
             self._missions[key] = mission
         while len(self._missions) > _REMEMBERED:
             del self._missions[next(iter(self._missions))]

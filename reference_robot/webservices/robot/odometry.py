@@ -18,7 +18,7 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
-OLDEST: Final = 1.0  # seconds; what is older is no odometry (contract, REST)
+OLDEST: Final = 1.0  # seconds; older odometry counts as missing (contract, REST)
 
 T = TypeVar("T")
 Writer = Callable[[dict[str, Any]], Any]  # of a plain nav_msgs/Odometry
@@ -32,7 +32,7 @@ class LatestOdometry:
     def __init__(self, subscribers: RobotSubscribersNode) -> None:
         self._subscribers = subscribers
         self._read = reader_of(Odometry)
-        self._came = 0  # messages
+        self._came = 0  # messages so far
         self._told = _Told(0, b"", None, _NOBODY)
         subscribers.on_odometry = self._foresee
 
@@ -91,7 +91,7 @@ class LatestOdometry:
             plain = self._read(told.message)
             told.written = {writer: writer(plain) for writer in wanted}
         except Problem:
-            return  # whoever asks is told
+            return  # a request for the message gets the problem
         self._told = told
 
     def _successor(self, octets: bytes, last: _Told) -> _Told:

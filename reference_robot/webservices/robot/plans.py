@@ -76,7 +76,7 @@ class Planner:
         stamped_start = None if start is None else self._stamped(into(start), frame)
         goal = self._stamped(into(planar_pose(query.x, query.y, query.yaw)), frame)
         if self._subscribers.plan_service_is_served():
-            # A start in no frame is none (move_base's make_plan).
+            # A start without a frame_id means the robot's own pose (move_base's make_plan).
             request = GetPlan.Request(start=stamped_start or PoseStamped(), goal=goal, tolerance=query.tolerance)
             reply = await self._calls.result(lambda: self._subscribers.ask_plan_service(request), "the plan service")
             path = reply.plan

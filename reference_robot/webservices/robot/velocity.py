@@ -15,7 +15,7 @@ from reference_robot.webservices.representation.shapes import shape_of
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.watchdog import VelocityWatchdog
 
-_DISCOVERY: Final = 1.0  # seconds that a robot just found may take to be connected
+_DISCOVERY: Final = 1.0  # seconds to wait for a robot's subscription
 _DISCOVERY_STEP: Final = 0.02
 
 
@@ -89,7 +89,7 @@ class Velocity:
             if self._goal_is_active():
                 return
         except Problem:
-            pass  # what the robot does is not known: to stop is safe
+            pass  # the robot's state is unknown: stopping is safe
         self._publishers.publish_velocity(Twist())
 
     def _check_limits(self, twist: dict[str, Any]) -> None:

@@ -21,7 +21,7 @@ class VelocityWatchdog:
         """Restart the hold time, because a velocity was just sent; call on the event loop's thread."""
         loop = asyncio.get_running_loop()
         self._ends_at = loop.time() + self._hold
-        if self._timer is None:  # or it looks again when it is due: cheaper than a new timer for each of 100 a second
+        if self._timer is None:  # a running timer checks `_ends_at` itself; cheaper than a new timer each time
             self._timer = loop.call_at(self._ends_at, self._look, loop)
 
     def release(self) -> None:

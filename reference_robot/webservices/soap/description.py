@@ -35,7 +35,7 @@ class ServiceDescription:
     def require_valid(self, element: etree._Element) -> None:
         """Raise a Client fault for an element that is invalid by the XSD (R2724)."""
         if not self._schema.validate(element):
-            # libxml2 quotes names and values of the message itself, and nothing of the robot's.
+            # libxml2's texts quote only names and values of the message, nothing internal to the robot.
             log: Any = self._schema.error_log
             told = "; ".join(entry.message for entry in log[:_ERRORS_TOLD])
             raise client_fault(f"{shown(element.tag)} is not what the description says: {told}")

@@ -13,11 +13,11 @@ _BODY: Final = f"{{{SOAP}}}Body"
 _MUST_UNDERSTAND: Final = f"{{{SOAP}}}mustUnderstand"
 _ACTOR: Final = f"{{{SOAP}}}actor"
 
-# SOAP 1.1, 4.2.2: without an actor, or with this one, a header block is meant for whoever receives it.
+# SOAP 1.1, 4.2.2: without an actor, or with this one, a header block is meant for the receiver of the message.
 _FOR_US: Final = frozenset({None, "", "http://schemas.xmlsoap.org/soap/actor/next"})
 
-# WS-Addressing is tolerated, mandatory or not (contract): the answer goes back on the connection that asked, which is
-# what an anonymous ReplyTo asks for. No other address is ever called.
+# WS-Addressing headers are accepted, mandatory or not (contract). The response is sent on the same connection, as an
+# anonymous ReplyTo requests. The robot never connects to another address.
 _TOLERATED: Final = ("{http://www.w3.org/2005/08/addressing}", "{http://schemas.xmlsoap.org/ws/2004/08/addressing}")
 
 

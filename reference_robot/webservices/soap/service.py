@@ -60,7 +60,7 @@ class SoapService:
         root = parsed(request.content(), charset)
         try:
             outcome = self._answer(root)
-        except Exception as error:  # noqa: BLE001 - whatever went wrong, the client gets a fault
+        except Exception as error:  # noqa: BLE001 - after any error the client gets a fault
             return _faulted(root, error)
         return outcome if isinstance(outcome, Response) else _awaited(root, outcome)
 
